@@ -144,6 +144,8 @@ def _found(result: Result, found: Diagnosis | None) -> str:
         return "nobody has looked, for diagnose was not done"
     if found.verdict == "nothing-wrong":
         return "nothing"
+    if found.verdict == "cannot-judge":
+        return "nothing, for these logs cannot be judged"
     asked = {_place(fault): _given(fault) for fault in result.fault}
     told = []
     for one in found.findings:

@@ -138,7 +138,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is not None and Path(settings.model).is_file():
         sources.append(Path(settings.model).absolute())
     sources = [*logs.sources, *(path.absolute() for path in sources)]
-    return Inputs(logs.logs, logs.rejected, logs.checks, tuple(sources), logs.hashes, robot=robot,
+    return Inputs(logs.logs, logs.rejected, (*robot.checks, *logs.checks), tuple(sources), logs.hashes, robot=robot,
                   material=Material(robot, arm, bounds, recipe, modes, request.tell, why),
                   label=_label(settings), robot_name=robot.name)
 

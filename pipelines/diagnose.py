@@ -110,8 +110,9 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     Raises:
         NothingMatched: C06, no log to fit.
         UsageError: C01, C02, settings that do not fit, logs of several robots, or a model or a calibration of another one.
-        InputRejected: the doctor rejects a log: its first reason; S13, S14, S15, T06, torque and motion of a log do not belong
-            together; T04, no stretch of a log can be used; T08, too few equations are left; D14, one recording in two roles.
+        InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks gravity, has one of another
+            direction, or has no sign; S13, S14, S15, T06, torque and motion of a log do not belong together; T04, no stretch of
+            a log can be used; T08, too few equations are left; D14, one recording in two roles.
     """
     _refuse_strange(settings)
     given = inputs.material if isinstance(inputs.material, Material) else Material(None, lambda words: None)
@@ -126,15 +127,15 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
                          f"{chosen.identify[0].n_joints}", where="--model", remedy="give a model of this robot")
     given.tell("examining the logs")
     memory = Memory()
-    said = memory.examined(chosen, settings.allow_mismatch)
+    said, boundary = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
                                settings.decimate, settings.min_speed, settings.seed, evidence=whole, limits=whole)
     found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)
-    found = _beside_clocks(found, said)
+    found = replace(_beside_clocks(found, said), boundary=boundary)
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
-                  without=settings.without, doctor=said, memory=memory,
+                  without=settings.without, doctor=(*said, *found.checks), memory=memory,
                   laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name,
                   calibrated_with=() if given.calibration is None else tuple(one.name for one in given.calibration.origin.logs))
 
@@ -142,7 +143,7 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
 def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
     """Logs whose torque is late alike, before and after, show nothing that has changed: that they are late has to be said."""
     late = next((check for check in said if check.code == "RRID-T06"), None)
-    if found.verdict != "nothing-wrong" or late is None:
+    if found.verdict not in ("nothing-wrong", "cannot-judge") or late is None:
         return found
     words = f"in {Path(late.where.partition(',')[0]).name} {late.message}"
     return replace(found, reason=f"{found.reason}; {words}" if found.reason else words,

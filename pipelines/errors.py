@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 __all__ = ["Check", "EnvironmentFault", "Gathering", "InputRejected", "Interrupted", "Level", "NothingMatched", "RrridError",
-           "UsageError", "clean", "did_you_mean"]
+           "UsageError", "clean", "did_you_mean", "escaped"]
 
 Level = Literal["ok", "warn", "repair", "reject"]
 
@@ -23,10 +23,16 @@ Level = Literal["ok", "warn", "repair", "reject"]
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 
-def clean(text: object, limit: int = 400) -> str:
-    """`text` as one printable line of at most `limit` characters, control characters taken out."""
+def clean(text: object, limit: int | None = 400) -> str:
+    """`text` as one printable line of at most `limit` characters (None: all of it), control characters taken out."""
     line = " ".join(_CONTROL.sub("", str(text).encode("utf-8", "replace").decode("utf-8")).split())
-    return line if len(line) <= limit else line[: limit - 1] + "…"
+    return line if limit is None or len(line) <= limit else line[: limit - 1] + "…"
+
+
+def escaped(path: object) -> str:
+    """`path` as one printable line that still names it: control characters as \\x1b."""
+    text = str(path).encode("utf-8", "backslashreplace").decode("utf-8")
+    return re.sub(rf"{_CONTROL.pattern}|[\t\n]", lambda found: found[0].encode("unicode_escape").decode(), text)
 
 
 def did_you_mean(word: str, known: Iterable[str], most: int = 1, near_by: float = 0.6) -> str:

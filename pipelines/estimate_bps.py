@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
-from pipelines.fit.identifiability import hard_to_see
+from pipelines.estimation.checks.boundary import Boundary, torque_boundary
+from pipelines.estimation.checks.findings import boundary_findings, without_followers
+from pipelines.fit.identifiability import hard_to_see, not_separated
 from pipelines.log.canonical import digest_of
 from pipelines.log.covariance_file import read_covariance, write_covariance
 from pipelines.log.derive import derive, recording
@@ -29,14 +31,16 @@ from pipelines.model.estimation.checks import consistency
 from pipelines.model.estimation.compare import compare
 from pipelines.model.estimation.floor import averaged, residuals
 from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, fit_logs, judge, with_cutoff
+from pipelines.model.estimation.negative_viscous import negative_viscous
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
 from pipelines.model.estimation.outcome import torques as torque_parts
+from pipelines.model.estimation.rests import without_stiction
 from pipelines.model.estimation.result import Result
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
 from pipelines.model.mean_period import doubts
-from pipelines.model.motion import Reconstructed, reconstruct
+from pipelines.model.motion import Reconstructed, for_equations, reconstruct
 from pipelines.model.parameter import Uncertainty
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
@@ -94,7 +98,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     Raises:
         NothingMatched: C06, no log to fit.
         UsageError: C02, settings that do not fit, logs of several robots, or a model of another one.
-        InputRejected: the doctor rejects a log: its first reason; S13, S14, S15, T06, torque and motion of a log do not belong
+        InputRejected: the doctor rejects a log: its first reason; S23, S24, S25, the torque lacks gravity, has one of another
+            direction, or has no sign; S13, S14, S15, T06, torque and motion of a log do not belong
             together; T04, no stretch of a log can be used; T08, too few
             equations are left; D14, a log that is fitted shall judge as well.
     """
@@ -108,17 +113,23 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
         refuse_unfit(settings, log)
-    motions, said = _examined(identify, settings)
-    judges, said_too = _examined(validate, settings)
-    recipe = with_cutoff(recipe, motions)
-    means, scatter = averaged((*motions, *judges), settings.reconstruction, recipe.cutoff_hz)
+    subjects, judging = _accepted(identify), _accepted(validate)
+    boundary, said_of_torque = _boundary(identify, settings)
+    motions, said = _examined(identify, subjects, settings, said_of_torque)
+    judges, said_too = _examined(validate, judging, settings, said_of_torque)
+    even = for_equations((*motions, *judges))
+    recipe = with_cutoff(recipe, even[:len(motions)])
+    means, scatter = averaged(even, settings.reconstruction, recipe.cutoff_hz)
+    means = without_stiction(means, len(motions), columns, recipe, settings.weighted)
     fitted = fit_logs(means[:len(motions)], columns, recipe, settings.weighted)
     judged = judge(fitted, means[len(motions):], settings.blocks)
     arm = fitted_arm(fitted.estimate, identify[0].robot_name, () if given is None else given.friction)
     logs = (*identify, *validate)
     said_of_periods = [check for own, log in zip(scatter, logs, strict=True) if own is not None
                        for check in doubts(own.floor, log.source or log.name, settings.average)]
-    result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), doctor=(*said, *said_too, *said_of_periods),
+    said += negative_viscous(fitted.estimate, arm.name)
+    result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), boundary=boundary,
+                     doctor=(*said_of_torque, *said, *said_too, *said_of_periods),
                      noise_floor=residuals(scatter, fitted, judged, logs, settings.average))
     return result if not settings.compare else replace(
         result, comparison=compare(fitted, judged, settings.blocks, settings.weighted),
@@ -134,17 +145,43 @@ def _rigid_body_alone(fitted: Fitted, means: Motions, settings: Settings) -> tup
     return tuple(map(float, judge(alone, means[identify:], settings.blocks).errors.rms))
 
 
-def _examined(logs: list[ExperimentLog], settings: Settings) -> tuple[Motions, tuple[Check, ...]]:
-    """The motion of every log, and what the doctor says of it; of what the logs do not show, D09, the estimate itself knows."""
-    motions, said = [], []
+def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
+    """What the doctor says of every log; of what the logs do not show, D09, the estimate itself knows.
+
+    Raises:
+        InputRejected: the first reason to reject one.
+    """
+    subjects = []
     for log in logs:
         subject = Subject(recording(log))
         checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
         if reject := next((check for check in checks if check.level == "reject"), None):
             raise reject.as_error()
-        against = mismatches(subject)
+        subjects.append((subject, checks))
+    return subjects
+
+
+def _boundary(logs: list[ExperimentLog], settings: Settings) -> tuple[Boundary | None, tuple[Check, ...]]:
+    """What the torque of the logs is, and what of it is told, where a mismatch is allowed."""
+    boundary = torque_boundary([recording(log) for log in logs])
+    findings = boundary_findings(boundary, logs[0].source or logs[0].name)
+    if findings and not settings.allow_mismatch:
+        raise _with_way_out(findings[0]).as_error()
+    return boundary, findings
+
+
+def _with_way_out(gate: Check) -> Check:
+    return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch")
+
+
+def _examined(logs: list[ExperimentLog], subjects: list[tuple[Subject, list[Check]]], settings: Settings,
+              findings: tuple[Check, ...]) -> tuple[Motions, tuple[Check, ...]]:
+    """The motion of every log, and what is said of it."""
+    motions, said = [], []
+    for log, (subject, checks) in zip(logs, subjects, strict=True):
+        against = without_followers(mismatches(subject), findings)
         if not settings.allow_mismatch and (gate := next((check for check in against if check.gate), None)):
-            raise replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch").as_error()
+            raise _with_way_out(gate).as_error()
         motions.append((log, reconstruct(log, settings.reconstruction, subject.good)))
         said += [*checks, *against]
     return tuple(motions), tuple(said)
@@ -176,6 +213,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         physically_consistent=None if checked is None else checked.consistent, consistency=checked, balance=power_balance(found),
         unresolved=found.unresolved.told(columns_in_words(names)),
         hard_to_see=tuple(Direction(d.singular_value, d.weights) for d in hard_to_see(found.solution, names)),
+        not_separated=not_separated(found.solution, found.std, names),
         comparison=(), convergence_samples=growth.samples, convergence=growth.beta, convergence_std=growth.std,
         courses=tuple(course(log, motion, parts, fitted.cutoff_hz) for log, motion, parts in torques[:_COURSES]),
         arm=arm, model=arm.to_model(validity=validity(motions[:len(fitted.motions)]), sources=_sources(motions),

@@ -117,7 +117,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was not done", where=inputs.label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     memory = (inputs.material.memory if isinstance(inputs.material, Diagnosed) else None) or Memory()  # none of one taken back
-    said = memory.examined(chosen, settings.allow_mismatch)
+    said, _ = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
                                min_speed=settings.min_speed)
     found = extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)
@@ -165,6 +165,8 @@ def _found_instead(diagnosed: Diagnosed) -> str:
     """What `diagnose` says, where it names nothing that a model could have."""
     if diagnosed.verdict == "unknown":
         return "diagnose found something wrong, and no cause for it"
+    if diagnosed.verdict == "cannot-judge":
+        return "diagnose cannot judge these logs"
     if diagnosed.findings:
         return "what diagnose found happens once, or is in doubt, and has no place in a model"
     changed = diagnosed.question == "what has changed"

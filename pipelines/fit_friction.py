@@ -32,6 +32,7 @@ from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
 from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.methods import METHODS, by_method
 from pipelines.model.friction.misfit import misfits
+from pipelines.model.friction.nuisances import nuisance_findings
 from pipelines.model.friction.result import JointResult, Result, joint_result, several_results
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
@@ -52,7 +53,7 @@ class Settings:
 
     law: str | None = None  # a law of the ladder, or several joined by "+"; None: the simplest that is not measurably worse
     method: str = "varpro"  # how its numbers are found in the end: varpro, output-error or ekf
-    window: float = 0.02  # [s] of the equations
+    window: float = 0.02  # [s] of the equations, the shortest: a coarse encoder takes longer ones
     order: int = Reconstruction.order  # of the smoother that motion begins with
     together: bool = True  # where no joint was driven alone: friction with the base parameters, from logs in which all move
 
@@ -84,6 +85,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     joints = [by_method(fit_joint(part, settings.window, law), settings.method) for part in _by_joint(seen)]
     found = tuple(check for joint in joints for check in findings(joint))
     robot = identify[0].robot
+    found += tuple(check for joint in joints for check in nuisance_findings(joint, robot.joints[joint.logs.joint - 1].name))
     results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method) for joint in joints)
     found += misfits(results, inputs.label)
     arm = _arm(identify[0], joints)

@@ -24,8 +24,9 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.frf.findings import Findings, frf_findings
+from pipelines.model.frf.grouping import FLAT, advance
 from pipelines.model.frf.modes import BAND
-from pipelines.model.frf.responses import How
+from pipelines.model.frf.responses import How, Measured
 from pipelines.model.frf.result import Classified, Method, Posture, Undecided, classified, methods_of, posture_of, undecided
 from pipelines.report.frf_report import frf_report
 from pipelines.report.report import Report
@@ -35,8 +36,8 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
 _RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans "
            "one, at home or where --home says")
+_UNFOLDED = "log all signals by one clock at the controller's own rate; or thin them out behind the same low-pass"
 _RELIABLE = 0.7
-_MOST_LOW = 0.9  # of the bins in the band under that coherence: low everywhere
 _SWING = 0.25  # of the turning speed: beyond it friction now and then turns its sign
 
 
@@ -92,7 +93,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     said = tuple(check for log in logs for check in _examined(log))
     found = frf_findings(logs, arm, How(settings.estimator, settings.resolution), (settings.low, settings.high))
     postures = tuple(posture_of(seen) for seen in found.seen)
-    _refuse_no_posture(settings, max(Counter(posture.joint for posture in postures).values()))
+    _refuse_no_posture(settings, max(Counter(posture.joint for posture in postures).values(), default=0))
     return Result(logs[0].robot_name, tuple(m for seen in found.seen for m in methods_of(seen)), postures, classified(found),
                   undecided(found), settings.postures, (*said, *_complaints(found, settings)))
 
@@ -128,20 +129,37 @@ def _examined(log: ExperimentLog) -> list[Check]:
 def _complaints(found: Findings, settings: Settings) -> list[Check]:
     """D13, coherence too low; D09, friction that turns its sign."""
     said = []
+    for one in found.unusable:
+        if one.aliased:
+            said.append(Check.of("T09", "warn", f"torque of joint {one.joint} was sampled, and v has power up to half the rate: "
+                                 "what is faster has folded back (aliasing), and no mode can be told", where=_logs_of(one),
+                                 gate=True, remedy=_UNFOLDED))
+            continue
+        said.append(Check.of("D13", "warn", f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: "
+                             "no frequency can be relied on, no mode is looked for", where=_logs_of(one), gate=True,
+                             remedy="excite more strongly, record longer, or look for what disturbs the joint"))
+    for joint in sorted({seen.measured.joint for seen in found.seen}):
+        own = [seen for seen in found.seen if seen.measured.joint == joint]
+        first = own[0].measured.first
+        early = advance([seen.modes for seen in own], first.sample_time, first.held)
+        if early is not None and max(seen.modes.flat for seen in own) < FLAT:
+            said.append(Check.of("T06", "warn", f"joint {joint} moves {-1e3 * early.value:.3g} ms before its torque: torque and "
+                                 "position have different clocks, or what is faster has folded back (aliasing)",
+                                 where=", ".join(_logs_of(seen.measured) for seen in own), gate=True, remedy=_UNFOLDED))
     for seen in found.seen:
-        m, where = seen.measured, ", ".join(t.name for t in seen.measured.turned)
-        inside = m.plant.within(settings.low, settings.high)
-        low = float(np.mean(inside.coherence < _RELIABLE)) if len(inside.frequency) else 1.0
-        if low > _MOST_LOW:
-            said.append(Check.of("D13", "warn", f"the coherence of joint {m.joint} is under {_RELIABLE:g} nearly everywhere: no "
-                                 "frequency can be relied on", where=where, gate=True,
-                                 remedy="excite more strongly, record longer, or look for what disturbs the joint"))
-        elif low > 0.0:
+        m = seen.measured
+        inside = m.plant.within(*seen.modes.band)
+        low = float(np.mean(inside.coherence < _RELIABLE))
+        if low > 0.0:
             said.append(Check.of("D13", "warn", f"the coherence of joint {m.joint} is under {_RELIABLE:g} at {100.0 * low:.2g} % "
-                                 "of the frequencies; they are shaded and hardly weigh", where=where,
+                                 "of the frequencies of its excited band; they are shaded and hardly weigh", where=_logs_of(m),
                                  remedy="excite these frequencies more strongly, or record longer"))
-        said += _turning(seen.measured.joint, m.first.speed, max(t.swing for t in m.turned), where)
+        said += _turning(m.joint, m.first.speed, max(t.swing for t in m.turned), _logs_of(m))
     return said
+
+
+def _logs_of(measured: Measured) -> str:
+    return ", ".join(t.name for t in measured.turned)
 
 
 def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Check]:

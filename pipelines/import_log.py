@@ -116,7 +116,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """
     material: Material = inputs.material
     mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
-    checks: list[Check] = []
+    checks: list[Check] = list(material.robot.checks)
     logs: list[ImportedLog] = []
     problems = Gathering()
     for source in material.sources:

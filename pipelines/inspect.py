@@ -14,6 +14,8 @@ from collections import defaultdict
 from dataclasses import dataclass, replace
 
 from pipelines.errors import Check, RrridError
+from pipelines.estimation.checks.boundary import Boundary, torque_boundary
+from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.log.codes import first_to_read, title_of
 from pipelines.log.doctor.checks import NotTested, Subject, check_together, findings
 from pipelines.log.doctor.checks_subject import many
@@ -23,6 +25,7 @@ from pipelines.log.doctor.summary import LogSummary, summary_of
 from pipelines.log.files import Opened
 from pipelines.log.robot import RobotDescription, format_robot
 from pipelines.model.plausibility import plausibility_findings
+from pipelines.report.boundary_card import boundary_card
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import checks_table, level_tone
@@ -54,6 +57,7 @@ class Result:
     logs: tuple[LogSummary, ...]
     rejected: tuple[str, ...]  # files that could not be opened
     previews: tuple[Preview, ...]
+    boundary: Boundary | None = None  # what the logged torque is; null: no log tells, or the logs are of several robots
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -80,10 +84,26 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         if len(previews) < _PREVIEWS and subject.sampled:
             previews.append(log_preview(subject))
     found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
+    boundary, of_torque = _torque(inputs, subjects, logs)
+    found = [*of_torque, *without_followers(found, of_torque)]
     if len({log.robot for log in logs}) == 1:
         found = list(columns_first(found))
     return Result((*reading, *found), tuple(blind), len(reading), tuple(logs),
-                  tuple(str(r.path) for r in inputs.rejected), tuple(previews))
+                  tuple(str(r.path) for r in inputs.rejected), tuple(previews), boundary)
+
+
+def _torque(inputs: Inputs, subjects: list[Subject], logs: list[LogSummary]) -> tuple[Boundary | None, tuple[Check, ...]]:
+    """What the torque of the logs that can be used is; nothing of several robots, which are told apart by `run` and `batch`."""
+    usable = [(subject.log, opened.path) for subject, opened, summary in zip(subjects, inputs.logs, logs, strict=True)
+              if summary.verdict != "reject"]
+    if len({log.robot_text for log, _ in usable}) != 1:
+        return None, ()
+    try:
+        boundary = torque_boundary([log for log, _ in usable])
+    except RrridError:  # a description without usable geometry, which is told of the log
+        return None, ()
+    place = usable[0][1] if len(usable) == 1 else usable[0][1].parent
+    return boundary, boundary_findings(boundary, str(place))
 
 
 def _with_way_out(item: Check | NotTested) -> Check | NotTested:
@@ -127,7 +147,8 @@ def exit_code(result: Result, check: bool) -> int:
 def report(result: Result) -> Report:
     """The verdict, what was found, what was looked at, and the signals of the first logs."""
     found = sorted((c for c in result.checks if c.level != "ok"), key=first_to_read)
-    sections = [_found_section(found), _logs_section(result), _passed_section(result), _not_tested_section(result)]
+    sections = [*boundary_card(result.boundary), _found_section(found), _logs_section(result), _passed_section(result),
+                _not_tested_section(result)]
     sections = [section for section in sections if any(table.rows for table in section.tables)]
     sections += [_log_section(summary, preview) for summary, preview in _paired(result)]
     tone = level_tone(c.level for c in result.checks)

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.errors import Check, InputRejected, Level, NothingMatched, UsageError, did_you_mean
+from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.doctor.columns_first import columns_first
 from pipelines.log.files import expanded
 from pipelines.log.places import renamed, short_names, tilde
@@ -94,8 +95,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """Every stage on every group of logs; what is unchanged is taken back."""
     _refuse_strange(settings)
     done = [(name, _stages(name, part, settings)) for name, part in _apart(inputs)]
-    groups = tuple(Group(name, steps, _diagnosis(steps)) for name, steps in done)
-    return Result((), groups) if len(groups) > 1 else Result(groups[0].stages, diagnosis=groups[0].diagnosis)
+    groups = tuple(Group(name, steps, _boundary(steps), _diagnosis(steps)) for name, steps in done)
+    one = groups[0]
+    return Result((), groups) if len(groups) > 1 else Result(one.stages, boundary=one.boundary, diagnosis=one.diagnosis)
 
 
 def plan(request: Request, settings: Settings) -> tuple[Planned, ...]:
@@ -111,6 +113,12 @@ def _refuse_strange(settings: Settings) -> None:
         if name not in names:
             raise UsageError("C01", f"'{name}' is no stage of a run{did_you_mean(name, names)}", where="--skip",
                              remedy=f"there are: {', '.join(names)}")
+
+
+def _boundary(steps: Iterable[Step]) -> Boundary | None:
+    """What the logged torque is, as the last stage that knows says."""
+    known = [found for step in steps if isinstance(found := getattr(step.result, "boundary", None), Boundary)]
+    return known[-1] if known else None
 
 
 def _diagnosis(steps: Iterable[Step]) -> Diagnosis | None:
@@ -174,9 +182,10 @@ def restored(folder: Path, result: Mapping[str, Any]) -> Result:
         return tuple(_step(by_name[one["name"]], store.stored(_place(group, one["name"]))) for one in stages)
 
     groups = tuple(Group(one["name"], steps(one["name"], one["stages"])) for one in result["runs"])
-    whole = tuple(dataclasses.replace(group, diagnosis=_diagnosis(group.stages)) for group in groups)
+    whole = tuple(dataclasses.replace(group, boundary=_boundary(group.stages), diagnosis=_diagnosis(group.stages))
+                  for group in groups)
     alone = steps("", result["stages"])
-    return Result(alone, whole, _diagnosis(alone))
+    return Result(alone, whole, _boundary(alone), _diagnosis(alone))
 
 
 def _place(group: str, stage: str) -> str:

@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from pipelines.errors import Check, RrridError, clean
+from pipelines.errors import Check, RrridError, clean, escaped
 
 if TYPE_CHECKING:
     from pipelines.report.report import Report, Table
@@ -111,13 +111,13 @@ def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: b
         print(f"  {clean(line, 400)}", file=stream)
     say_checks(outcome.checks, verbose, stream)
     report = outcome.folder / "report.html"
-    print(f"→ {report if report.exists() else outcome.folder}", file=stream)
+    print(f"→ {escaped(report if report.exists() else outcome.folder)}", file=stream)
 
 
 def say_verdict(report: Report, stream: Any = None) -> None:
     """The sentence, and what to look at on the machine; on standard output where nothing else is said."""
     for line in (report.verdict, *report.advice):
-        print(clean(line, 1000), file=stream)
+        print(clean(line, None), file=stream)
 
 
 def _say_table(table: Table, stream: Any) -> None:

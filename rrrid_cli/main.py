@@ -15,10 +15,11 @@ from typing import Any, NoReturn
 import typer
 
 from pipelines.batch.process import economise
-from pipelines.errors import Interrupted, RrridError
+from pipelines.errors import EnvironmentFault, Interrupted, RrridError
 from pipelines.log.atomic import fault_of
 from rrrid_cli.commands import app
 from rrrid_cli.console import say_error
+from rrrid_cli.streams import prepare_streams
 from rrrid_cli.usage import WrongUsage, as_error, as_given
 
 __all__ = ["entry"]
@@ -35,6 +36,7 @@ def entry() -> NoReturn:
     signal.signal(signal.SIGINT, _interrupt)
     sys.unraisablehook = _again
     as_json, debug = "--json" in sys.argv, "--debug" in sys.argv
+    prepare_streams(as_json)
     try:
         if "_RRRID_COMPLETE" in os.environ:  # a shell asks how the line could go on
             app(prog_name="rrrid", complete_var="_RRRID_COMPLETE")
@@ -43,7 +45,7 @@ def entry() -> NoReturn:
         _deaf()
         if debug:
             raise
-        error = problem.as_error() if isinstance(problem, Interrupted) else as_given(problem, sys.argv[1:])
+        error = problem.as_error() if isinstance(problem, Interrupted) else as_given(_no_folder(problem), sys.argv[1:])
         say_error(error, as_json=as_json)
         if isinstance(problem, Interrupted):
             _leave(error.exit_code)
@@ -55,7 +57,7 @@ def entry() -> NoReturn:
     except OSError as problem:
         if debug:
             raise
-        fault = fault_of(problem, Path("standard output"))
+        fault = _no_folder(fault_of(problem, Path("standard output")))
         say_error(fault, as_json=False)
         _mute()
         sys.exit(fault.exit_code)
@@ -77,6 +79,17 @@ def _ended(words: list[str]) -> int:
         code = ended.exit_code
     sys.stdout.flush()
     return code
+
+
+def _no_folder(problem: RrridError) -> RrridError:
+    """`problem`, or that the working folder is gone, which explains what the machine could not do."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        if isinstance(problem, EnvironmentFault):
+            return EnvironmentFault("P02", "the folder that the command was called in was deleted", where="working folder",
+                                    remedy="call it from a folder that exists (cd)")
+    return problem
 
 
 def _mute() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-import tomllib
 import types
 import typing
 from collections.abc import Iterable, Mapping
@@ -14,6 +13,7 @@ from typing import Any, TypeVar
 
 from pipelines.errors import UsageError, did_you_mean
 from pipelines.log.text import read_small_text
+from pipelines.log.toml_text import TomlError, parse_toml
 
 __all__ = ["known_options", "make_settings", "stage_of"]
 
@@ -107,8 +107,8 @@ def _from_file(path: Path | None) -> list[tuple[str, dict[str, Any]]]:
         return []
     text = read_small_text(path, what="a TOML file of settings")
     try:
-        return [(str(path), tomllib.loads(text))]
-    except (ValueError, RecursionError) as problem:
+        return [(str(path), parse_toml(text))]
+    except TomlError as problem:
         raise UsageError("C03", f"not valid TOML: {problem}", where=path, remedy="settings are TOML; YAML is not read") from None
 
 
@@ -120,8 +120,8 @@ def _from_sets(sets: Iterable[str]) -> list[tuple[str, dict[str, Any]]]:
         if not (equals and dot and option):
             raise UsageError("C01", f"'{text}' is not STAGE.OPTION=VALUE", where="--set", remedy="write for example convert.to=csv")
         try:
-            parsed: Any = tomllib.loads(f"x = {value}")["x"]
-        except (ValueError, RecursionError):
+            parsed: Any = parse_toml(f"x = {value}")["x"]
+        except TomlError:
             parsed = value.strip()  # a bare word is a text
         found.append(("--set", {stage: {option: parsed}}))
     return found

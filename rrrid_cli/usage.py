@@ -46,6 +46,10 @@ def as_given(problem: RrridError, words: Iterable[str]) -> RrridError:
     """
     from pipelines.log.places import renamed
 
+    try:
+        os.getcwd()
+    except FileNotFoundError:  # relative paths mean nothing
+        return problem
     names: dict[str, str] = {}
     for text in (part for word in words for part in (word, word.partition("=")[2]) if part and not part.startswith("-")):
         path = Path(text)

@@ -27,7 +27,7 @@ class Found:
 class Said:
     """One answer."""
 
-    verdict: str  # "cause", "nothing-wrong", "unknown"; "refused" and "crashed" where there is none
+    verdict: str  # "cause", "nothing-wrong", "unknown", "cannot-judge"; "refused" and "crashed" where there is none
     findings: tuple[Found, ...] = ()
     standing: tuple[Place, ...] = ()
     not_testable: Mapping[str, str] = field(default_factory=dict)  # cause -> reason

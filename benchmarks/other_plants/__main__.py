@@ -94,7 +94,8 @@ def judged(case: Case, line: Mapping[str, Any]) -> tuple[str, str]:
         line: as `asked` answers.
 
     A healthy arm is right with nothing wrong, and a cause with its name at its joint and no other name; an "unknown" is open where
-    something is wrong, and wrong where nothing is. Friction that the nominal model lacks may be named, or not, but not otherwise.
+    something is wrong, and wrong where nothing is; "cannot-judge" is open. Friction that the nominal model lacks may be named, or
+    not, but not otherwise.
     """
     for none in ("refused", "crashed"):
         if none in line:
@@ -107,7 +108,8 @@ def judged(case: Case, line: Mapping[str, Any]) -> tuple[str, str]:
     if not all(good):
         outcome = "wrong"
     elif not case.fault:
-        outcome = "right" if verdict == "nothing-wrong" or names else "open" if case.answers else "wrong"
+        silent = case.answers or verdict == "cannot-judge"
+        outcome = "right" if verdict == "nothing-wrong" or names else "open" if silent else "wrong"
     elif case.answers:
         outcome = "right" if names else "open"
     else:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 import math
 import re
-import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -20,6 +19,7 @@ from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.fit.differences import difference
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredValue
+from pipelines.log.result_figures import name_in
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.parameter_names import quantity_of
 from pipelines.report.diagnosis_words import title_of
@@ -58,7 +58,7 @@ def against(record: Record, baseline: ModelFile) -> Record:
 
 
 def _limited(about: str, words: Sequence[str]) -> str:
-    return clean(f"{about}: {'; '.join(words)}.", 1000)
+    return clean(f"{about}: {'; '.join(words)}.", None)
 
 
 def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: bool = False) -> tuple[Check, ...]:
@@ -126,7 +126,7 @@ def _warned(message: str, remedy: str, gate: bool = False) -> Check:
 
 def _robot(baseline: ModelFile) -> str:
     """The name of the robot that the baseline is of; empty where it says none."""
-    return str(tomllib.loads(baseline.robot).get("name", ""))
+    return name_in(baseline.robot)
 
 
 def known_figures(baseline: ModelFile, names: Iterable[str]) -> dict[str, tuple[float, float]]:
@@ -253,10 +253,10 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
     What the reference logs show as well is no finding, and there all the same. An effect is gone where it is larger than the
     least that these logs would show by more than its own uncertainty explains. One that the baseline itself cannot tell from
     nothing, an offset that was fitted with the rest, is not missed. A diagnosis of something without a name tells no causes
-    apart: of none it says that it is gone.
+    apart, nor does one of logs that cannot be judged: of none it says that it is gone.
     """
     gone, unsure = list[str](), list[str]()
-    unnamed = part.verdict == "unknown"
+    untold = {"unknown": "something is wrong that has no name", "cannot-judge": "these logs cannot be judged"}.get(part.verdict)
     there = {*map(place_of, part.findings), *part.standing}
     for one in baseline.effects if part.diagnosed else ():
         place = place_of({"cause": one.effect, "joint": one.joint})
@@ -264,8 +264,8 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
         stored = one.parameters.get(parameter)
         if place in there or not any(map(_is_there, one.parameters.values() if stored is None else (stored,))):
             continue
-        if unnamed:
-            unsure.append(f"{place} is not found, and might be there: something is wrong that has no name")
+        if untold:
+            unsure.append(f"{place} is not found, and might be there: {untold}")
         elif stored is not None and abs(stored.value) - LIMIT * (stored.std or 0.0) > least:
             gone.append(f"{place} is not found any more: {parameter} {_told(stored.value, stored.unit)} before, and from "
                         f"{_told(least, stored.unit, 2)} on it would have been")

@@ -57,9 +57,9 @@ def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tu
     folders: dict[Path, list[Path]] = {}
     faults: dict[Path, RrridError] = {}
     checks: list[Check] = []
-    _walk(root, root.resolve(), folders, faults, checks)
+    _walk(root, folders, faults, checks)
     if not folders and not faults:
-        raise nothing_there(root, checks)
+        raise nothing_there(root, checks, [root])
     items = [Item(_name(folder, root), (folder,), (), fault) for folder, fault in faults.items()]
     for folder, logs in folders.items():
         if each_log:
@@ -74,17 +74,16 @@ def _name(path: Path, root: Path) -> str:
     return path.relative_to(root).as_posix()
 
 
-def _walk(folder: Path, root: Path, folders: dict[Path, list[Path]], faults: dict[Path, RrridError],
-          checks: list[Check]) -> None:
+def _walk(folder: Path, folders: dict[Path, list[Path]], faults: dict[Path, RrridError], checks: list[Check]) -> None:
     """Gather the logs of `folder` and of the folders below it, each under its own folder."""
     try:
-        there = entries(folder, root, checks)
+        there = entries(folder, checks)
     except OSError as problem:
         faults[folder] = fault_of(problem, folder)
         return
     for entry in there:
         if entry.is_dir():
-            _walk(entry, root, folders, faults, checks)
+            _walk(entry, folders, faults, checks)
         else:
             folders.setdefault(folder, []).append(entry)
 

@@ -28,7 +28,7 @@ class Part:
     residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     findings: tuple[Mapping[str, Any], ...] = ()  # of a diagnosis: cause, joint, parameters
     diagnosed: bool = False  # its result names causes, be it none
-    verdict: str = ""  # of a diagnosis: "cause", "nothing-wrong", "unknown"
+    verdict: str = ""  # of a diagnosis: "cause", "nothing-wrong", "unknown", "cannot-judge"
     standing: tuple[str, ...] = ()  # what the reference logs show as well: "stribeck:2"
     detectable: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, the least that is found
 

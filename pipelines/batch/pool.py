@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
+from multiprocessing.context import ForkServerContext
 from typing import Any
 
 from pipelines.batch.items import Item
@@ -37,6 +38,7 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
     from pebble import ProcessPool
 
     context = warm_up(plan.module)
+    _refuse_no_locks(context)
     waiting, starts, text = deque(items), 0, plan_text(plan)
     while waiting and not stopped():
         told, tell = context.Pipe(duplex=False)
@@ -55,6 +57,15 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
             pool.join()
             told.close()
             tell.close()
+
+
+def _refuse_no_locks(context: ForkServerContext) -> None:
+    """P04: the locks of a pool lie in shared memory, which some containers do not let one write."""
+    try:
+        context.Lock()
+    except (OSError, ImportError) as problem:
+        raise EnvironmentFault("P04", f"no worker can be started, for there is no shared memory: {problem}", where="batch",
+                               remedy="let /dev/shm be writable, or run the stage on each folder without batch") from None
 
 
 def _begin(text: str, key: str, tell: Connection) -> None:

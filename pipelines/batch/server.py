@@ -8,19 +8,26 @@ from __future__ import annotations
 import multiprocessing
 import signal
 import sys
+import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.context import ForkServerContext
 from multiprocessing.forkserver import ensure_running
+from multiprocessing.util import Finalize
 from typing import Final
 
 from pipelines.batch.process import one_thread
+from pipelines.log.atomic import remove_folder, temporary_folder
 
 __all__ = ["warm_up"]
 
 # The last is else imported by each worker, with its first log.
 _NEEDED: Final = ("pipelines.batch.newborn", "pipelines.batch.work", "h5py")
+
+
+_DEEPEST: Final = 36  # characters; of 104 for a socket, 67 are "/.rrrid-tmp-…/pymp-…/listener-…"
+_AFTER_ALL: Final = -200  # priority at exit; `multiprocessing` removes its own temporary folder at -100
 
 
 def warm_up(module: str) -> ForkServerContext:
@@ -34,9 +41,27 @@ def warm_up(module: str) -> ForkServerContext:
     one_thread()
     context = multiprocessing.get_context("forkserver")
     context.set_forkserver_preload([*_NEEDED, module, *_main()])
-    with _deaf():
+    with _deaf(), _own_temporary_folder():
         ensure_running()
     return context
+
+
+@contextmanager
+def _own_temporary_folder() -> Iterator[None]:
+    """Let `multiprocessing` make its temporary folder inside one that the next batch sweeps away where this process is killed.
+
+    Where the system's own lies so deep that the name of a socket in it would be too long, nothing is changed.
+    """
+    if len(tempfile.gettempdir()) > _DEEPEST:
+        yield
+        return
+    folder = temporary_folder()
+    Finalize(None, remove_folder, args=[folder], exitpriority=_AFTER_ALL)
+    before, tempfile.tempdir = tempfile.tempdir, str(folder)
+    try:
+        yield
+    finally:
+        tempfile.tempdir = before
 
 
 @contextmanager

@@ -92,6 +92,8 @@ def _verdict(summary: Summary) -> str:
     total, wrong, found = len(summary.records), summary.count("rejected", "failed"), summary.count("found")
     said = f"{total} items: {total - wrong - found} in order"
     said += f", in {found} something was found" if found else ""
+    unjudged = sum(one.status == "found" and any(part.verdict == "cannot-judge" for part in one.parts) for one in summary.records)
+    said += f" ({unjudged} of these cannot be judged)" if unjudged else ""
     how = "rejected, failed or not done" if summary.interrupted else "rejected or failed"
     said += f", {wrong} {'was' if wrong == 1 else 'were'} {how}" if wrong else ""
     begun = "Interrupted; what is missing is done with --resume. " if summary.interrupted else ""

@@ -115,7 +115,7 @@ def _record(item: Item, warm: _Warm, outcome: Outcome[Any], inputs: Inputs, root
     turning = inputs.logs[0].log.robot.revolute if inputs.logs else ()
     recorded = min((opened.log.recorded for opened in inputs.logs if opened.log.recorded), default="")
     return Record(
-        clean(item.name), item.slug, status, outcome.exit_code, error, clean(outcome.report.verdict, 1000),
+        clean(item.name), item.slug, status, outcome.exit_code, error, clean(outcome.report.verdict, None),
         inputs.robot_name, recorded,
         parts_of(outcome.json, inputs.robot_name, recorded, turning), _only_causes(outcome.json), hashes,
         tuple(relative(log, root) for log in item.logs), hash_file(outcome.folder / PROVENANCE), warm.key, seconds)

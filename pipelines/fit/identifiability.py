@@ -3,6 +3,7 @@
     condition_number(statistics)         of Φ itself: no weights, no scaling
     resolved_rank(solution)              directions that stand out of the noise
     unresolved(solution, names)          which parameters cannot be separated, in words
+    not_separated(solution, std, names)  groups of parameters that are determined only together
     hard_to_see(solution, names)         the weakest directions, strongest columns first
     visible(value, std, typical)         parameters worth printing as a number
     visibility(statistics, ...)          how much of a further column the model cannot absorb
@@ -22,7 +23,7 @@ from pipelines.fit.equations import Array
 from pipelines.fit.least_squares import Solution
 from pipelines.fit.statistics import Statistics
 
-__all__ = ["Direction", "Unresolved", "condition_number", "hard_to_see", "resolved_rank", "typical_size", "unresolved",
+__all__ = ["Direction", "Separation", "Unresolved", "condition_number", "hard_to_see", "not_separated", "resolved_rank", "typical_size", "unresolved",
            "visibility", "visible"]
 
 _WHOLE = 3.0  # a direction is lost if three standard deviations of it are as large as all that was measured
@@ -30,6 +31,16 @@ _SURE = 3.0  # standard deviations that a value must stand from zero
 _SMALL = 0.05  # of the typical size: a value that is zero to within this is known to be nearly nothing
 _NAMED = 0.15  # share of a direction below which a column is not worth naming
 _INVOLVED = 1e-3  # share of an unresolved direction above which a parameter is not determined
+
+
+@dataclass(frozen=True)
+class Separation:
+    """When parameters count as not separated (Belsley, Kuh & Welsch 1980, Regression Diagnostics, sec. 3.2)."""
+
+    index: float = 10.0  # condition index from which on a dependency of columns does harm; 30 is a strong one
+    share: float = 0.5  # of a parameter's variance that comes from such dependencies
+    linked: float = 0.3  # of its variance, with which a parameter belongs to a dependency that competes with others
+    torque: float = 0.5  # std of its torque over the residual: its interval of 2 std is then as wide as the residual
 
 
 @dataclass(frozen=True)
@@ -121,6 +132,36 @@ def _sparse(space: Array) -> Array:
         others = np.arange(len(rows)) != k
         rows[others] -= rows[others, j, None] * rows[k]
     return rows
+
+
+def not_separated(solution: Solution, std: Array, names: Sequence[str],
+                  config: Separation | None = None) -> tuple[tuple[str, ...], ...]:
+    """Return groups of parameters of which these equations determine the sum of torques better than each.
+
+    Variance decomposition: with singular values μ_j and directions v_j of columns of unit length, var β_k is proportional to
+    Σ_j (v_kj / μ_j)²; the share of j is what that dependency adds. A group is what shares dependencies of a high condition
+    index μ_max / μ_j, and whose torques, each by itself, are uncertain beside the residual.
+
+    Args:
+        std: of the parameters (k,), with the memory of the residual allowed for.
+    """
+    config = config or Separation()
+    values = solution.singular_values
+    floor = np.where(values > 0.0, values, np.finfo(float).eps * values[0])
+    shares = (solution.directions / floor[:, None]) ** 2
+    shares = shares / np.maximum(shares.sum(axis=0), 1e-300)
+    weak = shares[values[0] / floor >= config.index]
+    power = np.square(solution.scale * np.where(np.isfinite(std), std, np.inf))  # of its torque, in units of the residual's
+    uncertain = power >= config.torque**2 * solution.errors.samples
+    members = np.flatnonzero((weak.sum(axis=0) >= config.share) & uncertain & solution.acting) if len(weak) else []
+    groups: list[tuple[set[int], set[int]]] = []  # parameters, dependencies
+    for k in members:
+        own, dependencies = {int(k)}, set(np.flatnonzero(weak[:, k] >= config.linked).tolist())
+        for group in [g for g in groups if g[1] & dependencies]:
+            groups.remove(group)
+            own, dependencies = own | group[0], dependencies | group[1]
+        groups.append((own, dependencies))
+    return tuple(tuple(names[k] for k in sorted(own)) for own, _ in groups if len(own) > 1)
 
 
 def hard_to_see(solution: Solution, names: Sequence[str], count: int = 3) -> tuple[Direction, ...]:

@@ -8,8 +8,10 @@
     found.delay                         [s], beside the hold
 
 Products of sections, with s in units of the middle of the band, keep the fit well conditioned at any order, and every section is
-a mode: ω = 1/√a, ζ = b / (2√a). Maximum likelihood: the sum of |Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System
-Identification, §9.11); the number of sections is that of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
+a mode: ω = 1/√a, ζ = b / (2√a). Both a and b are positive: poles are stable and every damping is positive, as of a passive
+structure that is moved and measured at one place (all zeros of such a response are minimum phase, too). Maximum likelihood: the
+sum of |Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System Identification, §9.11); the number of sections is that
+of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
 """
 
 from __future__ import annotations
@@ -48,7 +50,7 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class Rational:
-    """A fitted function. `parameters`: log |g|, delay · unit, then b, a of each zero section, then b, a of each pole section."""
+    """A fitted function. `parameters`: log |g|, delay · unit, log b, log a of each zero section, then of each pole section."""
 
     parameters: Array  # (2 + 2 zeros + 2 poles,), s in `unit`
     covariance: Array  # of them; zero rows for what was held
@@ -79,11 +81,10 @@ class Rational:
         """g Π a_zeros / Π a_poles: the plateau above all modes, where there are as many zeros as poles; else (0, 0)."""
         if self.zeros != self.poles:
             return Known(0.0, 0.0)
-        a = self.parameters[3::2]
         sign = np.repeat([1.0, -1.0], [self.zeros, self.poles])
-        value = self.low.value * float(np.prod(a**sign))
         gradient = np.zeros(len(self.parameters))
-        gradient[0], gradient[3::2] = 1.0, sign / a
+        gradient[0], gradient[3::2] = 1.0, sign
+        value = self.sign * float(np.exp(gradient @ self.parameters))
         return Known(value, abs(value) * float(np.sqrt(gradient @ self.covariance @ gradient)))
 
     @property
@@ -99,16 +100,16 @@ class Rational:
         return tuple(sorted(marked, key=lambda m: m.frequency.value))
 
     def _mode(self, section: int) -> Mode | None:
-        """ω = 1/√a, ζ = b/(2√a); δω/ω = -δa/(2a), δζ/ζ = δb/b - δa/(2a). None for two real roots."""
+        """ω = 1/√a, ζ = b/(2√a); δω/ω = -δ(log a)/2, δζ/ζ = δ(log b) - δ(log a)/2. None for two real roots."""
         at = slice(2 + 2 * section, 4 + 2 * section)
-        b, a = self.parameters[at]
-        if a <= 0.0 or b * b >= 4.0 * a:
+        log_b, log_a = self.parameters[at]
+        c, damping = self.covariance[at, at], 0.5 * np.exp(log_b - 0.5 * log_a)
+        hertz = self.unit * np.exp(-0.5 * log_a) / (2.0 * np.pi)
+        if damping >= 1.0:
             return None
-        c, root = self.covariance[at, at], np.sqrt(a)
-        hertz, damping = self.unit / root / (2.0 * np.pi), b / (2.0 * root)
-        gradient = np.array([1.0 / (2.0 * root), -damping / (2.0 * a)])
+        gradient = damping * np.array([1.0, -0.5])
         kind: Literal["resonance", "antiresonance"] = "antiresonance" if section < self.zeros else "resonance"
-        return Mode(kind, Known(float(hertz), float(hertz * np.sqrt(c[1, 1]) / (2.0 * a))),
+        return Mode(kind, Known(float(hertz), float(hertz * 0.5 * np.sqrt(c[1, 1]))),
                     Known(float(damping), float(np.sqrt(gradient @ c @ gradient))), True)
 
 
@@ -130,7 +131,7 @@ def known_part(s: Complex, integrators: int, hold: float) -> Complex:
 
 def product(parameters: Array, s: Complex, zeros: int, sign: float) -> tuple[Complex, Complex]:
     """Everything that is fitted, at s in units of the fit (bins,), and each 1 + b s + a s² (sections, bins)."""
-    sections = 1.0 + parameters[2::2, None] * s + parameters[3::2, None] * s**2
+    sections = 1.0 + np.exp(parameters[2::2, None]) * s + np.exp(parameters[3::2, None]) * s**2
     value = sign * np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0) / np.prod(sections[zeros:], axis=0)
     return np.asarray(value), np.asarray(sections)
 

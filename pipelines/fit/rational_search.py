@@ -16,18 +16,19 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.fit.rational import Array, Complex, Rational, known_part, product
 
-__all__ = ["fit_rational", "scattered"]
+__all__ = ["FEWEST", "fit_rational", "scattered"]
 
 _DAMPINGS = (0.003, 0.01, 0.03, 0.1, 0.3)  # tried for a new pair of poles
 _FREQUENCIES = 150  # tried for it
 _REFINED = 3  # of the trials
 _DELAYS = 100  # tried, in eighths of a period of the highest frequency, early and late
-_LEAP = 3.0  # of the logarithm of the gain at once
+_LEAP = 3.0  # of the logarithm of gain, b or a at once
+_SMALLEST = 1e-4  # of b and a of the poles: where those of a numerator start that would be negative
 _ROUGH = (12, 1e-3)  # steps and relative decrease of a trial
 _STEPS = 60  # of Gauss and Newton at most
 _STOP = 1e-7  # relative decrease of the sum of squares below which they end
 _PATIENCE = 2  # sections more that do not pay before the search ends
-_FEWEST = 18  # bins
+FEWEST = 18  # bins
 _EXACT = 1e-12  # of the square of the response: a variance below this is rounding
 
 
@@ -116,7 +117,7 @@ def _prepare(frequency: Array, response: Complex, variance: Array, integrators: 
                             remedy="excite the frequencies that are asked for")
     frequency = frequency[good]
     s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-    if len(frequency) < _FEWEST:
+    if len(frequency) < FEWEST:
         raise InputRejected("T08", f"{len(frequency)} frequencies are too few for a mode",
                             remedy="record longer, or ask for a finer resolution or a wider band")
     known = known_part(s, integrators, hold)
@@ -143,13 +144,14 @@ def _rigid(data: _Data, shell: Rational) -> Rational:
 
 
 def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Complex, Complex]:
-    """Residual (bins,) and Jacobian (parameters, bins), weighted. ∂H/∂b = ± H s / section, ∂H/∂a = ± H s² / section."""
+    """Residual (bins,) and Jacobian (parameters, bins), weighted. ∂H/∂log b = ± H b s / section, ∂H/∂log a = ± H a s² / section."""
     value, sections = product(parameters, data.s, zeros, data.sign)
     sign = np.where(np.arange(len(sections)) < zeros, 1.0, -1.0)[:, None]
     slope = np.empty((len(parameters), len(data.s)), dtype=np.complex128)
     slope[0], slope[1] = value, -data.s * value if data.with_delay else 0.0
-    slope[2::2] = sign * value * data.s / sections
-    slope[3::2] = slope[2::2] * data.s
+    shared = sign * value * data.s / sections
+    slope[2::2] = shared * np.exp(parameters[2::2, None])
+    slope[3::2] = shared * np.exp(parameters[3::2, None]) * data.s
     return np.asarray((value - data.target) * data.weight), slope * data.weight
 
 
@@ -188,7 +190,7 @@ def _descend(data: _Data, start: Rational, freedom: float, steps: int = _STEPS, 
                 step = np.linalg.solve(matrix + damping * np.eye(len(p)), gradient / scale) / scale
                 tried, its_slope = _residual(data, p - step, start.zeros)
                 its_cost, its_w = _cost(tried, freedom)
-                if its_cost < cost and abs(step[0]) < _LEAP:
+                if its_cost < cost and np.abs(np.delete(step, 1)).max() < _LEAP:
                     p, rest, slope, cost, w, damping = p - step, tried, its_slope, its_cost, its_w, max(damping / 10.0, 1e-12)
                     break
                 damping *= 4.0
@@ -237,8 +239,9 @@ def _grow(data: _Data, model: Rational, with_zeros: bool) -> Rational:
     found = []
     for k in _separate(gained, len(_DAMPINGS)):
         base = model.parameters[:2] + np.array([np.log(gain[k]), 0.0])
-        between = 2 + 2 * model.zeros
-        p = np.concatenate([base, model.parameters[2:between], zero[k], model.parameters[between:], [b[k], a[k]]])
+        between, pole = 2 + 2 * model.zeros, np.array([b[k], a[k]])
+        own = np.log(np.maximum(zero[k], _SMALLEST * pole[:len(zero[k])]))  # a best numerator may be none that is passive
+        p = np.concatenate([base, model.parameters[2:between], own, model.parameters[between:], np.log(pole)])
         started = replace(model, parameters=p, zeros=model.zeros + int(with_zeros), poles=model.poles + 1)
         found.append(_judged(data, replace(started, parameters=_descend(data, started, np.inf, *_ROUGH))))
     return _refine(data, min(found, key=lambda one: one.description))

@@ -17,7 +17,8 @@ from pathlib import Path
 
 from pipelines.errors import EnvironmentFault, RrridError, UsageError
 
-__all__ = ["environment_faults", "remove_folder", "replace_folder", "staging_folder", "staging_place", "sweep", "write_file"]
+__all__ = ["environment_faults", "remove_folder", "replace_folder", "staging_folder", "staging_place", "sweep",
+           "temporary_folder", "write_file"]
 
 _MARK = ".rrrid-tmp-"
 
@@ -100,6 +101,17 @@ def staging_place(target: Path) -> Path:
         target.parent.mkdir(parents=True, exist_ok=True)
         sweep(target.parent)
         return target.parent / f"{_prefix()}{os.getpid()}-{os.urandom(4).hex()}"
+
+
+def temporary_folder() -> Path:
+    """An empty folder in the system's place for temporary files, to be removed by the caller; what killed processes left is swept.
+
+    Raises:
+        EnvironmentFault: there is no such place, or no room in it.
+    """
+    import tempfile
+
+    return staging_folder(Path(tempfile.gettempdir()) / "rrrid")
 
 
 def remove_folder(folder: Path) -> None:

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import glob
 import hashlib
@@ -184,7 +185,8 @@ def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
                          remedy="unpack it, and give the logs or their folder")
     else:
         raise InputRejected("F06", "neither HDF5 nor Parquet", where=path,
-                            remedy="a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe")
+                            remedy="a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe, "
+                            "which 'rrrid import --guess FILE' drafts")
     if ENDINGS.get(path.suffix.lower()) == container:
         return container, []
     return container, [Check.of("F06", "warn", f"named '{path.suffix}', but its content is {container}; read as that", where=path,
@@ -237,7 +239,7 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
     """The logs named by `inputs`: files as they are, folders searched below.
 
     Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is named: then its logs
-    are meant. Links that lead out of a folder are passed over with a warning.
+    are meant. A link to a log is that log; links to folders, and those that lead nowhere, are passed over with a warning.
 
     Raises:
         UsageError: an input does not exist.
@@ -253,55 +255,48 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
             continue
         own = (path / PROVENANCE).is_file()
         root = path / "logs" if own else path
-        found += sorted(_below(root, root.resolve(), checks))
+        found += sorted(_below(root, checks))
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
-        raise nothing_there(", ".join(map(str, inputs)), checks, _recording_in(inputs))
+        raise nothing_there(", ".join(map(str, inputs)), checks, [path for path in inputs if os.path.isdir(path)])
     return tuple(dict.fromkeys(found)), tuple(checks)
 
 
-def _recording_in(folders: Iterable[Path]) -> Path | None:
-    """The first file in the folders that `import` may read; None where there is none."""
-    for folder in folders:
-        try:
-            names = sorted(entry.name for entry in os.scandir(folder) if entry.is_file())
-        except OSError:
-            continue
-        for ending in RECORDINGS:  # tables before texts
-            if found := next((name for name in names if name.lower().endswith(ending)), None):
-                return folder / found
-    return None
-
-
-def nothing_there(where: object, checks: Sequence[Check], recording: Path | None = None) -> NothingMatched:
-    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie.
-
-    Args:
-        recording: a file there that `import` makes a log of.
+def nothing_there(where: object, checks: Sequence[Check], folders: Sequence[Path]) -> NothingMatched:
+    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie, or which
+    recordings lie there that `import` makes logs of.
     """
     links = [str(check.where) for check in checks if check.code == "RRID-X11"]
     passed, remedy = "", "logs end in .h5 or .parquet"
     if links:
         passed = f"; {len(links)} link{'s' * (len(links) > 1)} passed over, {'first ' * (len(links) > 1)}{links[0]}"
         remedy = "give what a link leads to by its own path"
-    elif recording is not None:
-        passed = f", but recordings such as {recording.name}"
-        remedy = f"make logs of them: rrrid import --guess {recording} > recipe.toml, then rrrid import recipe.toml"
+    elif recorded := next((path for folder in folders for path in _recordings(folder)), None):
+        passed = f", but recordings such as {recorded.name}"
+        remedy = f"make logs of them: 'rrrid import --guess {recorded}' drafts the recipe that does"
     return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
 
 
-def _below(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
+def _recordings(folder: Path) -> list[Path]:
+    """The recorded files in `folder`, and in the folders in it."""
+    with contextlib.suppress(OSError):
+        return [path for pattern in ("*", "*/*") for path in sorted(folder.glob(pattern))
+                if path.suffix.lower() in RECORDINGS and path.is_file()]
+    return []
+
+
+def _below(folder: Path, checks: list[Check]) -> list[Path]:
     try:
-        there = entries(folder, root, checks)
+        there = entries(folder, checks)
     except FileNotFoundError:
         return []
     except OSError as problem:
         raise fault_of(problem, folder) from None
-    return [path for entry in there for path in (_below(entry, root, checks) if entry.is_dir() else [entry])]
+    return [path for entry in there for path in (_below(entry, checks) if entry.is_dir() else [entry])]
 
 
-def entries(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
-    """Logs in `folder` and folders to look into, in order; links that lead out of `root` are passed over with a word (X11).
+def entries(folder: Path, checks: list[Check]) -> list[Path]:
+    """Logs in `folder` and folders to look into, in order; links to folders and to nothing are passed over with a word (X11).
 
     Raises:
         OSError: the folder cannot be read.
@@ -310,9 +305,13 @@ def entries(folder: Path, root: Path, checks: list[Check]) -> list[Path]:
     for entry in sorted(folder.iterdir()):
         if entry.name.startswith("."):
             continue
-        if entry.is_symlink() and (entry.is_dir() or not entry.resolve().is_relative_to(root)):
-            checks.append(Check.of("X11", "warn", "link to a folder, or out of this one, passed over", where=entry,
+        if entry.is_symlink() and entry.is_dir():
+            checks.append(Check.of("X11", "warn", "link to a folder passed over", where=entry,
                                    remedy="give what it leads to by its own path, if that is meant"))
+        elif entry.is_symlink() and not entry.exists():
+            if entry.suffix.lower() in ENDINGS:
+                checks.append(Check.of("X11", "warn", "link that leads nowhere, or in a circle, passed over", where=entry,
+                                       remedy="remove it, or let it lead to a log"))
         elif entry.is_dir():
             if not (entry / PROVENANCE).is_file():
                 found.append(entry)

@@ -99,7 +99,8 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     if rejected and not keep_rejected:
         raise _all_of(rejected)
     names = sorted({opened_log.log.robot_name for opened_log in opened})
-    inputs = Inputs(tuple(opened), tuple(rejected), checks, paths, {o.path: o.sha256 for o in opened}, robot=robot,
+    described = robot.checks if robot is not None else ()
+    inputs = Inputs(tuple(opened), tuple(rejected), (*described, *checks), paths, {o.path: o.sha256 for o in opened}, robot=robot,
                     label=_label(request.paths),
                     robot_name=names[0] if len(names) == 1 else "several" if names else "unknown")
     return _of_session(inputs, request.session)

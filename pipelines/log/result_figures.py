@@ -8,11 +8,12 @@ any extension and what it leaves with it are told apart: "nominal model residual
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-__all__ = ["fitted", "numbers_of", "residuals", "robot_of"]
+from pipelines.log.toml_text import TomlError, parse_toml
+
+__all__ = ["fitted", "name_in", "numbers_of", "residuals", "robot_of"]
 
 # What a result calls the error that is left, its words, and its unit; arrays are per joint.
 _RESIDUALS: Final = {"torque_rms": ("torque rms", "N m"), "residual_rms": ("nominal model residual rms", "N m"),
@@ -81,18 +82,18 @@ def robot_of(result: Any) -> str:
     """The name of the first robot that a result is of, however deep; "" where it says none."""
     if isinstance(result, Mapping):
         if "base_parameters" in result and isinstance(result.get("robot"), str):  # a model file, with a whole description
-            return _described(result["robot"])
+            return name_in(result["robot"])
         if isinstance(result.get("robot"), str):
             return str(result["robot"])
         return next(filter(None, (robot_of(item) for key, item in result.items() if key != _A_MODEL)), "")
     return next(filter(None, map(robot_of, result)), "") if isinstance(result, list) else ""
 
 
-def _described(robot: str) -> str:
-    """The name in a description."""
+def name_in(robot: str) -> str:
+    """Return the name in a robot description, "" where it is none."""
     try:
-        return str(tomllib.loads(robot).get("name", ""))
-    except tomllib.TOMLDecodeError:
+        return str(parse_toml(robot).get("name", ""))
+    except TomlError:
         return ""
 
 

@@ -34,7 +34,7 @@ WORDS: Final[dict[str, str]] = {
     "visibility": "share of its columns that the refitted model cannot absorb",
     "explained": "share of the residual that it explains",
     # findings
-    "verdict": "cause, nothing-wrong or unknown", "cause": "identifier of the cause, as commands take it",
+    "verdict": "cause, nothing-wrong, unknown or cannot-judge", "cause": "identifier of the cause, as commands take it",
     "title": "the cause in plain words", "standing": "effects that the reference logs show as well, at the same strength",
     "rejected": "hypotheses that came close and are not believed", "reason": "why, in words; empty where there is nothing to say",
     "detectable": "the smallest of each cause that would have been found on these logs, with 95 %",
@@ -165,6 +165,9 @@ WORDS: Final[dict[str, str]] = {
     "revolute": "whether the joint turns; else it slides", "controller": "control law of the log",
     "detected_odd": "odd distortion that was detected", "expected_from": "what the rigid response is known from",
     "misfit": "how far the fitted response is from the measured one", "damping": "damping, with its unit",
+    "excited": "[Hz] bands where the excitation has power and its responses are known; nothing is fitted or named outside",
+    "filled": "share of the samples that were lost, and filled alike in all signals",
+    "others_held": "whether the motion of the other joints was taken out of the relative response",
     "seen_at": "numbers of the responses that show it", "candidates": "what it could be",
     # model.json
     "base_parameters": "base parameters of the rigid body", "validity": "range of the logs behind the model", "notes": "remarks",

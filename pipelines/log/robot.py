@@ -12,12 +12,12 @@ pydantic alone costs more than reading a ten-second log.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NoReturn
 
-from pipelines.errors import InputRejected, RrridError, UsageError, did_you_mean
+from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
+from pipelines.log.toml_text import TomlError, parse_toml
 
 __all__ = ["Drive", "Joint", "LinkParameters", "RobotDescription", "format_robot", "parse_robot"]
 
@@ -94,6 +94,7 @@ class RobotDescription:
     urdf_text: str | None = None  # kinematics of a URDF, meshes left out
     tip_link: str | None = None  # last link, where a URDF branches
     drive: Drive | None = None
+    checks: tuple[Check, ...] = field(default=(), compare=False)  # what its file was warned of; no part of the robot
 
     @property
     def n_joints(self) -> int:
@@ -169,8 +170,8 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     """
     fail: type[RrridError] = InputRejected if inside_log else UsageError
     try:
-        table = tomllib.loads(text)
-    except (ValueError, RecursionError) as problem:
+        table = parse_toml(text)
+    except TomlError as problem:
         raise fail("C01", f"the robot description is not valid TOML: {problem}", where=where,
                    remedy="correct it at that place") from None
     top = _Reader(table, "", fail, str(where))

@@ -3,59 +3,60 @@
 from __future__ import annotations
 
 import os
-import tomllib
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import UsageError
+from pipelines.errors import Check, UsageError
 from pipelines.log.files import ENDINGS, open_log
 from pipelines.log.robot import Joint, RobotDescription, parse_robot
 from pipelines.log.shipped import shipped
 from pipelines.log.text import read_small_text
+from pipelines.log.toml_text import TomlError, parse_toml
 
-__all__ = ["load_robot", "robot_at_hand", "robot_sources"]
+__all__ = ["load_robot", "robot_at_hand", "robot_sources", "split_tip"]
 
 _URDF = (".urdf", ".xacro")
 _HERE, _SHIPPED = "robot.toml", "rrr"  # where none is named
 
 
-def load_robot(source: str | Path) -> RobotDescription:
+def load_robot(source: str | Path, tip_link: str | None = None) -> RobotDescription:
     """Read a robot from a TOML file, a URDF file, or a log, which has that of its arm; or by the bare name of one that is shipped.
+
+    A URDF may be followed by a colon and the link at which the arm ends, "arm.urdf:hand"; `tip_link` says the same.
 
     Raises:
         UsageError: no such robot, or the file is not a robot description.
         InputRejected: a log that cannot be read.
     """
-    path = _file_of(source)
+    path, tip = _file_and_tip(source)
     if path.suffix.lower() in ENDINGS:
         return open_log(path).log.robot
-    if path.suffix.lower() in _URDF:
-        return _from_urdf(path)
-    text = read_small_text(path, what="a robot description (TOML) or a URDF")
+    text = "" if path.suffix.lower() in _URDF else read_small_text(path, what="a robot description (TOML) or a URDF")
+    if path.suffix.lower() in _URDF or _is_xml(text):
+        return _from_urdf(path, tip_link or tip)
+    if tip_link or tip:
+        raise UsageError("C02", "the link at which the arm ends is given for a URDF, and this is a description", where=source,
+                         remedy=f"write tip_link = \"{tip_link or tip}\" under [kinematics] in it")
     _refuse_recipe(text, path)
-    return _embed_urdf(text, path) or parse_robot(text, where=path)
-
-
-def _refuse_recipe(text: str, path: Path) -> None:
-    """C02: a recipe of `rrrid import` names its robot, and is none."""
-    table = _table_of(text)
-    if "kinematics" in table or not ({"signals", "log"} & set(table)):
-        return
-    robot = table.get("robot")
-    use = robot.get("use") if isinstance(robot, dict) else None
-    raise UsageError("C02", "this is a recipe of rrrid import, not the description of a robot", where=path,
-                     remedy=f"give the robot that the recipe names: {use}" if isinstance(use, str) else
-                     "write the recipe's [robot] into a file of its own, with [kinematics] and [[joint]] at its top")
+    robot = _embed_urdf(text, path) or parse_robot(text, where=path)
+    return replace(robot, checks=(*robot.checks, *_impossible_links(robot, path)))
 
 
 def robot_sources(source: str | Path) -> tuple[Path, ...]:
     """The files that `load_robot(source)` reads: the description, and the URDF it names."""
-    path = _file_of(source)
+    path, _ = _file_and_tip(source)
     if path.suffix.lower() in (*_URDF, *ENDINGS):
         return (path,)
     urdf = _urdf_named(_table_of(read_small_text(path)))
-    return (path,) if urdf is None else (path, path.parent / urdf)
+    return (path,) if urdf is None else (path, _file_and_tip(path.parent / urdf)[0])
+
+
+def split_tip(source: str) -> tuple[str, str | None]:
+    """Return the file of "arm.urdf:hand" and the link after the colon; None where there is none."""
+    found = re.fullmatch(r"(.+\.\w+):([^/]+)", source)
+    return (found[1], found[2]) if found else (source, None)
 
 
 def robot_at_hand() -> tuple[str, str]:
@@ -63,6 +64,40 @@ def robot_at_hand() -> tuple[str, str]:
     if Path(_HERE).is_file():
         return _HERE, f"none was named: {_HERE} here"
     return _SHIPPED, f"none was named, and no {_HERE} is here: the shipped {_SHIPPED}"
+
+
+def _file_and_tip(source: str | Path) -> tuple[Path, str | None]:
+    if os.path.lexists(source):
+        return _file_of(source), None
+    file, tip = split_tip(str(source))
+    return _file_of(file), tip
+
+
+def _is_xml(text: str) -> bool:
+    return text.lstrip("\ufeff \t\n").startswith("<")
+
+
+def _refuse_recipe(text: str, path: Path) -> None:
+    """C02: a recipe of `rrrid import` where the robot is wanted."""
+    table = _table_of(text)
+    if "kinematics" in table or not {"log", "file", "time", "signals"} & set(table):
+        return
+    robot = table.get("robot")
+    use = robot.get("use") if isinstance(robot, dict) else None
+    raise UsageError("C02", "this is a recipe of rrrid import, not a robot description", where=path,
+                     remedy=f"give the robot that it names: {use}" if isinstance(use, str)
+                     else "give a robot description (TOML), a URDF or a shipped robot")
+
+
+def _impossible_links(robot: RobotDescription, path: Path) -> tuple[Check, ...]:
+    """S20: a warning for every link of a description that no rigid body can be; `import_urdf` warns of those of a URDF itself."""
+    if robot.urdf_text is not None:
+        return ()
+    from pipelines.log.link_consistency import of_link
+
+    return tuple(Check.of("S20", "warn", f"no rigid body has the inertial parameters of joint '{joint.name}': {words}", where=path,
+                          remedy="correct its link: what is known of the links is used")
+                 for joint in robot.joints if joint.link is not None and (words := of_link(joint.link)))
 
 
 def _file_of(source: str | Path) -> Path:
@@ -82,8 +117,8 @@ def _file_of(source: str | Path) -> Path:
 def _table_of(text: str) -> dict[str, Any]:
     """The table of a TOML text; empty where it is none, which `parse_robot` says better."""
     try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError):
+        return parse_toml(text)
+    except TomlError:
         return {}
 
 
@@ -100,7 +135,8 @@ def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
     if named is None or not isinstance(kinematics, dict):
         return None
     tip = kinematics.get("tip_link")
-    arm = _from_urdf(path.parent / named, tip_link=tip if isinstance(tip, str) else None)
+    file, after_colon = _file_and_tip(path.parent / named)
+    arm = _from_urdf(file, tip_link=tip if isinstance(tip, str) else after_colon)
     kinematics.pop("urdf")
     kinematics["urdf_text"] = arm.urdf_text
     given = table.setdefault("joint", [{"name": j.name, "type": j.type} for j in arm.joints])
@@ -109,7 +145,7 @@ def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
         raise UsageError("S02", f"{len(given)} [[joint]] tables, but the URDF has {arm.n_joints} moving joints", where=path,
                          remedy="describe each moving joint once, or none")
     merged = tuple(_fill(mine, urdf) for mine, urdf in zip(described.joints, arm.joints, strict=True))
-    return replace(described, joints=merged, tip_link=arm.tip_link)
+    return replace(described, joints=merged, tip_link=arm.tip_link, checks=arm.checks)
 
 
 def _from_urdf(path: Path, tip_link: str | None = None) -> RobotDescription:

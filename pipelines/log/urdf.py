@@ -14,7 +14,8 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import InputRejected, UsageError
+from pipelines.errors import Check, InputRejected, UsageError
+from pipelines.log.link_consistency import inconsistency
 from pipelines.log.robot import Joint, LinkParameters, RobotDescription
 from pipelines.log.urdf_tree import (
     Source,
@@ -34,6 +35,7 @@ __all__ = ["JointPlacement", "UrdfChain", "chain_from_urdf", "import_urdf"]
 Array = npt.NDArray[np.float64]
 
 _GRAVITY = (0.0, 0.0, -9.81)
+_OPEN = 1e16  # the limit that URDFs write for none
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +76,8 @@ def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescripti
     joints = tuple(Joint(j.name, "prismatic" if j.type == "prismatic" else "revolute", position=j.limits[0],
                          velocity=j.limits[1], torque=j.limits[2], link=link)
                    for j, link in zip(moving, links, strict=True))
-    return RobotDescription(tree.name, _GRAVITY, "urdf", joints, urdf_text=_canonical(tree, way), tip_link=tip)
+    return RobotDescription(tree.name, _GRAVITY, "urdf", joints, urdf_text=_canonical(tree, way), tip_link=tip,
+                            checks=_impossible_links(tree, source))
 
 
 def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
@@ -122,17 +125,35 @@ def _body(tree: Tree, first: str, stop: frozenset[str], source: Source) -> LinkP
                           (float(xx), float(yy), float(zz), float(-xy + 0.0), float(-xz + 0.0), float(-yz + 0.0)))
 
 
+def _impossible_links(tree: Tree, source: Source) -> tuple[Check, ...]:
+    """S17: a warning for every link whose inertial parameters no rigid body has."""
+    found = []
+    for name, link in tree.links.items():
+        element = link.find("inertial")
+        if element is None:
+            continue
+        mass = number(element.find("mass"), "value", f"link '{name}'", source)
+        if words := inconsistency(mass, _tensor(element, f"link '{name}'", source)):
+            found.append(Check.of("S17", "warn", f"no rigid body has the inertial parameters of link '{name}': {words}",
+                                  where=source.where, remedy="correct them in the URDF: what is known of its links is used"))
+    return tuple(found)
+
+
+def _tensor(element: Element, place: str, source: Source) -> Array:
+    """The inertia (3, 3) about the centre of mass, in the axes of <inertial>."""
+    xx, yy, zz, xy, xz, yz = (number(element.find("inertia"), k, place, source) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
 def _inertial(element: Element, r: Array, p: Array, place: str, source: Source) -> tuple[float, Array, Array]:
     """Mass, first moment and inertia tensor about the body's origin: I_o = R I_c Rᵀ + m (|c|² 1 - c cᵀ)."""
     mass = number(element.find("mass"), "value", place, source)
     if mass < 0.0:
         raise source.wrong(f"{place} has negative mass {mass}")
     xyz, rpy = read_origin(element, place, source)
-    tensor = element.find("inertia")
-    xx, yy, zz, xy, xz, yz = (number(tensor, k, place, source) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
     turn = r @ rotation_of(rpy)
     c = r @ xyz + p
-    about_com = turn @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ turn.T
+    about_com = turn @ _tensor(element, place, source) @ turn.T
     return mass, mass * c, about_com + mass * (float(c @ c) * np.eye(3) - np.outer(c, c))
 
 
@@ -143,8 +164,10 @@ def _canonical(tree: Tree, way: list[TreeJoint]) -> str:
     lines = [f"<robot name={quoteattr(tree.name)}>", f"  <link name={quoteattr(tree.root)}/>"]
     for joint in way:
         (low, high), velocity, effort = joint.limits
-        kind = "continuous" if joint.type == "revolute" and math.isinf(high) else joint.type
-        limits = {"lower": low, "upper": high, "velocity": velocity, "effort": effort}
+        kind = "continuous" if joint.type == "revolute" and math.isinf(low) and math.isinf(high) else joint.type
+        limits = {"velocity": velocity, "effort": effort}
+        if math.isfinite(low) or math.isfinite(high):  # a range open at one end has no other form: without it, that end is 0
+            limits |= {"lower": max(low, -_OPEN), "upper": min(high, _OPEN)}
         xyz, rpy = (" ".join(map(repr, map(float, v))) for v in joint.origin)
         lines += [f"  <link name={quoteattr(joint.child)}/>", f"  <joint name={quoteattr(joint.name)} type=\"{kind}\">",
                   f"    <origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>",

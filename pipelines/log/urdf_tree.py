@@ -22,9 +22,14 @@ Array = npt.NDArray[np.float64]
 
 _LARGEST = 16_000_000  # [bytes] a URDF is text about a few dozen links
 _DEEPEST = 100  # nested elements
-_LARGEST_NUMBER = 1e9  # squares and products of it stay finite
+_MOST_ELEMENTS = 100_000
+_MOST_LINKS = 1000  # a humanoid with hands has a tenth of it
+_LARGEST_NUMBER = 1e9  # squares and products of it stay finite; a limit of that size is none
+_NAMED_ENDS = 4  # links that a remedy names
 _MOVING = ("revolute", "continuous", "prismatic")
 _TYPES = (*_MOVING, "fixed", "planar", "floating")
+_OTHER_FORMATS = {"mujoco": "an MJCF model (MuJoCo)", "mujocoinclude": "a part of an MJCF model (MuJoCo)",
+                  "sdf": "an SDF model (Gazebo)", "gazebo": "an SDF model (Gazebo)"}
 
 
 @dataclass(frozen=True)
@@ -54,6 +59,11 @@ class TreeJoint:
     @property
     def moves(self) -> bool:
         return self.type != "fixed"
+
+    @property
+    def independent(self) -> bool:
+        """Whether its one coordinate is its own."""
+        return self.type in _MOVING and not self.mimics
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,19 +97,21 @@ def _parse(text: bytes | str, source: Source) -> Element:
     """The XML tree, refusing every document type, and so every entity, before it takes effect."""
     if len(text) > _LARGEST:
         raise source.wrong(f"larger than {_LARGEST // 1_000_000} MB", code="X13")
-    builder, parser, depth = TreeBuilder(), expat.ParserCreate(), 0
+    builder, parser, depth, elements = TreeBuilder(), expat.ParserCreate(), 0, 0
 
     def doctype(*_: object) -> None:
         raise source.wrong("has a DOCTYPE or entity declaration, which is never followed", code="X13",
                            remedy="delete the <!DOCTYPE …> from the file")
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
+        nonlocal depth, elements
+        depth, elements = depth + 1, elements + 1
         if tag.startswith("xacro:"):
             raise _xacro(source)
         if depth > _DEEPEST:
             raise source.wrong(f"elements nested more than {_DEEPEST} deep", code="X13")
+        if elements > _MOST_ELEMENTS:
+            raise source.wrong(f"more than {_MOST_ELEMENTS} elements", code="X13")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -110,7 +122,7 @@ def _parse(text: bytes | str, source: Source) -> Element:
     parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = doctype
     parser.StartElementHandler, parser.EndElementHandler = start, end
     try:
-        parser.Parse(text, True)
+        parser.Parse(text.lstrip(), True)  # many a file begins with an empty line
     except (expat.ExpatError, LookupError, ValueError) as problem:
         raise source.wrong(f"is not well-formed XML: {problem}") from None
     return builder.close()
@@ -119,9 +131,14 @@ def _parse(text: bytes | str, source: Source) -> Element:
 def tree_of(text: bytes | str, source: Source) -> Tree:
     """Links and joints, each child with one parent and all of them under one root."""
     robot = _parse(text, source)
+    if robot.tag in _OTHER_FORMATS:
+        raise source.wrong(f"this is {_OTHER_FORMATS[robot.tag]}, not a URDF",
+                           remedy="give the URDF that it was made from, or export a URDF of the arm")
     if robot.tag != "robot":
         raise source.wrong(f"the outermost element is <{robot.tag}>, not <robot>")
     links: dict[str, Element] = {}
+    if len(robot.findall("link")) > _MOST_LINKS or len(robot.findall("joint")) > _MOST_LINKS:
+        raise source.wrong(f"more than {_MOST_LINKS} links or joints", "give the URDF of the arm alone", code="X13")
     for element in robot.findall("link"):
         if links.setdefault(_name(element, source), element) is not element:
             raise source.wrong(f"two links are called '{element.get('name')}'")
@@ -144,7 +161,9 @@ def tree_of(text: bytes | str, source: Source) -> Tree:
     roots = [name for name in links if name not in into]
     if len(roots) != 1:
         what = f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
-        raise source.wrong(f"there must be one root link, but {what}", remedy="connect all links into one tree")
+        loose = [name for name in roots if not out[name]]
+        raise source.wrong(f"there must be one root link, but {what}", remedy="connect all links into one tree"
+                           + (f", or delete those without joints: {', '.join(loose)}" if loose else ""))
     tree = Tree(robot.get("name") or "robot", links, into, out, roots[0])
     if len(below(tree, tree.root)) != len(links):
         raise source.wrong("some joints form a closed loop apart from the root",
@@ -165,17 +184,25 @@ def way_to(tree: Tree, tip_link: str | None, source: Source) -> tuple[list[TreeJ
     tip = tip_link or _only_tip(tree, source)
     if tip not in tree.links:
         raise source.wrong(f"there is no link '{tip}' for tip_link{did_you_mean(tip, tree.links)}", code="C02")
-    way, link = [], tip
+    way = _way(tree, tip)
+    for joint in way:
+        if joint.moves and not joint.independent:
+            raise source.wrong(f"joint '{joint.name}' is {'a mimic of another' if joint.mimics else joint.type}, and an arm has "
+                               "independent revolute, continuous and prismatic joints",
+                               remedy="make it type=\"fixed\" in the URDF" + _end_there(tree, source, ", or "))
+    if not any(joint.moves for joint in way):
+        raise source.wrong(f"no joint moves between '{tree.root}' and '{tip}'",
+                           remedy=_end_there(tree, source) or "give the URDF of an arm whose joints move")
+    return way, tip
+
+
+def _way(tree: Tree, link: str) -> list[TreeJoint]:
+    """The joints from the root to `link`."""
+    way: list[TreeJoint] = []
     while link in tree.into:
         way.append(tree.into[link])
         link = way[-1].parent
-    for joint in way:
-        if joint.type in ("planar", "floating") or joint.mimics:
-            raise source.wrong(f"joint '{joint.name}' is {'a mimic of another' if joint.mimics else joint.type}",
-                               remedy="only independent revolute, continuous and prismatic joints can be described")
-    if not any(joint.moves for joint in way):
-        raise source.wrong(f"no joint moves between '{tree.root}' and '{tip}'")
-    return way[::-1], tip
+    return way[::-1]
 
 
 def _only_tip(tree: Tree, source: Source) -> str:
@@ -186,11 +213,40 @@ def _only_tip(tree: Tree, source: Source) -> str:
         onwards = [joint for name in body for joint in tree.out[name] if joint.moves]
         if len(onwards) > 1:
             raise source.wrong(f"joints {', '.join(repr(j.name) for j in onwards)} branch off the same body",
-                               remedy="say which arm is meant: tip_link = \"name of its last link\"")
+                               remedy=_end_there(tree, source) or "make those that are no joint of the arm type=\"fixed\"")
         if not onwards:
             ends = [name for name in body if not tree.out[name]]
             return ends[0] if len(ends) == 1 else link
+        if not onwards[0].independent:
+            return onwards[0].child
         link = onwards[0].child
+
+
+def _ends(tree: Tree) -> list[str]:
+    """The links that an arm may end at: where its joints end, branch off or cease to be independent.
+
+    The longest arms first; before them a body that fingers branch off, not one that arms branch off.
+    """
+    moving = [joint.name for joints in tree.out.values() for joint in joints if joint.moves]
+    ends: dict[str, int] = {}
+    for end in dict.fromkeys((tree.root, *(joint.child for joint in tree.into.values() if joint.moves))):
+        way = [joint for joint in _way(tree, end) if joint.moves]
+        body = below(tree, end, frozenset(moving))
+        onwards = [joint for name in body for joint in tree.out[name] if joint.moves]
+        if way and all(joint.independent for joint in way) and (len(onwards) != 1 or not onwards[0].independent):
+            ends[onwards[0].parent if onwards else body[-1]] = len(way) * (2 if len(onwards) > 1 else 1)
+    return sorted(ends, key=lambda end: -ends[end])
+
+
+def _end_there(tree: Tree, source: Source, before: str = "") -> str:
+    """The remedy that names the last link of the arm, in the words of every place that takes one."""
+    ends = _ends(tree)
+    if not ends:
+        return ""
+    file = source.where.rpartition("/")[2]
+    named = ", ".join(f"{file}:{end}" for end in ends[:_NAMED_ENDS])
+    return (f"{before}say at which link the arm ends, after a colon: {named}; "
+            f"in a description or a recipe also tip_link = \"{ends[0]}\"")
 
 
 def _joint(element: Element, source: Source) -> TreeJoint:
@@ -212,14 +268,27 @@ def _joint(element: Element, source: Source) -> TreeJoint:
 
 
 def _limits(element: Element, name: str, kind: str, source: Source) -> tuple[tuple[float, float], float, float]:
-    """Position, velocity and effort limits; what is missing or 0 is no limit, as drawing programs write it."""
+    """Position, velocity and effort limits. No limit is what is missing, 0 as drawing programs write it, infinite, or as large as
+    1e16; and any range of a continuous joint.
+    """
     limit = element.find("limit")
-    low, high, velocity, effort = (number(limit, key, f"joint '{name}'", source)
-                                   for key in ("lower", "upper", "velocity", "effort"))
+    low, high, velocity, effort = (
+        0.0 if kind == "continuous" and key in ("lower", "upper") else _limit(limit, key, f"joint '{name}'", source)
+        for key in ("lower", "upper", "velocity", "effort"))
     if velocity < 0.0 or effort < 0.0 or low > high:
         raise source.wrong(f"joint '{name}' has a negative velocity or effort limit, or lower above upper")
-    position = (-math.inf, math.inf) if kind == "continuous" or low == high else (low, high)
+    position = (-math.inf, math.inf) if low == high else (low, high)
     return position, velocity or math.inf, effort or math.inf
+
+
+def _limit(element: Element | None, key: str, place: str, source: Source) -> float:
+    """The number of a limit, infinite where it is too large to be one."""
+    if element is None or element.get(key) is None:
+        return 0.0
+    value = _number_in(str(element.get(key)), key, place, source)
+    if math.isnan(value):
+        raise source.wrong(f"{place}: {key} is not a number")
+    return value if abs(value) < _LARGEST_NUMBER else math.copysign(math.inf, value)
 
 
 def _name(element: Element, source: Source) -> str:
@@ -235,13 +304,17 @@ def number(element: Element | None, key: str, place: str, source: Source, defaul
     return _float(str(element.get(key)), key, place, source)
 
 
-def _float(word: str, key: str, place: str, source: Source) -> float:
+def _number_in(word: str, key: str, place: str, source: Source) -> float:
     if "${" in word or "$(" in word:
         raise _xacro(source)
     try:
-        value = float(word.replace("_", "?"))  # Python reads 1_0 as 10, no other reader does
+        return float(word.replace("_", "?"))  # Python reads 1_0 as 10, no other reader does
     except ValueError:
         raise source.wrong(f"{place}: {key} holds '{word}', which is not a number") from None
+
+
+def _float(word: str, key: str, place: str, source: Source) -> float:
+    value = _number_in(word, key, place, source)
     if not abs(value) <= _LARGEST_NUMBER:
         raise source.wrong(f"{place}: {key} holds {word}, which is not finite or absurdly large")
     return value

@@ -3,6 +3,10 @@
 τ(t + d) ≈ τ(t) + d τ̇(t). What a joint's row leaves of τ is compared with what it leaves of τ̇ (Gauss-Newton), in each
 quarter of the log and on each joint apart: their scatter says how sure the answer is, and their trend is the drift. A
 delay of one joint alone makes scatter, not an offset: a clock is common to all.
+
+Friction lags as well: after a reversal it comes to its level over a presliding distance (Armstrong-Hélouvry, Dupont & Canudas
+de Wit 1994), and where all joints have gears alike, it lags alike in all of them. It does so near reversals alone, a clock
+everywhere. So an offset is believed only where the rest of the motion shows it too (`away_from_reversals`).
 """
 
 from __future__ import annotations
@@ -12,15 +16,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.rigid.body import Array
-from pipelines.model.row_fit import Row, Sampled
+from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.model.row_fit import Row, Sampled, factorised, row_columns
 
-__all__ = ["Offset", "clock_offset"]
+__all__ = ["Offset", "away_from_reversals", "clock_offset"]
 
 _BLOCKS = 4
 _ROUNDS = 6
 _EXPLAINED = 0.2  # relative residual up to which a joint's torque is understood well enough to time it
 # Student's t for 99.5 % by degrees of freedom: few joints agree by chance more easily than many.
+_PARAMETERS = 4  # moments a parameter of a row, at least
+_LAGS = 3.0  # times an offset, within which of a reversal friction may look like it
 _STUDENT = (np.inf, 63.7, 9.92, 5.84, 4.60, 4.03, 3.71, 3.50)
 
 
@@ -38,23 +44,48 @@ class Offset:
     joints: int  # how many joints' torques are understood well enough to say
 
 
-def clock_offset(rows: tuple[Row, ...], motion: Sampled, joints: Sequence[int] | None = None) -> Offset | None:
+def away_from_reversals(body: RigidBody, motion: Sampled, offset: float, joints: Sequence[int]) -> Offset | None:
+    """Return the offset from the moments at which no joint has just turned round; None where too few are left to say.
+
+    Args:
+        offset: [samples] that all moments show.
+    """
+    reach = _LAGS * abs(offset) * motion.sample_time
+    keep = np.ones(motion.dq.shape)
+    for j in joints:
+        turn = motion.t[:-1][np.diff(np.sign(motion.dq[:, j])) != 0.0]
+        if turn.size:
+            after = np.searchsorted(turn, motion.t)
+            near = np.minimum(np.abs(motion.t - turn[np.maximum(after - 1, 0)]),
+                              np.abs(motion.t - turn[np.minimum(after, turn.size - 1)]))
+            keep[near < reach, j] = 0.0
+    columns = [row_columns(body, motion, j) for j in range(motion.dq.shape[1])]
+    if min(keep[:, j].sum() for j in joints) < _PARAMETERS * len(columns[0][1]):
+        return None
+    rows = tuple(factorised(keep[:, j, None] * table, names) for j, (table, names) in enumerate(columns))
+    return clock_offset(rows, motion, joints, keep)
+
+
+def clock_offset(rows: tuple[Row, ...], motion: Sampled, joints: Sequence[int] | None = None,
+                 keep: Array | None = None) -> Offset | None:
     """The offset between the clocks of torque and position, or None where no torque is understood well enough.
 
     Args:
         joints: those to ask (from 0); all of them by default.
+        keep: 1 where a moment counts in a joint's row, 0 where not (moments, joints); the rows are zero there.
     """
     joints = range(len(rows)) if joints is None else joints
+    keep = np.ones_like(motion.dq) if keep is None else keep
     time = motion.t - motion.t.mean()
     span = float(np.ptp(motion.t))
-    offset, drift = _coarse(rows, motion, joints), 0.0
-    tau = motion.shifted(offset)
-    timed = [j for j in joints if _left(rows[j], tau[:, j]) < _EXPLAINED]
+    offset, drift = _coarse(rows, motion, joints, keep), 0.0
+    tau = keep * motion.shifted(offset)
+    timed = [j for j in joints if _left(rows[j], tau[:, j], keep[:, j]) < _EXPLAINED]
     if not timed or span <= 0:
         return None
     middle = np.array([float(block.mean()) for block in np.array_split(time, _BLOCKS)]) / span
     for _ in range(_ROUNDS):
-        number, weight = _steps(rows, motion, offset + drift * time / span, timed)
+        number, weight = _steps(rows, motion, offset + drift * time / span, timed, keep)
         step, bound = _line(number, weight, middle)
         offset, drift = offset + float(step[0]), drift + float(step[1])
         if np.abs(step).sum() < 1e-3:
@@ -62,24 +93,26 @@ def clock_offset(rows: tuple[Row, ...], motion: Sampled, joints: Sequence[int] |
     return Offset(offset, float(bound[0]), drift, float(bound[1]), len(timed))
 
 
-def _left(row: Row, tau: Array) -> float:
-    return float(np.linalg.norm(row.residual(tau)) / max(float(np.linalg.norm(tau - tau.mean())), 1e-300))
+def _left(row: Row, tau: Array, keep: Array) -> float:
+    varies = keep * (tau - tau.sum() / max(float(keep.sum()), 1.0))
+    return float(np.linalg.norm(row.residual(tau)) / max(float(np.linalg.norm(varies)), 1e-300))
 
 
-def _coarse(rows: tuple[Row, ...], motion: Sampled, joints: Sequence[int]) -> float:
+def _coarse(rows: tuple[Row, ...], motion: Sampled, joints: Sequence[int], keep: Array) -> float:
     """The best of a few offsets, so that the linear steps start near."""
     offsets = np.linspace(-0.8, 0.8, 17) * motion.reach
     left = []
     for offset in offsets:
-        tau = motion.shifted(float(offset))
-        left.append(sum(_left(rows[j], tau[:, j]) ** 2 for j in joints))
+        tau = keep * motion.shifted(float(offset))
+        left.append(sum(_left(rows[j], tau[:, j], keep[:, j]) ** 2 for j in joints))
     return float(offsets[int(np.argmin(left))])
 
 
-def _steps(rows: tuple[Row, ...], motion: Sampled, offset: Array | float, joints: list[int]) -> tuple[Array, Array]:
+def _steps(rows: tuple[Row, ...], motion: Sampled, offset: Array | float, joints: list[int],
+           keep: Array) -> tuple[Array, Array]:
     """For each block and joint: the step in samples that the residual asks for, and its weight (inverse variance)."""
-    tau = motion.shifted(offset)
-    slope = 0.5 * (motion.shifted(offset + 1.0) - motion.shifted(offset - 1.0))
+    tau = keep * motion.shifted(offset)
+    slope = 0.5 * keep * (motion.shifted(offset + 1.0) - motion.shifted(offset - 1.0))
     number, weight = np.zeros((_BLOCKS, len(joints))), np.zeros((_BLOCKS, len(joints)))
     for place, j in enumerate(joints):
         rest, turn = rows[j].residual(tau[:, j]), rows[j].residual(slope[:, j])

@@ -9,6 +9,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.limits import SHORTEST, recorded_span
 from pipelines.signal.grid import Grid, grids
 
 __all__ = ["Measured", "measured"]
@@ -38,6 +39,11 @@ def measured(log: ExperimentLog, good: Usable | None = None) -> Measured:
         InputRejected: T04, no stretch of it is long enough; T05, its clock is too uneven.
     """
     good = usable(log) if good is None else good
+    if log.n_samples < SHORTEST:
+        span = recorded_span(log.signals["t"].values, log.sample_time)
+        raise InputRejected("T08", f"{log.n_samples} samples, {span:.3g} s: at least {SHORTEST} are needed to reconstruct motion, "
+                            f"{SHORTEST * log.sample_time:.3g} s at this rate",
+                            where=log.source or log.name, remedy="record longer, some seconds of the motion at least")
     if not good.runs:
         raise InputRejected("T04", "no stretch without a gap is long enough to reconstruct motion from",
                             where=log.source or log.name, remedy="'rrrid inspect' shows what is missing; record again")

@@ -24,13 +24,15 @@ from pipelines.log.doctor.faults import Mask
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.order_statistics import median
+from pipelines.model.even import Evened, evened
 from pipelines.model.measured import Measured, measured
 from pipelines.model.rigid.body import Motion
 from pipelines.model.trackers import difference_tracker, filter_tracker
 from pipelines.model.tuned import METHODS, Observers, Reconstruction, encoder_resolution, tuned_observers
 from pipelines.signal.grid import Tracker, on_grid
 
-__all__ = ["METHODS", "Mean", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "noise_response", "reconstruct"]
+__all__ = ["METHODS", "Mean", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "for_equations",
+           "noise_response", "reconstruct"]
 
 Indices = npt.NDArray[np.intp]
 
@@ -49,6 +51,8 @@ class Reconstructed:
     good: Usable  # which samples, stretches and masks
     derived: bool  # taken from the log instead of computed
     mean: Mean | None = None  # where the log is the mean period of another
+    stuck: Mask | None = None  # (kept samples, joints) where dry friction holds a joint: its own equations are left out
+    even: tuple[ExperimentLog, Reconstructed] | None = None  # of an uneven clock: the log on an even grid, for equations
 
     @property
     def vague(self) -> Mask:
@@ -86,8 +90,11 @@ def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = N
         InputRejected: T04, no stretch of it is long enough; T05, its clock is too uneven.
     """
     how.check(log.n_joints)
+    good = usable(log) if good is None else good
+    if (even := evened(log, good)) is not None:
+        return _of_even(log, even, how, good, observers)
     if derived_by(log, "reconstruct", how.as_settings()) and all(name in log for name in _SIGNALS):
-        return _taken(log, usable(log) if good is None else good)
+        return _taken(log, good)
     seen = measured(log, good)
     states, std = np.full((3, *seen.y.shape), np.nan), np.full((3, *seen.y.shape), np.nan)
     filtering = how.method in ("smoother", "observer")
@@ -104,6 +111,33 @@ def reconstruct(log: ExperimentLog, how: Reconstruction, good: Usable | None = N
     states, std = (_at_recording(seen.good.kept, values, log.n_samples) for values in (states, std))
     std[:, seen.good.time.undefined] = bound[:, None]
     return Reconstructed(Motion(log.t, *states), (std[0], std[1], std[2]) if filtering else None, tuned, seen.good, False)
+
+
+def for_equations(motions: tuple[tuple[ExperimentLog, Reconstructed], ...]) -> tuple[tuple[ExperimentLog, Reconstructed], ...]:
+    """Return the logs and motions that equations are made of: those with an uneven clock on their even grid."""
+    return tuple((log, found) if found.even is None else found.even for log, found in motions)
+
+
+def _of_even(log: ExperimentLog, even: Evened, how: Reconstruction, good: Usable, observers: Observers | None) -> Reconstructed:
+    """Return the motion at the instants of the samples, from that on an even grid."""
+    found = reconstruct(even.log, how, even.good, observers)
+    samples = len(good.kept)
+    states = even.at_recording(np.stack([found.motion.q, found.motion.dq, found.motion.ddq]), samples, spline=True)
+    std = np.full_like(states, np.nan)
+    if found.std is not None:
+        std = even.at_recording(np.stack(found.std), samples, spline=False)
+    bound = _bounds(found)
+    _fill(states, std, bound)
+    states, std = (_at_recording(good.kept, values, log.n_samples) for values in (states, std))
+    std[:, good.time.undefined] = bound[:, None]
+    return Reconstructed(Motion(log.t, *states), None if found.std is None else (std[0], std[1], std[2]), found.observers, good,
+                         False, even=(even.log, found))
+
+
+def _bounds(found: Reconstructed) -> Array:
+    """Return what can be said of a joint where nothing was measured (3, joints): its range, largest speed and acceleration."""
+    motion = found.motion
+    return np.maximum([np.ptp(motion.q, axis=0), np.abs(motion.dq).max(axis=0), np.abs(motion.ddq).max(axis=0)], 1e-12)
 
 
 def noise_response(log: ExperimentLog, found: Reconstructed, how: Reconstruction, samples: int,

@@ -18,7 +18,7 @@ import numpy as np
 
 from pipelines.errors import Check
 from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
-from pipelines.model.clock_offset import clock_offset
+from pipelines.model.clock_offset import away_from_reversals, clock_offset
 from pipelines.model.commanded import against_command
 from pipelines.model.evidence import Evidence
 from pipelines.model.excited import excited
@@ -240,6 +240,10 @@ def _clock(e: Evidence) -> Sequence[Check | NotTested]:
                               signal="tau", gate=abs(found.drift) > 1.0 + _DRIFTS * found.drift_bound,
                               remedy="stamp position and torque by one clock")]
     if abs(found.samples) > 1.0 + found.bound:
+        rest = away_from_reversals(e.body, e.motion, found.samples, e.telling.tolist())
+        if rest is None or abs(rest.samples - found.samples) > 1.0 + found.bound + rest.bound:
+            return e.subject.cannot_tell("T06", f"{words}, but not away from reversals: friction that lags there looks like it",
+                                         signal="tau")
         return [e.subject.say("T06", "warn",
                               f"{words}, alike in {found.joints} joints; it drifts by {drift}",
                               signal="tau",

@@ -10,7 +10,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.doctor.segments import Usable
 from pipelines.log.experiment import Array
 from pipelines.signal.chain import ORDERS, stationary
-from pipelines.signal.grid import Grid, lay_on, settle_late
+from pipelines.signal.grid import Grid, lay_on
 from pipelines.signal.observer import BLOCK, Observer, design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import sigma_for_bandwidth, tune_jerk, tune_smoother
@@ -19,7 +19,6 @@ __all__ = ["METHODS", "Observers", "Reconstruction", "encoder_resolution", "tune
 
 METHODS = ("smoother", "observer", "central-differences", "zero-phase")
 _FALLBACK_RESOLUTION = 1e-6  # [rad] where neither description nor samples show a step: far below any encoder
-_ROUNDS = 3  # of tuning a wandering clock: noise that lateness makes goes down by about 1/30 a round
 _FORGOTTEN = 7.0  # time constants after which a start is forgotten to about 1/1000
 _LATEST = 32768  # samples by which an observer must have forgotten its start, however long the log
 _NOTHING = 1e4  # tracking index from which nothing is filtered by far, the largest that tuning tries
@@ -99,22 +98,14 @@ class Observers:
 
 
 def tuned_observers(good: Usable, y: Array, grid: Grid, step: float, how: Reconstruction) -> Observers:
-    """The observers for `y` (samples, joints), tuned on the rows of `grid`; lateness of its clock taken off where that is real.
+    """The observers for `y` (samples, joints), tuned on the rows of `grid`.
 
     Raises:
         UsageError: C02, a jerk level or a bandwidth that settles later than the log ends, or filters nothing by far.
     """
     rows, resolution = y[grid.first:grid.last], encoder_resolution(good)
     units = tuple("rad" if joint.revolute else "m" for joint in good.log.robot.joints)
-    found = _tuned(lay_on(rows, grid), step, resolution, how, units)
-    late = grid.lateness(step)
-    for _ in range(_ROUNDS if late.any() else 0):
-        moved = settle_late(rows, grid, late, smooth(lay_on(rows, grid), found.smoothing).states)
-        other = _tuned(moved, step, resolution, how, units)
-        if other.smoothing.noise_variance.sum() > 0.9 * found.smoothing.noise_variance.sum():
-            break
-        found = other
-    return found
+    return _tuned(lay_on(rows, grid), step, resolution, how, units)
 
 
 def _tuned(laid: Array, step: float, resolution: Array, how: Reconstruction, units: tuple[str, ...]) -> Observers:

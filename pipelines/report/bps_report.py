@@ -11,6 +11,8 @@ from pipelines.model.estimation.compare import Compared
 from pipelines.model.estimation.floor import Beside
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
+from pipelines.model.estimation.words import column_in_words
+from pipelines.report.boundary_card import boundary_card
 from pipelines.report.bps import convergence_figure, torque_figure
 from pipelines.report.bps_balance import balance_table, balance_words
 from pipelines.report.figure_words import figure_in_words as plain
@@ -23,6 +25,7 @@ __all__ = ["bps_report"]
 _GOOD = 0.1  # relative torque error that is worth calling good
 _POOR = 0.5  # one that explains too little to be used
 _SURE = 3.0  # standard deviations: a value that is clearly visible
+_ABOVE_NOISE = 10.0  # times what the noise between periods leaves, as in a diagnosis: beyond it the model lacks something
 _STANDS_OUT = 2.0  # times the overall relative error: a joint worth naming
 _ALIKE = 0.02  # of the better error: less is no difference worth speaking of
 
@@ -32,6 +35,7 @@ def bps_report(result: Result) -> Report:
     sections = [_parameter_section(result), _course_section(result), _trust_section(result)]
     if result.noise_floor:
         sections.insert(2, _noise_section(result))
+    sections = [*boundary_card(result.boundary), *sections]
     if result.comparison:
         sections.append(_comparison_section(result))
     return Report("Base parameters", _verdict(result), _tone(result), _key_figures(result), tuple(sections),
@@ -40,8 +44,10 @@ def bps_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     error = result.relative_error["validate"]
-    return "bad" if result.unresolved or result.physically_consistent is False or error >= _POOR else \
-        "good" if error < _GOOD and not _worst_joints(result) else "attention"
+    if result.unresolved or result.physically_consistent is False or error >= _POOR:
+        return "bad"
+    above, _ = _above_noise(result)
+    return "good" if error < _GOOD and not _worst_joints(result) and above <= _ABOVE_NOISE else "attention"
 
 
 def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
@@ -75,7 +81,7 @@ def _seen(p: Estimated) -> str:
 def _verdict(result: Result) -> str:
     judged = "held-out logs" if result.held_out == "logs" else "blocks held out of the fitted logs (for none has role validate)"
     if result.unresolved:
-        return f"These logs do not determine the model: {result.unresolved}."
+        return " ".join((f"These logs do not determine the model: {result.unresolved}.", *_together(result)))
     seen = [_seen(p) for p in result.parameters]
     small, error, noise = seen.count("known to be small"), result.relative_error["validate"], _beside_noise(result)
     worst = ", ".join(f"{name} {_percent(own)}" for name, own in _worst_joints(result))
@@ -85,21 +91,31 @@ def _verdict(result: Result) -> str:
                  f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
                  f"{f', {small} known to be small' if small else ''}.",
                  *(("No links that could exist have these parameters: some would need negative mass or inertia.",)
-                   if result.physically_consistent is False else ()))
+                   if result.physically_consistent is False else ()), *_together(result))
     return " ".join(sentences)
+
+
+def _together(result: Result) -> tuple[str, ...]:
+    """"mz5 and torque offset at joint 5 are determined only together.", a sentence for each group."""
+    groups = [[column_in_words(name) for name in group] for group in result.not_separated]
+    return tuple(f"{', '.join(group[:-1])} and {group[-1]} are determined only together." for group in groups)
 
 
 def _beside_noise(result: Result) -> str:
     """"the residual of the fitted logs is at most 1.1 times what the noise between periods leaves"; empty without periods."""
-    ratios = [(float(ratio), result.joints[j]) for log in result.noise_floor if log.role == "identify"
-              for j, ratio in enumerate(log.ratio) if math.isfinite(ratio)]
-    if not ratios:
+    worst, joint = _above_noise(result)
+    if not joint:
         return ""
-    worst, joint = max(ratios)
     several = len(result.joints) > 1
     return (f"the residual of the fitted logs is {'at most ' if several else ''}{worst:.2g} times what the noise between periods "
             f"leaves"
             f"{f' ({joint})' if several else ''}")
+
+
+def _above_noise(result: Result) -> tuple[float, str]:
+    """Return the largest residual of the fitted logs over the noise between periods, and its joint; (0, "") without periods."""
+    return max(((float(ratio), result.joints[j]) for log in result.noise_floor if log.role == "identify"
+                for j, ratio in enumerate(log.ratio) if math.isfinite(ratio)), default=(0.0, ""))
 
 
 def _periods_of(log: Beside) -> str:

@@ -14,6 +14,7 @@ from pipelines.model.diagnosis.result import Finding, Rejected, Trial
 from pipelines.model.diagnosis.searched.ledger import WEAKER
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
+from pipelines.report.boundary_card import boundary_card
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_floor import (
     above_in_order,
@@ -53,7 +54,7 @@ __all__ = ["diagnosis_report"]
 _LEDGER = 40  # lines
 _IN_RUN = "--set diagnose.model=FILE"
 _OUT_OF_REACH = "A threshold above 100 % is told as a dash: an arm in order leaves so much of it that such logs cannot show it."
-_TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention"}
+_TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention", "cannot-judge": "attention"}
 
 
 def diagnosis_report(result: Result) -> Report:
@@ -64,7 +65,8 @@ def diagnosis_report(result: Result) -> Report:
              for section in (finding_section(number, one, nominal, units=units, beside=result.findings,
                                              left=result.after_rms.validate),
                              numbers_section(number, one, units, result.findings))]
-    sections = [*found, *_unknown(result), *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
+    sections = [*boundary_card(result.boundary), *found, *_unknown(result),
+                *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),
                   errors_table(now, result.after_rms, result.rated, floor, name,
@@ -99,6 +101,9 @@ def _said(result: Result) -> str:
         return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}{doubt}"
     if result.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
+    if result.verdict == "cannot-judge":
+        anything = "has changed since the reference logs" if result.question == "what has changed" else "is wrong with this arm"
+        return f"Whether anything {anything} cannot be judged: {without_keys(result.reason)}."
     first, *more = result.findings
     changed = "What has changed: " if result.question == "what has changed" else ""
     others = f"; and {', '.join(_beside(more))}" if more else ""

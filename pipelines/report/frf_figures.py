@@ -7,10 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.frf.result import COHERENCE, Curve, Method, ModeFound, Posture, same_bins
+from pipelines.model.frf.controller import Complex
+from pipelines.model.frf.responses import double_integrator
+from pipelines.model.frf.result import COHERENCE, Band, Curve, Method, ModeFound, Posture, same_bins
 from pipelines.report import style
 from pipelines.report.figures import Array
 from pipelines.report.report import Figure
+from pipelines.signal.excited_band import ExcitedBand
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -48,8 +51,9 @@ def bode_figure(joint: int, drawn: Sequence[tuple[Posture, Mapping[str, Method]]
         grid[0, -1].legend(loc="lower left", fontsize="small")
 
     return Figure(f"bode-{joint}", f"Joint {joint}: input to position, with 95 % bands. Vertical lines: resonances "
-                  f"(solid) and antiresonances (dashed). Grey: coherence under {COHERENCE:g}, not reliable. Beside the default "
-                  "stand the other methods where v excites the joint and their own coherence is not under that.", draw, (6.4, 5.6))
+                  f"(solid) and antiresonances (dashed). Grey: coherence under {COHERENCE:g}, not reliable; hatched: outside "
+                  "the excited band, where nothing is fitted or named. Besides the default, the other methods are drawn where v "
+                  "excites the joint and their own coherence is not under that.", draw, (6.4, 5.6))
 
 
 def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Method]) -> None:
@@ -58,9 +62,10 @@ def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Meth
     default = methods["closed-loop"]
     f, value = default.curve.frequency, default.curve.value
     reliable = default.curve.coherence >= 0.3
-    rigid = np.abs(value) / np.maximum(np.abs(posture.relative.value), 1e-300) * abs(posture.expected_level or posture.level.value)
+    unit = _unit_inertia(posture, default)
+    rigid = np.abs(unit) * abs(posture.expected_level or posture.level.value)
     size.loglog(f, rigid, color=style.GREY, linewidth=1.0, linestyle=":", label="rigid body")
-    phase.semilogx(f, _phase(value / posture.relative.value), color=style.GREY, linewidth=1.0, linestyle=":")
+    phase.semilogx(f, _phase(unit), color=style.GREY, linewidth=1.0, linestyle=":")
     for name in ("direct", "indirect", "closed-loop"):
         if (method := methods.get(name)) is not None:
             color, width, line = _LOOKS[name]
@@ -88,11 +93,27 @@ def draw_bode(axes: Sequence[Axes], posture: Posture, methods: Mapping[str, Meth
     for low, high in default.coherence_below_0_7_hz:
         for axis in axes:
             axis.axvspan(low - half, high + half, color=style.GREY, alpha=0.15, linewidth=0.0)
+    for low, high in outside(posture.excited, float(f[0]), float(f[-1])):
+        for axis in axes:
+            axis.axvspan(low, high, facecolor="none", edgecolor=style.GREY, alpha=0.4, hatch="///", linewidth=0.0)
     mark_modes(axes[:2], default.modes)
     for axis in axes:
         style.log_ticks(axis.xaxis)
     style.log_ticks(size.yaxis)
     coherence.set_xlim(f[0], f[-1])
+
+
+def outside(intervals: Sequence[Band], low: float, high: float) -> list[Band]:
+    """What of `low` to `high` [Hz] lies in none of the `intervals`."""
+    edges = [low, *(edge for interval in intervals for edge in interval), high]
+    return [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b > a]
+
+
+def _unit_inertia(posture: Posture, method: Method) -> Complex:
+    """Position per input of a rigid body of unit inertia (bins,), at the frequencies of `method`."""
+    if posture.others_held:  # its relative response has other bins
+        return np.asarray(double_integrator(method.curve.frequency, posture.sample_time), dtype=np.complex128)
+    return np.asarray(method.curve.value / posture.relative.value)
 
 
 def _label(name: str) -> str:
@@ -118,7 +139,7 @@ def relative_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         size, phase = drawing.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         for k, posture in enumerate(postures):
             color, measured, fit = style.COLOURS[k % len(style.COLOURS)], posture.relative, posture.fit
-            good = (measured.coherence >= 0.5) & (measured.frequency <= posture.band[1])
+            good = (measured.coherence >= 0.5) & ExcitedBand(posture.excited).holds(measured.frequency)
             size.semilogx(measured.frequency[good], np.abs(measured.value[good]), ".", markersize=2.0, color=color, alpha=0.5)
             size.semilogx(fit.frequency, np.abs(fit.value), color=color, label=posture_words(posture.posture, joint))
             phase.semilogx(measured.frequency[good], np.rad2deg(np.angle(measured.value[good])), ".", markersize=2.0, color=color,
@@ -133,8 +154,9 @@ def relative_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         size.legend(loc="best", fontsize="small")
         style.log_ticks(phase.xaxis)
 
-    return Figure(f"relative-{joint}", f"Joint {joint}: the response over that of a double integrator (points) and the rational "
-                  "function of the modes (lines). A rigid body is flat, a delay turns the phase alone.", draw, (6.0, 4.0))
+    return Figure(f"relative-{joint}", f"Joint {joint}: the response over that of a double integrator (points; in the excited "
+                  "band, under PD with the motion of other joints taken out), and the rational function "
+                  " of the modes (lines). A rigid body is flat, a delay turns the phase alone.", draw, (6.0, 4.0))
 
 
 def fitted_scale(axis: Axes, values: Array) -> None:
@@ -156,7 +178,7 @@ def compliance_figure(joint: int, postures: Sequence[Posture]) -> Figure:
         axes = drawing.subplots(1, 2)
         for k, posture in enumerate(postures):
             color, curve = style.COLOURS[k % len(style.COLOURS)], posture.compliance
-            good = (curve.coherence >= 0.5) & (curve.frequency <= posture.band[1])
+            good = (curve.coherence >= 0.5) & ExcitedBand(posture.excited).holds(curve.frequency)
             f = curve.frequency[good]
             square = (2.0 * np.pi * f) ** 2
             axes[0].loglog(f, np.abs(curve.value[good]), color=color, label=posture_words(posture.posture, joint))
@@ -191,7 +213,7 @@ def friction_figure(joint: int, postures: Sequence[Posture], methods: Sequence[M
             if posture.with_reversal is not None:
                 other = posture.with_reversal
                 part = other.frequency <= _LOW
-                unit = np.interp(other.frequency[part], relative.frequency, np.abs(method.curve.value) / np.abs(relative.value))
+                unit = np.interp(other.frequency[part], method.curve.frequency, np.abs(_unit_inertia(posture, method)))
                 axis.semilogx(other.frequency[part], np.abs(other.value[part]) / unit, color=color, linewidth=0.9, linestyle="--")
             axis.axhline(posture.level.value, color=color, linewidth=0.7, linestyle=":")
         axis.set_xlabel("frequency [Hz]")

@@ -192,7 +192,10 @@ def _beside(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method]]
 
 
 def _bands(method: Method) -> str:
-    bands = method.coherence_below_0_7_hz
+    return _said_bands(method.coherence_below_0_7_hz)
+
+
+def _said_bands(bands: Sequence[tuple[float, float]]) -> str:
     said = ", ".join(f"{format_number(a, 3)}–{format_number(b, 3)}" if b > a else format_number(a, 3) for a, b in bands[:4])
     return f"{said} and {len(bands) - 4} more" if len(bands) > 4 else said or "none"
 
@@ -212,13 +215,16 @@ def _recorded(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method
     for k, (p, own) in enumerate(zip(postures, methods, strict=True)):
         number, default = 1 + sum(q.joint == p.joint for q in postures[:k]), own["closed-loop"]
         motion.append((p.joint, number, posture_words(p.posture, p.joint), ", ".join(p.logs), p.controller, p.speed, p.swing,
-                       100.0 * p.left_out))
-        spectra.append((p.joint, number, default.estimator, default.resolution, default.averages, p.distortion, p.detected_even,
-                        p.detected_odd))
+                       100.0 * p.left_out, 100.0 * p.filled))
+        spectra.append((p.joint, number, _said_bands(p.excited), default.estimator, default.resolution, default.averages, p.distortion,
+                        p.detected_even, p.detected_odd))
     text = ("The reference is subtracted. Start, reversal and stop are left out, and half a second after each: there friction "
-            "jumps. At constant speed its mean is a constant that no spectrum shows.",)
+            "jumps. At constant speed its mean is a constant that no spectrum shows. The excited band is where v has power and its "
+            "responses are known to 10 dB: nothing is fitted, judged or named outside. Lost samples are filled alike in all "
+            "signals.",)
     return Section("How it was measured", text, (
-        Table(("joint", "no.", "posture", "logs", "controller", "speed [rad/s]", "its std [rad/s]", "left out [%]"), tuple(motion)),
-        Table(("joint", "no.", "estimator", "resolution [Hz]", "averages", "realisations", "even lines", "odd lines"),
-              tuple(spectra), "Variance between realisations and directions, and power at even and odd lines that v leaves out: "
+        Table(("joint", "no.", "posture", "logs", "controller", "speed [rad/s]", "its std [rad/s]", "left out [%]",
+               "lost, filled [%]"), tuple(motion)),
+        Table(("joint", "no.", "excited band [Hz]", "estimator", "resolution [Hz]", "averages", "realisations", "even lines",
+               "odd lines"), tuple(spectra), "Variance between realisations and directions, and power at even and odd lines that v leaves out: "
               "each over that of noise. Far more than 1 is nonlinear distortion.")))

@@ -10,6 +10,7 @@ from pipelines.log.places import slug
 from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.report.boundary_card import CARD, boundary_card
 from pipelines.report.joint_units import units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.run_ledger import ledger_lines, ledger_section
@@ -30,6 +31,8 @@ def run_report(result: Result) -> Report:
     single = len(steps) == 1
     sections = [] if single else [section for section in (
         ledger_section([(group.name, ledger_lines(group)) for group in result.groups]), _stages(steps), _lacking(steps)) if section]
+    cards = [_titled(boundary_card(group.boundary), group.name) for group in result.groups]
+    sections = [*(section for card in cards for section in card if not single), *sections]
     for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):
         own = step.report.sections if single else _fewer(step.report.sections, step.name)
         sections += _titled(own, "" if single else " · ".join(filter(None, (name, step.name))))
@@ -125,6 +128,8 @@ def _fewer(sections: Iterable[Section], stage: str) -> list[Section]:
     """`sections` of one stage with its first figures; where others are left out, the words say what draws them."""
     kept, drawn = list[Section](), 0
     for section in sections:
+        if section.title == CARD:  # it is at the top, once for all stages
+            continue
         if drawn + len(section.figures) > _FIGURES and drawn:
             told = f"Not drawn here, for the length of this report: rrrid {stage}, on the same logs, draws {_these(section)}."
             section = dataclasses.replace(section, text=(*section.text, told), figures=())

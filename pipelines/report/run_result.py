@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pipelines.errors import Check
+from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.results import FLAT, NOT_STORED
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.report import Report
@@ -31,6 +32,7 @@ class Group:
 
     name: str
     stages: tuple[Step, ...]
+    boundary: Boundary | None = None  # what the logged torque is, also where it keeps the arm from being diagnosed
     diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
 
 
@@ -40,8 +42,9 @@ class Result:
 
     stages: tuple[Step, ...]
     runs: tuple[Group, ...] = ()
+    boundary: Boundary | None = None  # of one group's logs: what their torque is, also where it keeps the arm from being diagnosed
     diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
 
     @property
     def groups(self) -> tuple[Group, ...]:
-        return self.runs or (Group("", self.stages, self.diagnosis),)
+        return self.runs or (Group("", self.stages, self.boundary, self.diagnosis),)

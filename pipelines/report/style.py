@@ -11,8 +11,6 @@ import logging
 import math
 import os
 import re
-import shutil
-import tempfile
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.errors import clean
+from pipelines.log.atomic import remove_folder, temporary_folder
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
@@ -223,9 +222,9 @@ def prepare_matplotlib() -> None:
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     if "MPLCONFIGDIR" in os.environ or _writable_home():
         return
-    folder = tempfile.mkdtemp(prefix="rrrid-matplotlib-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    os.environ["MPLCONFIGDIR"] = folder
+    folder = temporary_folder()
+    atexit.register(remove_folder, folder)
+    os.environ["MPLCONFIGDIR"] = str(folder)
 
 
 def _writable_home() -> bool:

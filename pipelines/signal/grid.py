@@ -3,9 +3,8 @@
     for grid in grids(t, sample_time, cuts):
         states, std = on_grid(y, grid, track)        at the rows grid.first .. grid.last - 1 of y
 
-Nothing is interpolated: a place of the grid that holds no sample is missing. A sample taken late by δ is told to the filter as
-what it says of the place, y - dq δ - ½ ddq δ² - ..., with the states of the pass before; three passes settle it. Where the
-positions are smoother without that, the stamps wander and not the sampling, and they are left out of account.
+Nothing is interpolated: a place of the grid that holds no sample is missing. A log whose clock is uneven is put on an even
+grid before (`model.even`); what is left here is a clock that runs a little fast, and lost samples.
 """
 
 from __future__ import annotations
@@ -13,21 +12,19 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from math import factorial
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 
-__all__ = ["Grid", "Tracker", "grids", "lay_on", "on_grid", "settle_late"]
+__all__ = ["Grid", "Tracker", "grids", "lay_on", "on_grid"]
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 Tracker = Callable[[Array], tuple[Array, Array | None]]  # samples of a grid -> states and deviations (order, samples, joints)
 
 _LATE = 1e-3  # of a sample: nearer than this, a sample is taken to lie on its place
-_PASSES = 3
 _CROWDED = 0.05  # of all samples: more than these on one place with another is no clock
 
 
@@ -97,37 +94,11 @@ def lay_on(y: Array, grid: Grid) -> Array:
     return out
 
 
-def settle_late(y: Array, grid: Grid, late: Array, states: Array) -> Array:
-    """`y` (rows, joints) on the grid as if nothing had been `late` [s], by `states` of the grid's places."""
-    at = states[:, grid.place]
-    return lay_on(y - (_ahead(at, 0, late) - at[0]), grid)
-
-
 def on_grid(y: Array, grid: Grid, sample_time: float, track: Tracker) -> tuple[Array, Array | None]:
     """States and deviations (order, rows, joints) of `y` (rows, joints), whose filter `track` counts in `sample_time`."""
     states, std = track(lay_on(y, grid))
-    late = grid.lateness(sample_time)
-    found = states[:, grid.place]
-    if late.any():
-        moved = states
-        for _ in range(_PASSES):
-            moved, other = track(settle_late(y, grid, late, moved))
-        at = moved[:, grid.place]
-        if _left(y, grid, _ahead(at, 0, late)) < _left(y, grid, found[0]):
-            last = np.gradient(moved[-1:], sample_time, axis=1)[:, grid.place]  # the highest state changes on the way, too
-            at = np.concatenate([at, last])
-            found, std = np.stack([_ahead(at, i, late) for i in range(len(at) - 1)]), other
-    return _rescale(found, grid, sample_time), None if std is None else _rescale(std[:, grid.place], grid, sample_time)
-
-
-def _left(y: Array, grid: Grid, position: Array) -> float:
-    """Mean square of what the reconstruction leaves of the measurement."""
-    return float(np.nanmean((y - position)[grid.alone] ** 2))
-
-
-def _ahead(states: Array, i: int, late: Array) -> Array:
-    """State i of a chain of integrators `late` [s] later: Σ_j x_{i+j} δ^j / j!."""
-    return np.asarray(sum(states[i + j] * (late[:, None] ** j / factorial(j)) for j in range(len(states) - i)))
+    return (_rescale(states[:, grid.place], grid, sample_time),
+            None if std is None else _rescale(std[:, grid.place], grid, sample_time))
 
 
 def _rescale(values: Array, grid: Grid, sample_time: float) -> Array:

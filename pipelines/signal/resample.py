@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["grid", "resample"]
+__all__ = ["grid", "resample", "through"]
 
 Array = npt.NDArray[np.float64]
 
@@ -32,3 +32,10 @@ def resample(t: Array, values: Array, at: Array, method: Literal["spline", "line
     from scipy.interpolate import CubicSpline
 
     return np.asarray(CubicSpline(t, values, axis=0, bc_type="natural")(at), dtype=np.float64)
+
+
+def through(at: Array, values: Array, wanted: Array) -> Array:
+    """Cubic spline through `values` (samples, channels) at instants `at` (samples,), at the `wanted` ones (wanted, channels)."""
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(at, values)(wanted))

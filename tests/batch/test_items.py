@@ -46,12 +46,13 @@ def test_names_become_folders_that_stay_in_the_output(tmp_path: Path) -> None:
 
 @pytest.mark.row("X11")
 def test_links_are_passed_over_and_own_output_too(tmp_path: Path) -> None:
-    """X11: a loop and a link that leads out are told and not followed; what rrrid wrote is no input."""
+    """X11: a loop and a circle of links are told and not followed; a linked log is one; what rrrid wrote is no input."""
     _touch(tmp_path, "root/a/1.h5", "root/done/provenance.json", "root/done/logs/1.h5", "elsewhere/1.h5")
     os.symlink(tmp_path / "root", tmp_path / "root/a/loop")
     os.symlink(tmp_path / "elsewhere/1.h5", tmp_path / "root/a/2.h5")
+    os.symlink("3.h5", tmp_path / "root/a/3.h5")
     items, checks = find_items(tmp_path / "root")
-    assert [(item.name, len(item.logs)) for item in items] == [("a", 1)]
+    assert [(item.name, len(item.logs)) for item in items] == [("a", 2)]
     assert [check.code for check in checks] == ["RRID-X11", "RRID-X11"]
 
 

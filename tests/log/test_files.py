@@ -183,7 +183,7 @@ def test_unknown_ending_is_a_usage_error(tmp_path: Path) -> None:
 
 
 def test_find_logs_passes_over_what_is_not_meant(tmp_path: Path) -> None:
-    """Hidden files, temporary files, rrrid's own output and links out of the folder are no inputs."""
+    """Hidden files, temporary files, rrrid's own output, links to folders and circles of links are no inputs; a linked log is."""
     for name in ("a.h5", "deep/b.parquet", ".rrrid-tmp-1-x.h5", "own/logs/c.h5", "outside/d.h5"):
         (tmp_path / "in" / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / "in" / name).write_bytes(b"x")
@@ -191,9 +191,11 @@ def test_find_logs_passes_over_what_is_not_meant(tmp_path: Path) -> None:
     (tmp_path / "in/own/provenance.json").write_text("{}")
     (tmp_path / "in/link.h5").symlink_to(tmp_path / "outside/d.h5")
     (tmp_path / "in/loop").symlink_to(tmp_path / "in")
+    (tmp_path / "in/x.h5").symlink_to("y.h5")
+    (tmp_path / "in/y.h5").symlink_to("x.h5")
     paths, checks = find_logs([tmp_path / "in"])
-    assert [p.relative_to(tmp_path / "in").as_posix() for p in paths if "loop" not in p.parts] == ["a.h5", "deep/b.parquet"]
-    assert {(c.code, Path(c.where).name) for c in checks} == {("RRID-X11", "link.h5"), ("RRID-X11", "loop")}
+    assert [p.relative_to(tmp_path / "in").as_posix() for p in paths] == ["a.h5", "deep/b.parquet", "link.h5"]
+    assert {(c.code, Path(c.where).name) for c in checks} == {("RRID-X11", name) for name in ("loop", "x.h5", "y.h5")}
     assert [p.name for p in find_logs([tmp_path / "in/own"])[0]] == ["c.h5"]
 
 

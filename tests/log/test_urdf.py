@@ -247,7 +247,8 @@ _CYCLE = _robot(_joint("j0", "d", "a"), _joint("j1", "a", "b"), _joint("j2", "b"
 
 @pytest.mark.parametrize(("text", "words"), [
     ("<robot", "not well-formed"), ("", "not well-formed"), (b"\xff\xfe\x00", "not well-formed"),
-    ('<?xml version="1.0" encoding="no-such"?><robot/>', "not well-formed"), ("<sdf/>", "<sdf>, not <robot>"),
+    ('<?xml version="1.0" encoding="no-such"?><robot/>', "not well-formed"), ("<sdf/>", "an SDF model"),
+    ("<arm/>", "<arm>, not <robot>"),
     ("<robot/>", "hangs"), (_robot(links="ab"), "a, b hang on nothing"), (_robot(links="a"), "no joint moves"),
     (_robot(_joint("j", "a", "nope"), links="ab"), "'nope', which is not defined"),
     (_robot(_joint("j", "a", "b"), _joint("j", "b", "c")), "two joints are called 'j'"),

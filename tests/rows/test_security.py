@@ -219,15 +219,16 @@ def test_no_name_leads_out_of_the_output(name: str, command: Command, tmp_path: 
 
 
 @row("X11")
-def test_links_are_not_followed_out_of_a_folder(command: Command, tmp_path: Path) -> None:
-    """A loop and a link to elsewhere are passed over with a word; an output that is a link is not written through."""
+def test_loops_of_links_are_not_followed(command: Command, tmp_path: Path) -> None:
+    """A loop is passed over with a word, a linked log is read; an output that is a link is not written through."""
     write_log(tmp_path / "in/a.h5", small_log())
-    write_log(tmp_path / "secret/b.h5", small_log(name="b"))
+    write_log(tmp_path / "elsewhere too/b.h5", small_log(name="b"))
     (tmp_path / "in/loop").symlink_to(tmp_path / "in")
-    (tmp_path / "in/b.h5").symlink_to(tmp_path / "secret/b.h5")
+    (tmp_path / "in/circle.h5").symlink_to("circle.h5")
+    (tmp_path / "in/b.h5").symlink_to(tmp_path / "elsewhere too/b.h5")
     done = command("inspect", "in", "--no-report", "--out", "out")
-    assert sorted(Path(c["where"]).name for c in done.told("X11")) == ["b.h5", "loop"]
-    assert [log["name"] for log in done.object["logs"]] == ["small"]
+    assert sorted(Path(c["where"]).name for c in done.told("X11")) == ["circle.h5", "loop"]
+    assert [log["name"] for log in done.object["logs"]] == ["small", "b"]
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere/thesis.tex").write_text("x")
     (tmp_path / "link").symlink_to(tmp_path / "elsewhere")

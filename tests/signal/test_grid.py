@@ -53,32 +53,6 @@ def test_a_clock_that_is_none_is_refused() -> None:
         grids(np.sort(np.random.default_rng(0).uniform(0.0, 1.0, 1000)), T)
 
 
-@pytest.mark.parametrize("wander", [0.02, 0.2, 0.4])
-@pytest.mark.parametrize("real", [True, False])
-def test_lateness_counts_where_it_is_real(wander: float, real: bool) -> None:
-    """Sampling that wanders by up to 0.4 samples is as good as even sampling; stamps that wander alone do no harm either."""
-    rng = np.random.default_rng(1)
-    k = np.arange(4000)
-    t = np.asarray((k + rng.uniform(-wander, wander, k.size)) * T)
-    taken = t if real else k * T
-    q, dq = np.sin(7.0 * taken)[:, None], 7.0 * np.cos(7.0 * taken)[:, None]
-    y = 1e-5 * np.rint(q / 1e-5)
-    observer = design(T, 5.0, 1e-10 / 12)
-
-    def track(laid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        found = smooth(laid, observer)
-        return found.states, found.full_std()
-
-    (grid,) = grids(t, T)
-    states, std = on_grid(y, grid, T, track)
-    assert std is not None
-    inner = slice(200, -200)
-    assert np.sqrt(np.mean((states[0] - q)[inner] ** 2)) < 1.5e-6
-    assert np.sqrt(np.mean((states[1] - dq)[inner] ** 2)) < 1.5e-4
-    if real:  # half a sample at this speed is 300 encoder steps: without lateness the same filter is far off
-        assert np.abs(track(lay_on(y, grid))[0][1][grid.place] - dq)[inner].max() > 2 * np.abs(states[1] - dq)[inner].max()
-
-
 def test_even_samples_are_left_alone() -> None:
     """On an even clock the grid changes no bit."""
     y, observer = swing(1000, 2, 1e-5), design(T, np.array([50.0, 500.0]), 1e-10 / 12)

@@ -17,6 +17,9 @@ from pipelines.log.limits import (
     shorter_than_period,
 )
 
+_STALE_LEAST = 0.05  # of the samples: fewer repeated rows do no harm
+_STALE_TOGETHER = 0.95  # of the repeats of one channel are those of all: by chance they are not
+
 __all__ = ["CLOCK_CHECKS", "MOTION_BAND", "TIME_CHECKS"]
 
 
@@ -33,6 +36,12 @@ def length(s: Subject) -> list[Check]:
                       f"{log.n_samples} samples, fewer than the {FEWEST} that any check needs",
                       signal="t",
                       remedy="record a longer log")]
+    if log.n_samples < SHORTEST:
+        return [s.say("T08", "warn",
+                      f"{log.n_samples} samples, {recorded_span(log.signals['t'].values, log.sample_time):.3g} s: too short for "
+                      f"any fit, which needs {SHORTEST} at least, {SHORTEST * log.sample_time:.3g} s at this rate",
+                      signal="t",
+                      remedy="record longer, some seconds of the motion at least")]
     time = s.good.log.t
     duration = recorded_span(time, log.sample_time)
     if log.period is not None and shorter_than_period(time, log.sample_time, log.period):
@@ -107,7 +116,43 @@ def repeated_stamps(s: Subject) -> list[Check]:
                       f"{many(time.repeated.size, 'sample')} twice, stamp and all; dropped",
                       signal="t", sample=int(time.repeated[0]) + 1,
                       remedy="look why the recorder wrote them twice")]
+    if stale := _stale(s):
+        return [s.say("T02", "warn", stale, signal="t",
+                      remedy="record at the rate at which the controller writes, or leave out the repeated samples on import")]
     return s.ok("T02", "every stamp stands once", signal="t")
+
+
+def _stale(s: Subject) -> str:
+    """Say how often a whole row is repeated under a new stamp; empty where none is.
+
+    Channels stop and go each at its own time, but for a row that is stale: where the channel that changes most often stands
+    still, all others do, and where it changes they do not. What stands still for longer is an arm at rest.
+    """
+    rows = np.hstack([s.log.q, s.log.tau])
+    if len(rows) < FEWEST or rows.shape[1] < 2:
+        return ""
+    same = rows[1:] == rows[:-1]
+    runs = np.flatnonzero(np.diff(np.pad(same.all(axis=1).astype(np.int8), 1))).reshape(-1, 2)
+    rest = np.zeros(len(same), dtype=bool)
+    for first, last in runs[np.diff(runs, axis=1)[:, 0] > GAP_LIMIT].tolist():
+        rest[first:last] = True
+    same = same[~rest]
+    if len(same) < FEWEST:
+        return ""
+    finest = int(np.argmin(same.mean(axis=0)))
+    others = np.delete(same, finest, axis=1).all(axis=1)
+    stale, fresh = others[same[:, finest]], others[~same[:, finest]]
+    if len(stale) < _STALE_LEAST * len(same) or stale.mean() < _STALE_TOGETHER or fresh.mean() > 1.0 - _STALE_TOGETHER:
+        return ""
+    between = np.diff(np.flatnonzero(~same[:, finest]))
+    every = int(np.median(between))
+    rate = 1.0 / s.log.sample_time
+    if np.mean(between == every) < 1.0 - _STALE_LEAST:
+        share = float(np.mean(same[:, finest]))
+        return (f"{percent(share, 2)} of the samples repeat the one before under a new stamp: {rate * (1.0 - share):.4g} Hz on "
+                "average")
+    which = "every second sample repeats the one before" if every == 2 else f"only one in {every} samples is new"
+    return f"{which}: {rate / every:.4g} Hz"
 
 
 def lost_samples(s: Subject) -> list[Check]:

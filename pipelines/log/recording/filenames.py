@@ -9,17 +9,25 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipelines.errors import EnvironmentFault, UsageError
+from pipelines.log.guard_answer import Answer
+from pipelines.log.guard_child import Child, Lost
 
-__all__ = ["files_below", "fill", "lying_there", "match"]
+__all__ = ["files_below", "fill", "lying_there", "match", "matches"]
 
 _MOST_FILES = 100_000
 _NAMED = 5  # files that a message names
+_LONGEST = 500  # characters of a pattern
+_SIMPLE = 2  # wildcards: a name of 255 characters is tried 255² times at most
+_SECONDS = 3.0  # for all patterns of a recipe on all names
+_MEMORY = 256 << 20  # [B]
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^{}]+(?:\{\d+(?:,\d*)?\}[^{}]*)*))?\}")
 
 
 @lru_cache(maxsize=256)
 def _compiled(pattern: str) -> re.Pattern[str]:
     """The regular expression of a pattern: {name} any text without a slash, {name:regex} that, *, ** and ? as in a shell."""
+    if len(pattern) > _LONGEST:
+        raise UsageError("C02", f"a pattern of {len(pattern)} characters", where="match", remedy=f"write at most {_LONGEST}")
     parts, at = [], 0
     seen: set[str] = set()
     for found in _FIELD.finditer(pattern):
@@ -39,6 +47,32 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 def _shell(text: str) -> str:
     text = re.escape(text)
     return text.replace(r"\*\*", ".*").replace(r"\*", "[^/]*").replace(r"\?", "[^/]")
+
+
+def matches(every: Sequence[str | tuple[str, ...]], names: Sequence[str], where: Path) -> list[dict[str, dict[str, str]]]:
+    """Of each of `every` patterns: the names that fit, each with its groups; in a time that no pattern exceeds.
+
+    A regular expression can take longer than the world has lasted; what could is matched in a child process.
+
+    Raises:
+        UsageError: C02, a pattern is none, or takes too long.
+    """
+    flat = [pattern for patterns in every for pattern in ((patterns,) if isinstance(patterns, str) else patterns)]
+    for pattern in flat:
+        _compiled(pattern)
+
+    def work() -> list[dict[str, dict[str, str]]]:
+        return [{name: groups for name in names if (groups := match(patterns, name)) is not None} for patterns in every]
+
+    if all(":" not in pattern and len(re.findall(r"\{|\*+", pattern)) <= _SIMPLE for pattern in flat):
+        return work()
+    try:
+        answer = Child(lambda _: Answer({"found": work()}, {})).ask(None, where, _SECONDS, _MEMORY, _MEMORY, last=True)
+    except Lost:
+        raise UsageError("C02", f"a pattern takes more than {_SECONDS:.0f} s: {', '.join(flat)}", where=where,
+                         remedy="write fewer wildcards, and no repetition inside another, such as (a+)+") from None
+    found: list[dict[str, dict[str, str]]] = answer.about["found"]
+    return found
 
 
 def match(patterns: str | tuple[str, ...], relative: str) -> dict[str, str] | None:

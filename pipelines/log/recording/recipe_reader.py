@@ -5,7 +5,6 @@ from __future__ import annotations
 import datetime
 import json
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from pathlib import Path
@@ -28,6 +27,7 @@ from pipelines.log.recording.recipe import (
     TimeSpec,
 )
 from pipelines.log.shipped import shipped
+from pipelines.log.toml_text import parse_toml
 
 __all__ = ["BLANK", "find_recipe", "parse_recipe"]
 
@@ -50,7 +50,7 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     from pydantic import TypeAdapter, ValidationError
 
     try:
-        table = _dated(tomllib.loads(text), where)
+        table = _dated(parse_toml(text), where)
     except (ValueError, RecursionError) as problem:
         raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where,
                          remedy="correct that line; strings stand in quotes, tables in [ ]") from None

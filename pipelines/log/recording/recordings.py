@@ -20,12 +20,13 @@ from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
 from pipelines.log.recording.repair import Recording
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Drive, RobotDescription, parse_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.log.robot_files import load_robot, split_tip
 from pipelines.log.shipped import shipped, shipped_names
 from pipelines.log.text import read_small_text
 
 __all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
 
+_BESIDE_USE = ("name", "gravity", "tip_link")
 
 Map = Mapping[str, Mapping[int, str]]
 
@@ -79,15 +80,16 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
             read[name] = read_table(filenames.inside(folder, name, path), recipe.format, name)
         return read[name]
 
-    hits = {name: hit for name in names if (hit := _case(cases, name)) is not None}
+    fits = filenames.matches([*(case.match for case in cases), *(spec.match for spec in recipe.table)], names, path)
+    hits = {name: hit for name in names if (hit := _case(cases, fits, name)) is not None}
     companions = {other for name, (_, groups) in hits.items() for other in _files_of(recipe, groups, name, path) if other != name}
     sources, problems = [], Gathering()
     for name, (case, found) in hits.items():
         with problems.part():
             sources += [] if name in companions else [_source(case, found, name, recipe, table_of, names, path)]
     problems.raise_all()
-    tables = [(spec, groups, table_of(name)) for name in names for spec in recipe.table
-              if (groups := filenames.match(spec.match, name)) is not None]
+    tables = [(spec, fit[name], table_of(name)) for name in names
+              for spec, fit in zip(recipe.table, fits[len(cases):], strict=True) if name in fit]
     if not sources and not tables:
         patterns = ", ".join(p for case in cases for p in ((case.match,) if isinstance(case.match, str) else case.match))
         there = filenames.lying_there(names, RECORDINGS)
@@ -116,10 +118,10 @@ def _folder(recipe: Path, source: Path | None) -> Path:
     return source
 
 
-def _case(cases: list[FileSpec], name: str) -> tuple[FileSpec, dict[str, str]] | None:
-    for case in cases:
-        if (groups := filenames.match(case.match, name)) is not None:
-            return None if case.skip else (case, groups)
+def _case(cases: list[FileSpec], fits: list[dict[str, dict[str, str]]], name: str) -> tuple[FileSpec, dict[str, str]] | None:
+    for case, fit in zip(cases, fits, strict=False):
+        if name in fit:
+            return None if case.skip else (case, fit[name])
     return None
 
 
@@ -155,21 +157,24 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
         import tomli_w
 
         return parse_robot(tomli_w.dumps(table), where=path), ()
-    beside = ("name", "gravity", "tip_link")
     for key in table:
-        if key not in beside:
-            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, beside)}", where=path,
-                             remedy="beside use, name, gravity and tip_link can be given; write the rest in the description")
+        if key not in _BESIDE_USE:
+            raise UsageError("C01", f"'robot.{key}' beside 'robot.use'{did_you_mean(key, _BESIDE_USE)}", where=path,
+                             remedy=f"beside use, {', '.join(_BESIDE_USE)} can be given; write the rest in the description")
+    tip = table.get("tip_link")
+    if not isinstance(tip, str | None):
+        raise UsageError("C02", "'robot.tip_link' must name a link", where=path, remedy="write tip_link = \"last link\"")
     if not isinstance(use, str) or not use.strip():
         raise UsageError("C02", "'robot.use' must name a robot description, a URDF, or a shipped robot", where=path,
                          remedy="fill it in")
+    use, after_colon = split_tip(use)
     found = next((place / use for place in (folder, path.parent) if (place / use).is_file()), None)
     if found is None and Path(use).suffix and use not in shipped_names("robots"):
         places = " nor ".join(dict.fromkeys((f"in {folder}", f"in {path.parent}")))
         raise UsageError("C04", f"the robot '{use}' that the recipe names lies neither {places}" if folder != path.parent
                          else f"the robot '{use}' that the recipe names does not lie in {folder}", where=path,
                          remedy="copy it to the recordings, give their folder with --source, or another robot with --robot")
-    robot = _with_tip(found, use, table.get("tip_link"), path)
+    robot = load_robot(found if found is not None else use, tip or after_colon)
     files = () if found is None else (found,)
     if "name" in table:
         robot = replace(robot, name=str(table["name"]))
@@ -180,22 +185,6 @@ def _robot(recipe: Recipe, folder: Path, path: Path, override: str | None) -> tu
         raise UsageError("C02", f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]", where=path,
                          remedy="write gravity = [0.0, 0.0, -9.81]")
     return replace(robot, gravity=(float(gravity[0]), float(gravity[1]), float(gravity[2]))), files
-
-
-def _with_tip(found: Path | None, use: str, tip_link: object, path: Path) -> RobotDescription:
-    """Load the robot that `use` names; `tip_link` says which arm of a URDF that branches is meant.
-
-    Raises:
-        UsageError: C02, a tip_link that is no text, or of a robot that is no URDF.
-    """
-    if tip_link is None:
-        return load_robot(found if found is not None else use)
-    if not isinstance(tip_link, str) or found is None or found.suffix.lower() != ".urdf":
-        raise UsageError("C02", "'robot.tip_link' must name the last link of a URDF", where=path,
-                         remedy='write tip_link = "…" beside use = "….urdf"; a description in TOML has it under [kinematics]')
-    from pipelines.log.urdf import import_urdf
-
-    return import_urdf(found, tip_link=tip_link)
 
 
 def parse_map(entries: tuple[str, ...], recipe: Recipe, joints: int) -> Map:

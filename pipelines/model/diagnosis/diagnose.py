@@ -18,6 +18,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.answered.judgeable import limited_by_estimate
 from pipelines.model.diagnosis.answered.told import diagnosis_of
 from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, of_those_held_out, only_held_out, share_held_out
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
@@ -120,6 +121,7 @@ def _asked(logs: Logs, chosen: DiagnosisSettings, arm: Arm | None, say: Tell, ca
             held = plainer_of(found, again)
     if held is again:
         memory.instead(prepared, other)
+    held = limited_by_estimate(held, other if held is again else prepared)
     held = replace(held, fewer_terms=prepared.fewer) if prepared.fewer else held
     return replace(held, without_limit=without_limit(held, bool(logs.frf), chosen.without)) if chosen.limits else held
 

@@ -9,6 +9,7 @@ from collections.abc import Callable, Hashable, Sequence
 from typing import Any, TypeVar
 
 from pipelines.errors import Check
+from pipelines.estimation.checks.boundary import Boundary
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.gates import examined
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
@@ -50,7 +51,7 @@ class Memory:
         comparison that knows more of what stands."""
         self._known = [(name, things, asked, after if found is before else found) for name, things, asked, found in self._known]
 
-    def examined(self, logs: Logs, allow_mismatch: bool) -> tuple[Check, ...]:
+    def examined(self, logs: Logs, allow_mismatch: bool) -> tuple[tuple[Check, ...], Boundary | None]:
         """As `examined` of all that a diagnosis looks at."""
         every = (*logs.identify, *logs.validate, *logs.reference, *logs.frf, *logs.frf_before)
         return self.of("said", every, allow_mismatch, lambda: examined(every, allow_mismatch))

@@ -9,6 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
+from pipelines.errors import Check
+from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.experiment import Array
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
@@ -21,7 +23,7 @@ __all__ = ["RIVALS", "Answer", "BeforeAfter", "Curve", "Detectable", "Diagnosis"
            "TorqueGain", "Trial", "Value", "Verdict"]
 
 RIVALS = 0.8  # similarity from which two causes explain the same
-Verdict = Literal["cause", "nothing-wrong", "unknown"]
+Verdict = Literal["cause", "nothing-wrong", "unknown", "cannot-judge"]
 
 
 @dataclass(frozen=True)
@@ -283,7 +285,7 @@ class Diagnosis:
     question: Literal["what is wrong", "what has changed"]
     held_out: JudgedBy
     floor_origin: str  # "twin" | "reference logs" | "repetition" | "blocks"
-    reason: str  # why "unknown"; what "nothing wrong" cannot vouch for; what stands beside causes; else empty
+    reason: str  # why "unknown" or "cannot-judge"; what "nothing wrong" cannot vouch for; what stands beside causes; else empty
     after_rms: ResidualRms  # the same with all findings and standing effects
     ledger: tuple[Trial, ...]
     thresholds: tuple[Threshold, ...]
@@ -297,4 +299,6 @@ class Diagnosis:
     unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
     without_limit: tuple[WithoutLimit, ...] = ()  # causes of the library that no other list has
     fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart
+    boundary: Boundary | None = None  # what the logged torque is; null where no log moves the arm enough to tell
     no_twin: str = ""  # why a floor "blocks" is that of no twin, although the logs describe their controller; else empty
+    checks: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False)  # of the nominal model

@@ -159,6 +159,7 @@ class LogEquations:
         if (mean := self.found.mean) is not None:  # the rest are copies
             out[:mean.first] = out[mean.last:] = True
         slow = np.abs(self.found.motion.dq[good.kept]) < np.array(self.conditioning.min_speed)
+        slow = slow if self.found.stuck is None else slow | self.found.stuck
         return Rows(out, slow | near_peaks(good, self.runs, self.conditioning.low_pass, ~(out[:, None] | slow)))
 
     @cached_property

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from pipelines.errors import Check
+from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
@@ -41,8 +42,10 @@ class Result:
     balance: Balance | None
     unresolved: str  # words; empty where everything shows
     hard_to_see: tuple[Direction, ...]
+    not_separated: tuple[tuple[str, ...], ...] = field(default=(), kw_only=True)  # parameters determined only together
     comparison: tuple[Compared, ...]
     rigid_body_alone: tuple[float, ...] | None = field(default=None, kw_only=True)  # [torque_units] held-out rms, no friction
+    boundary: Boundary | None = field(default=None, kw_only=True)  # what the logged torque is; null: no log tells
     friction_of: str = field(default="", kw_only=True)  # given: the model file, or "fit-friction" of the same run
     noise_floor: tuple[Beside, ...] = field(default=(), kw_only=True)  # of logs that hold two periods or more
     convergence_samples: tuple[int, ...]

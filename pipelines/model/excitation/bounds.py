@@ -8,12 +8,12 @@ holds for any parameters between the bounds, and some of them reach it: nothing 
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 
 import numpy as np
 
 from pipelines.errors import UsageError
+from pipelines.log.toml_text import TomlError, parse_toml
 from pipelines.model.excitation.columns import ArmColumns
 from pipelines.model.rigid.body import Array
 
@@ -50,8 +50,8 @@ def parse_bounds(text: str, columns: ArmColumns, where: str) -> ParameterBounds:
         UsageError: C02, no TOML, an unknown or a missing name, or no pair from low to high.
     """
     try:
-        given = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as problem:
+        given = parse_toml(text)
+    except TomlError as problem:
         raise UsageError("C02", f"not TOML: {problem}", where=where, remedy="write for example p1 = [0.2, 0.4]") from None
     unknown = [name for name in given if name not in columns.names]
     missing = [name for name in columns.names if name not in given and not name.startswith(_OFFSET)]

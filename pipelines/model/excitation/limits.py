@@ -14,7 +14,7 @@ from pipelines.model.rigid.body import Array
 
 __all__ = ["Limit", "Limits", "limits_of", "middle_and_half"]
 
-_FAR = 100.0 * np.pi  # [rad] fifty turns
+_FAR = 100.0 * np.pi  # [rad, rad/s, m, …] fifty turns
 
 
 @dataclass(frozen=True)
@@ -64,9 +64,9 @@ def _both(values: Array) -> Array:
 
 
 def middle_and_half(limits: tuple[Limit, ...]) -> tuple[Array, Array]:
-    """Of each limit; an open end is put far away. Tip speed is bounded by its square, which is smooth at rest."""
-    low = np.array([max(one.low, min(one.high, 0.0) - _FAR) for one in limits])
-    high = np.array([min(one.high, max(one.low, 0.0) + _FAR) for one in limits])
+    """Of each limit; an end that is open is put far away. Tip speed is bounded by its square, which is smooth at rest."""
+    low = np.array([one.low if np.isfinite(one.low) else min(one.high, 0.0) - _FAR for one in limits])
+    high = np.array([one.high if np.isfinite(one.high) else max(one.low, 0.0) + _FAR for one in limits])
     square = np.array([one.quantity == "tip speed" for one in limits], dtype=bool)
     low, high = np.where(square, -high**2, low), np.where(square, high**2, high)
     return 0.5 * (low + high), 0.5 * (high - low)

@@ -187,8 +187,9 @@ def _speed(robot: RobotDescription) -> Array:
         elif np.isfinite(joint.acceleration):
             speed[j] = joint.acceleration / (2.0 * np.pi * 0.6)
         else:
+            place = " in its <limit> in the URDF" if robot.urdf_text else ", and best acceleration and torque, in its [[joint]]"
             raise UsageError("C08", f"joint {j + 1} '{joint.name}' has no limit of speed and none of acceleration",
-                             where=robot.name, remedy="write velocity, and best acceleration and torque, in its [[joint]]")
+                             where=robot.name, remedy=f"write velocity{place}")
     return speed
 
 

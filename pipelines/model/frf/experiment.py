@@ -1,7 +1,7 @@
 """One "frf" log as signals for spectra: v, the plant's input, the deviation from the reference, torque; reversal left out.
 
     turned = turned_joint(log)
-    turned.stretches[0].signals        (samples, 4): v, u, q - q_ref, τ of the joint
+    turned.stretches[0].signals        (samples, 3 + joints): v, u, q - q_ref, τ of the joint; q - q_ref of all others
 
 Kostić et al. 2004, Section IV.D. The joint turns slowly, so that friction does not stick, and at constant speed, so that the
 mean of its friction is a constant that no spectrum shows. Where it starts, reverses and stops, friction jumps: those samples
@@ -19,11 +19,12 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected
 from pipelines.log.doctor.segments import Usable, usable
 from pipelines.log.experiment import Array, Controller, ExperimentLog
-from pipelines.log.limits import LARGEST_JITTER, percent
+from pipelines.log.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
+from pipelines.signal.resample import through
 
-__all__ = ["INPUT", "POSITION", "TORQUE", "Stretch", "Turned", "V", "excitation_period", "turned_joint"]
+__all__ = ["INPUT", "MOST_LOST", "POSITION", "TORQUE", "Stretch", "Turned", "V", "excitation_period", "turned_joint"]
 
-V, INPUT, POSITION, TORQUE = range(4)  # channels of a stretch
+V, INPUT, POSITION, TORQUE = range(4)  # channels of a stretch; behind them the positions of the other joints
 
 _PLATEAU = 0.02  # of the largest speed: what counts as constant
 _WANDERING = 0.2  # the same, where the speed is only reconstructed
@@ -32,6 +33,7 @@ _SETTLE = 0.5  # [s] after the speed has become constant
 _SHORTEST = 1.0  # [s] a stretch is worth
 _STILL = 1e-3  # [rad/s] a slower joint does not turn
 _SAME = 1e-9  # of the largest v: two periods are equal
+MOST_LOST = 0.1  # of the samples: beyond, what is filled in weighs as much as what was recorded
 _LINE = 1e-3  # of the strongest line's amplitude: what is weaker is none
 
 
@@ -42,7 +44,7 @@ class Stretch:
     start: int  # of the log
     stop: int
     direction: int  # 1, -1; 0 where the joint does not turn
-    signals: Array  # (samples, 4)
+    signals: Array  # (samples, 3 + joints)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +62,10 @@ class Turned:
     swing: float  # [rad/s] std of its speed about that, by the excitation
     period: int | None  # [samples] of v; None: it does not repeat
     stretches: tuple[Stretch, ...]
-    whole: Array  # (samples, 4) the log with its reversal
+    whole: Array  # (samples, 3 + joints) the log with its reversal
     left_out: float  # share of the samples
+    filled: float  # share of the samples that were lost, and filled alike in all channels
+    held: bool  # the input is held from one sample to the next; False: sampled at some instant between two, as position is
     mean_input: tuple[float | None, float | None]  # of the input, forwards and backwards: what friction and load leave
 
     @property
@@ -95,8 +99,8 @@ def turned_joint(log: ExperimentLog) -> Turned:
     """The excited joint's signals at constant speed.
 
     Raises:
-        InputRejected: S01, a signal or attribute is missing; T05, uneven sampling; D09, v does not excite; D04, input or position
-            is constant; T08, nothing of it lasts at constant speed.
+        InputRejected: S01, a signal or attribute is missing; T05, uneven sampling; T03, too many samples lost; D09, v does not
+            excite; D04, input or position is constant; T08, nothing of it lasts at constant speed.
     """
     joint, quantity = _described(log)
     good = usable(log)
@@ -113,13 +117,19 @@ def turned_joint(log: ExperimentLog) -> Turned:
         if not np.isfinite(channel).any() or float(np.nanstd(channel)) <= 0.0:
             raise InputRejected("D04", f"{name} of joint {joint} is constant while v excites it", where=log.source or log.name,
                                 remedy="look at this channel in the recording")
-    reference = mended["q_ref"][:, j] if "q_ref" in mended else _straight(mended.q[:, j])
-    signals = np.column_stack([v, mended[quantity][:, j], mended.q[:, j] - reference, mended.tau[:, j]])
-    speed = mended["dq_ref"][:, j] if "dq_ref" in mended else _speed(mended.q[:, j], log.sample_time)
+    position = mended.q - (mended["q_ref"] if "q_ref" in mended else np.column_stack([_straight(q) for q in mended.q.T]))
+    signals = np.column_stack([v, mended[quantity][:, j], position[:, j], mended.tau[:, j], np.delete(position, j, axis=1),
+                               mended.q[:, j], mended["dq_ref"][:, j] if "dq_ref" in mended else mended.q[:, j]])
+    even = _even(good, signals, log.sample_time)
+    if even.filled > MOST_LOST:
+        raise InputRejected("T03", f"{percent(even.filled)} of the samples were lost: between them no spectrum is known",
+                            where=log.source or log.name, remedy="give the recorder more priority, or record fewer signals")
+    signals, q = even.signals[:, :-2], even.signals[:, -2]
+    speed = even.signals[:, -1] if "dq_ref" in mended else _speed(q, log.sample_time)
     width = _PLATEAU if "dq_ref" in mended else _WANDERING
-    stretches = tuple(_stretches(good, signals, speed, width, log.sample_time))
+    stretches = tuple(_stretches(even.inside, signals, speed, width, log.sample_time))
     if "q_ref" not in mended:
-        stretches = tuple(replace(s, signals=_levelled(s.signals, mended.q[s.start:s.stop, j])) for s in stretches)
+        stretches = tuple(replace(s, signals=_levelled(s.signals, q[s.start:s.stop])) for s in stretches)
     if not stretches:
         raise InputRejected("T08", f"joint {joint} never turns at constant speed for {_SETTLE + _SHORTEST:g} s",
                             where=log.source or log.name,
@@ -129,8 +139,40 @@ def turned_joint(log: ExperimentLog) -> Turned:
     posture = log.posture if log.posture is not None else np.asarray(np.nanmedian(mended.q, axis=0))
     return Turned(log.name, joint, posture, log.sample_time, quantity, log.controller,
                   log.robot.joints[j].revolute, top if top > _STILL else 0.0, _swing(stretches, log.sample_time),
-                  excitation_period(v, log.period, log.sample_time), stretches, signals, 1.0 - kept / log.n_samples,
-                  (_mean(stretches, 1), _mean(stretches, -1)))
+                  excitation_period(even.recorded_v, log.period, log.sample_time), stretches, signals, 1.0 - kept / len(signals),
+                  even.filled, quantity == "r" or log.torque != "measured", (_mean(stretches, 1), _mean(stretches, -1)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Even:
+    """Samples at even instants."""
+
+    signals: Array  # (instants, channels); NaN in gaps that are too long
+    inside: npt.NDArray[np.bool_]  # (instants,) in a run, short gaps filled
+    recorded_v: Array  # (instants,) NaN wherever it was not recorded
+    filled: float  # share of the instants inside
+
+
+def _even(good: Usable, signals: Array, sample_time: float) -> _Even:
+    """Samples laid where their stamps say, one in a sample time; short gaps filled by a cubic spline through the stamps.
+
+    The filling is linear, and alike in all channels: on average it filters all of them alike, and the quotient of two responses to
+    v stays what it was; what it adds is noise, and shows as such. Samples that are laid side by side instead speed time up.
+    """
+    steps = np.clip(np.rint(np.diff(good.log.t) / sample_time), 1, GAP_LIMIT + 2)
+    place = np.concatenate([[0], np.cumsum(steps)]).astype(np.int64)
+    even = np.full((place[-1] + 1, signals.shape[1]), np.nan)
+    even[place] = signals
+    inside, recorded_v, filled = np.zeros(len(even), dtype=bool), even[:, V].copy(), 0
+    for run in good.runs:
+        at = np.arange(place[run.start], place[run.stop - 1] + 1)
+        known = np.isfinite(even[at]).all(axis=1)
+        if known.sum() < SHORTEST:
+            continue
+        if not known.all():
+            even[at[~known]] = through(at[known], even[at[known]], at[~known])
+        inside[at], filled = True, filled + int((~known).sum())
+    return _Even(even, inside, recorded_v, filled / max(int(inside.sum()), 1))
 
 
 def _described(log: ExperimentLog) -> tuple[int, str]:
@@ -176,17 +218,13 @@ def _speed(q: Array, sample_time: float) -> Array:
     return np.asarray((q[high] - q[low]) / ((high - low) * sample_time))
 
 
-def _stretches(good: Usable, signals: Array, speed: Array, width: float, sample_time: float) -> list[Stretch]:
+def _stretches(inside: npt.NDArray[np.bool_], signals: Array, speed: Array, width: float, sample_time: float) -> list[Stretch]:
     top = float(np.nanmax(np.abs(speed)))
     if top > _STILL:
         directions: npt.NDArray[np.int8] = np.where(np.abs(np.abs(speed) - top) <= width * top, np.sign(speed), 2).astype(np.int8)
     else:
         directions = np.zeros(len(speed), dtype=np.int8)
-    inside = np.zeros(len(speed), dtype=bool)
-    for run in good.runs:
-        inside[run] = True
-    inside &= np.isfinite(signals).all(axis=1)
-    directions[~inside] = 2
+    directions[~(inside & np.isfinite(signals).all(axis=1))] = 2
     edges = np.concatenate([[0], np.flatnonzero(np.diff(directions)) + 1, [len(speed)]])
     settle, shortest = round(_SETTLE / sample_time), round(_SHORTEST / sample_time)
     return [Stretch(int(a) + settle, int(b), int(directions[a]), signals[a + settle:b])

@@ -23,7 +23,7 @@ from pipelines.fit.rational import Known
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
-from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration
+from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
 from pipelines.model.frf.responses import How, Measured, measured_responses
 from pipelines.model.frf.rigid import Expected, expected_rigid
 
@@ -50,6 +50,7 @@ class Findings:
     """Of all "frf" logs of an arm."""
 
     seen: tuple[Seen, ...]
+    unusable: tuple[Measured, ...]  # responses in whose band the excitation tells nothing: neither fitted nor named
     classification: tuple[Finding, ...]
     undecided: tuple[Open, ...]
 
@@ -74,16 +75,17 @@ def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tupl
     """The same, of responses that are there already."""
     for one in measured:
         _check_sign(one)
-    seen = tuple(Seen(one, fitted_modes(one, band), expected_rigid(one, arm)) for one in measured)
+    usable = [one for one in measured if tells(one, band)]
+    seen = tuple(Seen(one, fitted_modes(one, band), expected_rigid(one, arm)) for one in usable)
     sure: list[Finding] = []
     unsure: list[Open] = []
     for joint in sorted({one.measured.joint for one in seen}):
         own = [one for one in seen if one.measured.joint == joint]
         turned = own[0].measured.first
-        found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute)
+        found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute, turned.held)
         sure += found
         unsure += left
-    return Findings(seen, *seen_elsewhere(sure, unsure))
+    return Findings(seen, tuple(one for one in measured if not tells(one, band)), *seen_elsewhere(sure, unsure))
 
 
 def _check_sign(measured: Measured) -> None:

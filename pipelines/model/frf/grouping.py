@@ -11,13 +11,17 @@ from pipelines.fit.rational import Known
 from pipelines.model.frf.compliant import Explained, explain
 from pipelines.model.frf.modes import Modes, Pair
 
-__all__ = ["Finding", "Open", "group_joint", "seen_elsewhere"]
+__all__ = ["FLAT", "Finding", "Open", "advance", "group_joint", "seen_elsewhere"]
 
 _TELLS = 9.0  # χ² by which one explanation must be better: three standard deviations
 _FITS = 4.0  # χ² per number, beyond which an explanation is none
 _HEAVY = 2.0  # rise above which what drops out outweighs the rest: no base does
 _LIGHT = 0.5  # of the arm's inertia: no base weighs less
-_FLAT = 1.15  # a ratio of magnitudes below it is flat
+FLAT = 1.15  # a ratio of magnitudes below it is flat
+# Damping ratio beyond which a mode is no mere spring: structures and gears have a few hundredths. A gap that is crossed answers like
+# a spring that swallows energy (its describing function: Gelb & Vander Velde 1968, ch. 2).
+_SPRING = 0.15
+_SPAN = 4.0  # highest over lowest frequency, of a band in which a joint without a mode is called rigid
 _DELAY = 0.15  # of the sample time: the smallest delay worth a word
 _SURE = 5.0  # standard deviations of it
 _NEAR = 0.03  # two joints show the same base within such a share of its frequency
@@ -54,13 +58,28 @@ class Open:
     experiment: str  # what to record to tell
 
 
-def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True) -> tuple[list[Finding], list[Open]]:
-    """What the responses of one joint (1-based), one a posture, say together."""
+def advance(modes: Sequence[Modes], sample_time: float, held: bool = True) -> Known | None:
+    """The delay [s], where it is negative beyond doubt: no position comes before its torque."""
+    mean = _late(modes, sample_time, held)
+    return mean if mean is not None and mean.value < 0.0 else None
+
+
+def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True,
+                held: bool = True) -> tuple[list[Finding], list[Open]]:
+    """What the responses of one joint (1-based), one a posture, say together.
+
+    Args:
+        sample_time: [s].
+        revolute: whether it turns.
+        held: whether its input is held from one sample to the next; if it was measured, nobody knows when within a sample.
+    """
     if (worst := max((m.misfit for m in modes if m.left > _LEFT), default=0.0)) > _UNFITTED:
         return [], [Open(joint, None, ("joint_elasticity", "base_resonance"),
                          f"No rational function explains the response: what it leaves has {worst:.3g} times the variance of noise.",
                          "weaker excitation or a faster turn, should friction have turned its sign; else longer")]
-    delays, unclear = _delay(joint, modes, sample_time)
+    if (early := advance(modes, sample_time, held)) is not None:
+        return [], [_early(joint, modes, early)]
+    delays, unclear = _delay(joint, modes, sample_time, held)
     count = min(len(m.pairs) for m in modes)
     pairs = [_strongest(m, count) for m in modes]
     unclear += _leftover(joint, modes, count)
@@ -112,6 +131,11 @@ def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: 
 
 
 def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str) -> tuple[list[Finding], list[Open]]:
+    damping = float(np.mean([max(p.antiresonance.damping.value, p.resonance.damping.value) for own in pairs for p in own]))
+    if damping > _SPRING:
+        why = f"{_told(pairs, inertia, unit)}; a damping ratio of {damping:.2g} is that of a gap which is crossed, or of friction"
+        return [], [replace(_open(joint, pairs, why), candidates=("backlash", "joint_elasticity", "base_resonance"),
+                            experiment=f"joint {joint} excited half as strongly: a gap answers otherwise then, a spring does not")]
     base, spring = explain(pairs, inertia, True, False), explain(pairs, inertia, False, True)
     assert base is not None
     assert spring is not None
@@ -191,13 +215,29 @@ def _mean(values: Sequence[Known]) -> Known:
     return Known(mean, float(np.sqrt(max(scatter, 1.0) / weight.sum())))
 
 
-def _delay(joint: int, modes: Sequence[Modes], sample_time: float) -> tuple[list[Finding], list[Open]]:
+def _late(modes: Sequence[Modes], sample_time: float, held: bool) -> Known | None:
+    """The delay [s], where there is one, of either sign."""
     mean = _mean([m.delay for m in modes])
-    if not np.isfinite(mean.value) or abs(mean.value) < max(_DELAY * sample_time, _SURE * mean.std):
+    least = (_DELAY if held else 1.0) * sample_time
+    return mean if np.isfinite(mean.value) and abs(mean.value) >= max(least, _SURE * mean.std) else None
+
+
+def _early(joint: int, modes: Sequence[Modes], early: Known) -> Open:
+    flat = max(m.flat for m in modes)
+    other = "" if flat < FLAT else f", or a mode outside the excited band: the magnitude changes by a factor of {flat:.3g}"
+    return Open(joint, None, () if flat < FLAT else ("joint_elasticity", "base_resonance"),
+                f"The phase advances as with {-1e3 * early.value:.3g} ms of time gained. No lag does that: faster motion has "
+                f"folded back (aliasing), or torque and position have different clocks{other}.",
+                "all signals by one clock, at the controller's own rate")
+
+
+def _delay(joint: int, modes: Sequence[Modes], sample_time: float, held: bool) -> tuple[list[Finding], list[Open]]:
+    mean = _late(modes, sample_time, held)
+    if mean is None:
         return [], []
     each = ", ".join(f"{1e3 * m.delay.value:.3g}" for m in modes)
     flat = max(m.flat for m in modes)
-    if flat < _FLAT and mean.value > 0.0:
+    if flat < FLAT:
         words = (f"Beside its modes the magnitude is flat within {100.0 * (flat - 1.0):.2g} % and the phase falls in proportion to "
                  f"the frequency: position comes {each} ms late in {_postures(modes)}, beyond hold and controller.")
         return [Finding("delay", joint, words, "time_delay", None, None, {"delay": mean}, (joint,))], []
@@ -207,8 +247,12 @@ def _delay(joint: int, modes: Sequence[Modes], sample_time: float) -> tuple[list
 
 
 def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
-    flat, low, high = max(m.flat for m in modes), min(m.band[0] for m in modes), max(m.band[1] for m in modes)
-    if flat < _FLAT:
+    flat, low, high = max(m.flat for m in modes), max(m.band[0] for m in modes), min(m.band[1] for m in modes)
+    if high < _SPAN * low:
+        return Open(joint, None, ("joint_elasticity", "base_resonance"),
+                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
+                    "stronger excitation, to lower and higher frequencies")
+    if flat < FLAT:
         traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]
         beside = f" A pair that nearly cancels leaves a trace at {_many(traces)} Hz: base or another joint." if traces else ""
         words = (f"No {'distinct ' if traces else ''}mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration "

@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.fit.rational import Known, Mode, Rational
-from pipelines.fit.rational_search import fit_rational, scattered
+from pipelines.fit.rational_search import FEWEST, fit_rational, scattered
 from pipelines.log.experiment import Array
 from pipelines.model.frf.along import along_turn
 from pipelines.model.frf.controller import Complex, loop_delay
 from pipelines.model.frf.responses import Measured, double_integrator
 from pipelines.signal.frequency_response import FrequencyResponse
 
-__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration"]
+__all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration", "tells"]
 
 BAND = (4.0, 250.0)  # [Hz] below it friction and gravity are at work, above it hardly any log has signal
 _OF_RATE = 0.3  # highest, of the rate
@@ -35,9 +35,8 @@ _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
-_NARROW = 0.5  # of the resolution, the least width 2 ζ f of a mode
+_NARROW = 0.25  # of the resolution, the least width 2 ζ f of a mode
 _STUCK = 3.0  # misfit that a search which found the modes hardly leaves
-_BEYOND = 1.25  # times the upper end of the band: the flank of a resonance up to there tells where it is
 _SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
 _LONGEST = 0.05  # [s] no delay is longer
 _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
@@ -77,15 +76,29 @@ class Modes:
 
 
 def relative_acceleration(measured: Measured, response: FrequencyResponse | None = None) -> FrequencyResponse:
-    """`response` (default: the plant's) over the double integrator, sampled and delayed as the loop was."""
-    response = response or measured.plant
+    """`response` over the double integrator, sampled and delayed as the loop was.
+
+    By default that of the plant, with the other joints held where they are not.
+    """
+    response = response or measured.held or measured.plant
     return response.times(np.asarray(1.0 / _rigid(measured, response.frequency)))
 
 
 def _rigid(measured: Measured, frequency: Array) -> Complex:
     first = measured.first
     _, delay = loop_delay(first.controller, first.quantity)
-    return np.asarray(double_integrator(frequency, first.sample_time, delay), dtype=np.complex128)
+    return np.asarray(double_integrator(frequency, first.sample_time, delay, first.held), dtype=np.complex128)
+
+
+def tells(measured: Measured, band: tuple[float, float] = BAND) -> bool:
+    """Whether enough of `band` [Hz] is excited for a fit, and nothing has folded into it."""
+    return not measured.aliased and len(_in_band(measured, relative_acceleration(measured), band).frequency) >= FEWEST
+
+
+def _in_band(measured: Measured, response: FrequencyResponse, band: tuple[float, float]) -> FrequencyResponse:
+    """What is excited of `band` [Hz], and sampled well enough."""
+    inside = response.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
+    return inside.where(measured.excited.holds(inside.frequency))
 
 
 def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
@@ -95,12 +108,12 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
         InputRejected: T08, too few frequencies in the band.
     """
     relative = relative_acceleration(measured)
-    part = relative.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
+    part = _in_band(measured, relative, band)
+    relative = relative.where(measured.excited.holds(relative.frequency))
     fit = _fitted(part)
-    moving = _moving(measured, part, fit)
-    modes = _inside(tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution)), fit.band[1])
-    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m, part.resolution)
-                   and m.frequency.value <= fit.band[1])
+    moving = [(m, to) for m, to in _moving(measured, part, fit) if measured.excited.holds(np.array(m.frequency.value))]
+    modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution))
+    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m, part.resolution))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
@@ -177,19 +190,9 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
     return np.asarray(found), np.sqrt(np.diag(inverse) * correlated * max(misfit, 1.0))
 
 
-def _inside(modes: tuple[Mode, ...], top: float) -> tuple[Mode, ...]:
-    """Those up to `top` [Hz]; where the last is an antiresonance, with the resonance that follows it, of which the flank is seen.
-
-    What gives way has both, and a light motor has them far apart.
-    """
-    count = sum(m.frequency.value <= top for m in modes)
-    following = 0 < count < len(modes) and modes[count - 1].kind == "antiresonance" and modes[count].kind == "resonance"
-    return modes[:count + 1] if following else modes[:count]
-
-
 def _is_mode(mode: Mode, resolution: float) -> bool:
     """One that is known, and not narrower than what the spectrum resolves."""
-    f, damping = mode.frequency, abs(mode.damping.value)
+    f, damping = mode.frequency, mode.damping.value
     return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value and 2.0 * damping * f.value > _NARROW * resolution
 
 
@@ -199,12 +202,12 @@ def _is_trace(mode: Mode, resolution: float) -> bool:
 
 def _moving(measured: Measured, part: FrequencyResponse, fit: Rational) -> list[tuple[Mode, Mode]]:
     """Each mode as the fit has it, and as uncertain as its movement along the turn makes it: what parts scatter beyond noise."""
-    modes = fit.modes(_BEYOND)
+    modes = fit.modes()
     along = along_turn(measured, part.frequency)
     if along is None or not modes:
         return [(m, m) for m in modes]
     relative = along.response / _rigid(measured, part.frequency)
-    seen = scattered(fit, part.frequency, relative, part.variance).modes(_BEYOND)
+    seen = scattered(fit, part.frequency, relative, part.variance).modes()
 
     def wider(mean: Known, one: Known) -> Known:
         return Known(mean.value, float(np.sqrt(mean.std**2 + max(one.std**2 - along.noise * mean.std**2, 0.0))))
@@ -241,8 +244,8 @@ def _rise_std(pairs: tuple[Pair, ...]) -> float:
 
 def _inertia(measured: Measured, level: Known) -> Known | None:
     """u/τ is one number per joint, D̂ or 1: the inertia is that over the level."""
-    torque = measured.compliance.within(*_CONSTANT)
-    plant = measured.plant.within(*_CONSTANT)
+    torque, plant = (one.where(measured.excited.holds(one.frequency)).within(*_CONSTANT)
+                     for one in (measured.compliance, measured.plant))
     if not len(torque.frequency) or len(torque.frequency) != len(plant.frequency):
         return None
     ratio = plant.response / torque.response  # τ/u

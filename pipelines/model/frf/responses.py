@@ -23,7 +23,9 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
+from pipelines.model.frf.others_held import others_held
 from pipelines.signal.cross_spectra import cross_spectra
+from pipelines.signal.excited_band import ExcitedBand, excited_band
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
 from pipelines.signal.local_polynomial import local_polynomial
 from pipelines.signal.multisine_response import DetectionLines, MultisineResponses, multisine_responses
@@ -37,6 +39,9 @@ _HIGHEST = 0.45  # of the rate
 _LOWEST = 0.5  # [Hz]
 _SEGMENTS = 4  # at least, for Welch's coherence and variance
 _NO_POWER = 1e-12  # of the strongest bin of the source
+_FOLDED = 0.1  # of the density of v in its band, near half the rate: it goes on beyond
+_COUPLED = 4.0  # [Hz] from where on friction and gravity of the other joints matter less than their inertia
+_DENSITY = 1.0  # [s] of the segments that show where v has power
 _SMOOTH = 25  # lines over which distortion is compared with noise
 
 
@@ -63,6 +68,9 @@ class Measured:
 
     turned: tuple[Turned, ...]  # its logs
     plant: FrequencyResponse  # u → q by Φ_vq/Φ_vu
+    held: FrequencyResponse | None  # the same in the excited band, were the other joints held; None where that is all one
+    aliased: bool  # the input was sampled, not held, and v has power up to half the rate: what lies above has folded back
+    excited: ExcitedBand  # where it exists: nothing is fitted, judged or named outside
     direct: FrequencyResponse
     indirect: FrequencyResponse | None  # None: the log does not describe the controller
     continuous: FrequencyResponse | None  # what (29) gives with k_p + k_d jω: shown, never used
@@ -122,15 +130,43 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     sampled = sampled_controller(first.controller, first.joint, plant.frequency, first.sample_time)
     smooth = continuous_controller(first.controller, first.joint, plant.frequency) if first.controller else None
     both = [None if c is None else indirect(sensitivity.times(shift), c / shift) for c in (sampled, smooth)]
-    return Measured(turned, plant, _direct([s.signals for s in stretches], turned, how), both[0], both[1],
+    density, top = _density(several.frequency, stretches, first.rate)
+    band = excited_band(_outputs(several, (INPUT - 1, POSITION - 1)), density)
+    inside = density[band.holds(several.frequency)]
+    aliased = not first.held and bool(len(inside)) and top > _FOLDED * float(np.median(inside))
+    return Measured(turned, plant, _held(several, first, band), aliased, band,
+                    _direct([s.signals for s in stretches], turned, how), both[0], both[1],
                     closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion, detected)
+
+
+def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tuple[Array, float]:
+    """Of v [unit²/Hz] at these frequencies, and its median over the last tenth below half the rate."""
+    segment = min(round(_DENSITY * rate), *(len(s.signals) for s in stretches))
+    spectra = cross_spectra([s.signals[:, [V]] for s in stretches], rate, segment)
+    density = spectra.density[:, 0, 0].real
+    return np.interp(frequency, spectra.frequency, density), float(np.median(density[spectra.frequency > 0.45 * rate]))
+
+
+def _held(several: Responses, first: Turned, band: ExcitedBand) -> FrequencyResponse | None:
+    """Of a joint whose input is its torque; computed torque uncouples the joints."""
+    if first.quantity != "tau":
+        return None
+    inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
+    rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.held), dtype=np.complex128)
+    return others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])))
+
+
+def _outputs(several: Responses, which: tuple[int, ...]) -> Responses:
+    kept = list(which)
+    return replace(several, response=several.response[:, kept], covariance=several.covariance[:, kept][:, :, kept],
+                   coherence=several.coherence[:, kept])
 
 
 def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch],
              how: How) -> tuple[Responses, float | None, tuple[float | None, float | None]]:
     """v → (u, q, τ), the distortion where there are realisations, and what detection lines show."""
     first, signals = turned[0], [s.signals for s in stretches]
-    outputs = (INPUT, POSITION, TORQUE)
+    outputs = range(1, signals[0].shape[1])
     periods = {one.period for one in turned}
     whole = [x for x in signals if first.period is not None and len(x) >= 2 * first.period]
     periodic = len(periods) == 1 and first.period is not None and bool(whole)
@@ -246,13 +282,19 @@ def _direct(signals: Sequence[Array], turned: tuple[Turned, ...], how: How) -> F
 
 def _with_reversal(turned: tuple[Turned, ...], how: How) -> FrequencyResponse | None:
     """From the whole log: what it would have been had nothing been left out."""
-    known = [one.whole[np.isfinite(one.whole).all(axis=1)] for one in turned]
-    if sum(len(x) for x in known) < _SEGMENTS * round(turned[0].rate / (how.resolution or 0.25)):
+    known = [one.whole for one in turned]
+    least = _SEGMENTS * round(turned[0].rate / (how.resolution or 0.25))
+    if not all(np.isfinite(x).all() for x in known) or sum(len(x) for x in known) < least:
         return None
     return closed_loop(_welch(known, turned, how, V, (INPUT, POSITION)))
 
 
-def double_integrator(frequency: Array, sample_time: float, delay: int = 0) -> Array:
-    """(z + 1) T²/(2 (z - 1)²) z^-delay (frequencies,), complex: unit inertia under a torque held over a sample."""
+def double_integrator(frequency: Array, sample_time: float, delay: int = 0, held: bool = True) -> Array:
+    """(z + 1) T²/(2 (z - 1)²) z^-delay (frequencies,), complex: unit inertia under a torque held over a sample.
+
+    Not `held`, 1/s²: a torque that was measured when position was.
+    """
+    if not held:
+        return np.asarray(-1.0 / (2.0 * np.pi * np.asarray(frequency)) ** 2 + 0j)
     z = np.exp(2j * np.pi * np.asarray(frequency) * sample_time)
     return np.asarray(sample_time**2 * (z + 1.0) / (2.0 * (z - 1.0) ** 2) * z ** -float(delay))

@@ -100,6 +100,9 @@ class Posture:
     relative: Curve  # acceleration per input
     fit: Curve  # the rational function at the same frequencies
     compliance: Curve  # τ → q [rad/(N m)]
+    excited: tuple[Band, ...]  # [Hz] where v has power and its responses are known: nothing is fitted, judged or named outside
+    filled: float  # share of the samples that were lost, and filled alike in all channels
+    others_held: bool  # the motion of the other joints was taken out of `relative`
     with_reversal: Curve | None  # input → q of the whole log
     continuous: Mapping[str, float]  # [Hz] as text -> error of the indirect method with the controller taken as continuous; share
 
@@ -184,6 +187,7 @@ def posture_of(seen: Seen) -> Posture:
                    m.distortion, *m.detected,
                    seen.expected.level, seen.expected.inertia, seen.expected.source, modes.level, modes.level_above,
                    modes.inertia, modes.delay, modes.misfit, modes.band, Curve.of(relative), fit, Curve.of(m.compliance),
+                   m.excited.intervals, max(t.filled for t in m.turned), m.held is not None,
                    None if m.with_reversal is None else Curve.of(m.with_reversal), _continuous(seen))
 
 

@@ -29,8 +29,12 @@ _ROUNDED = 1e-12  # of θ: less is what exp and log make of it
 _CARRIED = 3  # rounds in which a law that depends on the load sees the load of the fit before
 
 
-def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = None, sharpness: float | None = None) -> LawFit:
+def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = None, sharpness: float | None = None,
+            lags: int | None = None) -> LawFit:
     """Fit `law` from the best of `starts`, which are otherwise the grids of its effects.
+
+    Args:
+        lags: rows over which noise may remember itself, for the covariance.
 
     A law that depends on the load sees that of the fit before, round by round.
     """
@@ -41,11 +45,11 @@ def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = Non
         starts = list(law.starts(equations.nodes, arms[0], sharpness))
     begin = list(starts) if len(starts) == 1 else _best_of(equations, law, arms, starts)
     for _ in range(_CARRIED if law.sees_load else 1):
-        found = fit_separable(equations.problem(law, arms), begin)
+        found = fit_separable(equations.problem(law, arms), begin, lags)
         if not takes_power(equations, law, arms[0], found):
             found = _other(equations, law, arms, starts, found)
         if np.abs((named := law.canonical(found.theta)) - found.theta).max(initial=0.0) > _ROUNDED:
-            found = fit_separable(equations.problem(law, arms), [named])
+            found = fit_separable(equations.problem(law, arms), [named], lags)
         begin, arms = [found.theta], equations.arms(found.beta)
     return LawFit(law, arms[0], equations.postures, found, equations.width)
 

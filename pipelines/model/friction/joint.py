@@ -1,6 +1,8 @@
 """Everything that friction logs of one joint show: its law and how it was chosen, what judges it, what is not seen.
 
     motion by the smoother → refined about a flexible law → ladder → refined about the chosen law → the fit
+
+Rows in which the joint does not slide (sliding.py) are left out, where the flexible law does not follow them as well.
 """
 
 from __future__ import annotations
@@ -10,10 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.fit.varpro import SeparableFit
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.break_away import BreakAway, break_away, held_at_least
 from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
+from pipelines.model.friction.drift import DriftConfig, drift_of
 from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.fit_law import fit_law
 from pipelines.model.friction.ladder import Judge, Ladder, climb
@@ -24,13 +28,16 @@ from pipelines.model.friction.postures import alike
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
 from pipelines.model.friction.simulate import Simulated, simulate_joint
+from pipelines.model.friction.sliding import Sliding, SlidingConfig, free_curve, left_out, sliding_rows
 from pipelines.model.friction.speed_map import SpeedMap, speed_map
-from pipelines.model.friction.weak_form import Stretch, stretches_of, swaying
+from pipelines.model.friction.weak_form import Course, Stretch, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["JointFit", "JointLogs", "Seen", "fit_joint", "fractions", "with_fit"]
 
+_CURVE = 100  # points of a curve, each way
+_MEMORY = 1.0  # [s] over which errors of a law may depend on one another
 _ROUNDS = 2  # of refining before laws are compared
 _FLEXIBLE = "three_sigmoid"  # follows any curve that a healthy joint has: no law of the ladder is favoured
 
@@ -78,40 +85,115 @@ class JointFit:
     held: tuple[float, float] | None  # [N m] friction carried at rest, back and forth
     window: float  # [s]
     ripple: Ripple | None
+    sliding: Sliding
+    course: Course | None  # of friction that changes in time
     beside_ripple: SeparableFit | None  # the law and the rigid numbers, the rigid ones first, with the ripple known
 
 
-def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFit:
+def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: SlidingConfig | None = None) -> JointFit:
     """Fit `law`, or choose one.
 
     Args:
-        window: of the equations [s].
+        window: of the equations [s], the shortest: a coarse encoder needs longer ones.
     """
     robot = logs.identify[0][0].robot
     arm = OneJoint.of(robot, logs.joint)
     resolution = max(float(encoder_resolution(found.good)[logs.joint - 1]) for _, found in logs.identify)
     beside = _swaying(logs)
-    identify, validate = (_stretches(part, logs.joint, window, beside) for part in (logs.identify, logs.validate))
-    flexible = law_named(_FLEXIBLE) or LADDER[-1]
-    fit = fit_law(LawEquations.of(identify, arm), flexible)
-    for _ in range(_ROUNDS):
-        identify = tuple(refined(stretch, fit, resolution) for stretch in identify)
-        fit = fit_law(LawEquations.of(identify, arm), flexible, [fit.theta])
-    validate = tuple(refined(stretch, fit, resolution) for stretch in validate)
+    config = config or SlidingConfig()
+    rows = _usable_rows(logs, window, beside, arm, config)
+    stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
+    if rows.sliding.doubtful and not _followed(stretches, fit, rows.sliding, config):
+        stretches = left_out(rows.stretches, rows.sliding.slides)
+    course = _course(stretches, rows, arm, config, DriftConfig())
+    stretches = _along(stretches, course, fit)
+    identify, validate = stretches[:rows.fitted], stretches[rows.fitted:]
     judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
-    ladder = climb(judge, (law,) if law is not None else LADDER)
+    sticks = any(stretch.sticks is not None for stretch in identify)
+    laws = tuple(one for one in LADDER if one.pointwise or not sticks)  # what is left out is what presliding would show
+    ladder = climb(judge, (law,) if law is not None else laws)
     chosen = ladder.chosen.fit
-    identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
-    final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+    if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
+        identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
+    identify, validate = (_along(part, course, chosen) for part in (identify, validate))
+    lags = round(_MEMORY / rows.window) if sticks else None
+    final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta], lags=lags)
     ripple = ripple_of(LawEquations.of(identify, arm), final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
     covered = coverage(identify)
-    at_rest = [stretch for stretch in _stretches(logs.hold, logs.joint, window, beside)
+    at_rest = [stretch for stretch in _stretches(logs.hold, logs.joint, rows.window, beside)
                if any(alike(stretch.posture, posture) for posture in final.postures)]
     return JointFit(logs, final, ladder, identify, driven, covered, unseen(covered, ladder), speed_map(identify, final),
-                    break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window, ripple,
+                    break_away((*identify, *at_rest), final), held_at_least(at_rest, final), rows.window, ripple,
+                    rows.sliding, course,
                     None if ripple is None else refitted(LawEquations.of(identify, arm), final, ripple))
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Stretches to fit and to judge, and which of their rows slide."""
+
+    stretches: tuple[Stretch, ...]  # the fitted ones first
+    fitted: int
+    window: float  # [s]
+    sliding: Sliding
+
+
+def _usable_rows(logs: JointLogs, window: float, beside: tuple[int, ...], arm: OneJoint, config: SlidingConfig) -> _Rows:
+    """The shortest windows over which the encoder shows the acceleration."""
+    found: _Rows | None = None
+    for factor in config.windows:
+        identify, validate = (_stretches(part, logs.joint, factor * window, beside) for part in (logs.identify, logs.validate))
+        if not identify:
+            break
+        both = tuple(replace(stretch, part=k) for k, stretch in enumerate((*identify, *validate)))
+        found = _Rows(both, len(identify), factor * window, sliding_rows(both, arm, config))
+        if found.sliding.attenuation <= config.attenuation:
+            break
+    if found is None:
+        raise InputRejected("T08", f"joint {logs.joint}: no log has enough windows of {window:g} s to fit a law to",
+                            remedy="record a few seconds at least")
+    return found
+
+
+def _about_a_flexible_law(stretches: tuple[Stretch, ...], fitted: int, arm: OneJoint,
+                          resolution: float) -> tuple[tuple[Stretch, ...], LawFit]:
+    """The motion refined about a law that follows any curve, and that law."""
+    flexible = law_named(_FLEXIBLE) or LADDER[-1]
+    fit = fit_law(LawEquations.of(stretches[:fitted], arm), flexible)
+    for _ in range(_ROUNDS):
+        before, stretches = fit, tuple(refined(stretch, fit, resolution) for stretch in stretches)
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), flexible, [before.theta])
+    return stretches, fit
+
+
+def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, config: SlidingConfig) -> bool:
+    """Whether one curve follows the rows of doubt as well as it does those that surely slide."""
+    residual = LawEquations.of(stretches, fit.joint).predicted(fit).residual
+    return float(np.mean(np.square(residual[~sliding.slides]))) <= config.worse * sliding.mean_square
+
+
+def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
+            drift: DriftConfig) -> Course | None:
+    """How friction changes in time over the logs that are fitted."""
+    slides = rows.sliding.slides
+    if all(stretch.sticks is None for stretch in stretches):
+        stretches = left_out(stretches, slides)
+    fitted = stretches[:rows.fitted]
+    equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
+    return drift_of(fitted, equations.y, np.hstack([equations.fixed, free_curve(speed, config)]), drift)
+
+
+def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -> tuple[Stretch, ...]:
+    """The stretches with columns of `course`, a change of the curve of `fit`."""
+    if course is None or not stretches:
+        return stretches
+    fastest = max(float(np.abs(stretch.dq).max()) for stretch in stretches)
+    side = fastest * np.geomspace(1e-4, 1.0, _CURVE)
+    speed = np.concatenate([-side[::-1], side])
+    own = replace(course, curve=(speed, fit.curve(speed)))
+    return tuple(replace(stretch, course=own) for stretch in stretches)
 
 
 def _swaying(logs: JointLogs) -> tuple[int, ...]:

@@ -6,6 +6,7 @@ joint has its weight along the axis instead, a constant.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import NoReturn
 
@@ -14,8 +15,12 @@ import numpy as np
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.model.effects.base import SpeedCurve
 from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.rigid.choose import rigid_body
 
-__all__ = ["OneJoint", "gravity_columns", "gravity_names"]
+__all__ = ["OneJoint", "gravity_acts", "gravity_columns", "gravity_names"]
+
+_PLACES = 8  # of the driven joint
+_PARALLEL = 1e-6  # [rad] between axis and gravity: rounding of a description
 
 
 @dataclass(frozen=True)
@@ -74,3 +79,14 @@ def gravity_columns(q: Array, revolute: bool) -> Array:
 
 def gravity_names(revolute: bool) -> tuple[str, ...]:
     return ("sine", "cosine") if revolute else ("constant",)
+
+
+def gravity_acts(robot: RobotDescription, joint: int, others: Sequence[float]) -> bool:
+    """Whether gravity has a moment about the axis of `joint`, counted from 1, or a part along it where that slides.
+
+    Args:
+        others: (joints - 1,) positions of the other joints [rad].
+    """
+    q = np.insert(np.tile(np.asarray(others, dtype=np.float64), (_PLACES, 1)), joint - 1, np.linspace(-3.0, 3.0, _PLACES), axis=1)
+    row = rigid_body(robot).regressor(q, 0.0 * q, 0.0 * q)[:, joint - 1]
+    return bool(np.abs(row).max(initial=0.0) > _PARALLEL * float(np.linalg.norm(robot.gravity)))

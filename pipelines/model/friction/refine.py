@@ -61,9 +61,12 @@ def reference_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
     load = gravity_columns(nodes.q[:, 0], stretch.revolute) @ np.array(arm.gravity)
     load = load + fit.law.columns(nodes, arm, fit.theta) @ fit.amplitudes
     momentum = stretch.impulse - stretch.accumulated(load)
-    if stretch.beside:
+    if stretch.sway.shape[1]:
         momentum = momentum - stretch.swayed @ coupling
     dq = momentum / arm.inertia
+    if stretch.sticks is not None:  # the law says nothing of these: the motion is as it was seen
+        resting = np.append(np.repeat(stretch.sticks, stretch.window), np.zeros(len(dq), dtype=bool))[:len(dq) - 1]
+        dq = dq[0] + np.concatenate([[0.0], np.cumsum(np.where(resting, np.diff(stretch.dq), np.diff(dq)))])
     step = np.diff(stretch.t)
     q = np.concatenate([[0.0], np.cumsum(0.5 * step * (dq[1:] + dq[:-1]))])
     shift = np.nanmedian(stretch.measured[:50] - q[:50]) if np.isfinite(stretch.measured[:50]).any() else 0.0

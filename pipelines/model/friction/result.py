@@ -21,8 +21,8 @@ from pipelines.model.friction.several import SeveralFit
 from pipelines.model.friction.undecided import undecided
 from pipelines.model.friction.weak_form import moved
 
-__all__ = ["Event", "JointResult", "Posture", "Result", "Rippled", "Rung", "Series", "Validation", "Value",
-           "joint_result", "several_results"]
+__all__ = ["Drift", "Event", "JointResult", "Posture", "Result", "Rippled", "Rung", "Series", "Sticking", "Validation", "Value",
+           "drift_of_joint", "joint_result", "several_results"]
 
 _POINTS = 1500  # of a figure
 _CURVE = 401
@@ -78,6 +78,30 @@ class Event:
     direction: int
     torque: Value
     events: int
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Friction that changes in time."""
+
+    kind: str  # "trend" | "step"
+    form: str  # "whole" friction, its "viscous" part, or its "coulomb" part
+    when: float  # [s] since the start of the log: of a step; of a trend its time constant
+    change: Value  # relative to the law, from the start of a log to its end; of a step, after it
+    speed: float  # [rad/s] at which
+    holds_at: float  # [s] since the start of a log, when friction is the law; of a step, before it
+    log: str
+
+
+@dataclass(frozen=True)
+class Sticking:
+    """Rows in which the joint does not slide: no law of sliding friction is fitted to them."""
+
+    share: float  # of all rows
+    seconds: float  # [s]
+    distance: float  # [rad] of travel after a rest or reversal from which it slides
+    window: float  # [s] of the equations
+    slips: int  # times that it stuck amid motion one way
 
 
 @dataclass(frozen=True)
@@ -147,6 +171,8 @@ class JointResult:
     series: Series
     ripple: Rippled | None = None
     moved: bool = True  # whether the logs move it at all
+    drift: Drift | None = None  # of friction in time
+    sticking: Sticking | None = None  # rows that were left out
 
     @property
     def revolute(self) -> bool:
@@ -235,7 +261,46 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
         tuple(Missing(gap.what, gap.record) for gap in joint.unseen), events, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)), _series(joint),
-        _rippled(joint.ripple, _beside_ripple(joint), fit.joint.revolute))
+        _rippled(joint.ripple, _beside_ripple(joint), fit.joint.revolute), True, drift_of_joint(joint), _sticking(joint))
+
+
+def drift_of_joint(joint: JointFit) -> Drift | None:
+    """The change of friction at half of the fastest speed, relative to the law."""
+    course, fit = joint.course, joint.fit
+    if course is None:
+        return None
+    speed = 0.5 * joint.covered.fastest
+    level = float(np.mean(np.abs(fit.curve(np.array([speed, -speed])))))
+    own = joint.stretches[0].course or course
+    share = course.whole * float(np.mean(np.abs(own.shape(np.array([speed, -speed]))))) / level
+    change = Value(share * float(fit.found.beta[fit.rigid_size - 1]), abs(share) * float(fit.std[fit.rigid_size - 1]), "1")
+    return Drift(course.kind, course.form, course.time, change, speed, course.holds, joint.stretches[course.part].name)
+
+
+def _sticking(joint: JointFit) -> Sticking | None:
+    """How much of the logs was left out, for the joint stuck or bent its contacts."""
+    left, kept, seconds = 0, 0, 0.0
+    for stretch in joint.stretches:
+        sticks = int(0 if stretch.sticks is None else stretch.sticks.sum())
+        left, kept = left + sticks, kept + stretch.rows
+        seconds += sticks * float(stretch.length.mean())
+    if not left:
+        return None
+    return Sticking(left / (left + kept), seconds, joint.sliding.distance, joint.window, _stick_slips(joint))
+
+
+def _stick_slips(joint: JointFit) -> int:
+    """Times that the joint stuck amid motion one way: it slides, rests and slides on in the same direction."""
+    count = 0
+    for stretch in joint.stretches:
+        if stretch.sticks is None:
+            continue
+        speed = np.add.reduceat(stretch.dq, stretch.edges[:-1]) * (stretch.sticks == 0)
+        side = np.sign(speed)
+        moving = np.flatnonzero(side)
+        again = (np.diff(moving) > 1) & (side[moving[1:]] == side[moving[:-1]])
+        count += int(again.sum())
+    return count
 
 
 def _torque_error(ladder: Ladder) -> float | None:
@@ -267,8 +332,10 @@ def _posture(joint: JointFit, k: int) -> Posture:
     names = gravity_names(fit.joint.revolute)
     first = fit.rigid_size * k
     inertia, torque = ("kg m^2", "N m") if fit.joint.revolute else ("kg", "N")
-    gravity = {name: Value(float(fit.found.beta[first + 1 + i]), float(fit.std[first + 1 + i]), torque)
-               for i, name in enumerate(names)}
+    gravity = {}
+    for i, name in enumerate(names):
+        value, std = float(fit.found.beta[first + 1 + i]), float(fit.std[first + 1 + i])
+        gravity[name] = Value(value if joint.stretches[0].weighs else 0.0, std, torque)
     return Posture(fit.postures[k], Value(float(fit.found.beta[first]), float(fit.std[first]), inertia), gravity)
 
 

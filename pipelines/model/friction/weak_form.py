@@ -21,7 +21,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.nodes import Nodes, lay_nodes
-from pipelines.model.friction.one_joint import gravity_columns
+from pipelines.model.friction.one_joint import gravity_acts, gravity_columns
 from pipelines.model.friction.sway import Sway, sway_columns
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
@@ -29,7 +29,7 @@ from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_jerk
 
-__all__ = ["Stretch", "Windows", "moved", "stretches_of", "swaying"]
+__all__ = ["Course", "Stretch", "Windows", "moved", "stretches_of", "swaying"]
 
 _MOTIONLESS = ("edges", "kept", "impulse", "length", "torque")
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
@@ -65,6 +65,43 @@ class Windows:
 
 
 @dataclass(frozen=True, eq=False)
+class Course:
+    """Friction that changes in time by α c(t) g(v)."""
+
+    kind: str  # "trend" | "step"
+    form: str  # g: "whole", the curve of friction; "viscous", v; "coulomb", its sign
+    starts: tuple[float, ...]  # [s] first instant of every stretch
+    time: float  # [s] since the start: of a step when; of a trend its time constant
+    holds: float  # [s] since the start: where c is zero, of a trend
+    until: float  # [s] duration of a trend's log; of a step when
+    part: int = 0  # stretch of a step
+    curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
+
+    def at(self, part: int, t: Array) -> Array:
+        """c(t) in one of the stretches."""
+        since = t - self.starts[part]
+        if self.kind == "step":
+            return np.where(part > self.part, 1.0, np.where(part < self.part, 0.0, (since >= self.time) * 1.0))
+        return np.exp(-self.holds / self.time) - np.exp(-since / self.time)
+
+    @property
+    def whole(self) -> float:
+        """c at the end less c at the start."""
+        return 1.0 if self.kind == "step" else float(-np.expm1(-self.until / self.time))
+
+    def shape(self, v: Array) -> Array:
+        """g(v) [N m], [rad/s] or 1."""
+        if self.form == "viscous":
+            return v
+        return np.sign(v) if self.form == "coulomb" or self.curve is None else np.interp(v, *self.curve)
+
+    def columns(self, part: int, t: Array, dq: Array) -> Array:
+        """c(t) g(v) over the step after each sample (samples, 1); the last row is zero."""
+        value = self.at(part, 0.5 * (t[1:] + t[:-1])) * self.shape(0.5 * (dq[1:] + dq[:-1]))
+        return np.append(value, 0.0)[:, None]
+
+
+@dataclass(frozen=True, eq=False)
 class Stretch:
     """Samples of one joint without a gap, and the windows its equations are taken over."""
 
@@ -80,6 +117,19 @@ class Stretch:
     revolute: bool
     posture: tuple[float, ...]  # [rad] of the other joints
     beside: tuple[Sway, ...] = ()  # joints that are held and give way
+    speed_std: float = 0.0  # [rad/s] of the reconstructed speed
+    weighs: bool = True  # gravity acts about the joint's axis
+    sticks: npt.NDArray[np.bool_] | None = None  # (windows,) the joint does not slide: no row of a sliding law
+
+    course: Course | None = None  # of friction that changes in time
+    untimed: bool = False  # the torque is measured: when within its step it acted is not known
+    part: int = 0  # which of its stretches this is
+
+    def without(self, rows: npt.NDArray[np.bool_]) -> Stretch:
+        """The same without some of its rows (rows,)."""
+        sticks = np.zeros(len(self.kept), dtype=bool) if self.sticks is None else self.sticks.copy()
+        sticks[np.flatnonzero(self.kept)[rows]] = True
+        return replace(self, sticks=sticks)
 
     def moved(self, q: Array, dq: Array) -> Stretch:
         """The same with a better motion; what does not depend on that is kept."""
@@ -100,7 +150,8 @@ class Stretch:
     def kept(self) -> npt.NDArray[np.bool_]:
         """(windows,) nothing in it is spoilt."""
         bad = np.concatenate([[0], np.cumsum(self.spoilt)])
-        return np.asarray(bad[self.edges[1:] + 1] == bad[self.edges[:-1]])
+        usable = bad[self.edges[1:] + 1] == bad[self.edges[:-1]]
+        return np.asarray(usable if self.sticks is None else usable & ~self.sticks)
 
     @cached_property
     def impulse(self) -> Array:
@@ -123,9 +174,9 @@ class Stretch:
     def rigid(self) -> Array:
         """Columns of J, of gravity, and of the sway of joints that are held: (rows, width)."""
         mean = np.diff(self.dq[self.edges]) / self.length
-        gravity = self.windows.means(gravity_columns(self.nodes.q[:, 0], self.revolute))
+        gravity = self.windows.means(gravity_columns(self.nodes.q[:, 0], self.revolute) * float(self.weighs))
         columns = [mean[self.kept, None], gravity]
-        if self.beside:
+        if self.sway.shape[1]:
             columns.append((np.diff(self.swayed[self.edges], axis=0) / self.length[:, None])[self.kept])
         return np.hstack(columns)
 
@@ -153,8 +204,18 @@ class Stretch:
 
     @cached_property
     def sway(self) -> Array:
-        """Columns of the joints that are held and sway, over the step after each sample (samples, columns)."""
-        return sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)
+        """Columns beside inertia and gravity over the step after each sample (samples, columns).
+
+        Of joints that are held and sway; of a torque sample that may act a part of a step later or earlier, its change over
+        the step; and of friction that changes in time.
+        """
+        parts = [sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)]
+        if self.untimed:
+            known = np.where(np.isfinite(self.tau), self.tau, 0.0)
+            parts.append(np.append(np.diff(known), 0.0)[:, None])
+        if self.course is not None:
+            parts.append(self.course.columns(self.part, self.t, self.dq))
+        return np.hstack(parts)
 
     @cached_property
     def swayed(self) -> Array:
@@ -204,18 +265,22 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
     others = tuple(float(np.nanmedian(good.log.q[:, k])) for k in range(log.n_joints) if k != j)
     size = max(_SHORTEST, round(window / log.sample_time))
     motion, stretches = found.motion, []
+    weighs = gravity_acts(log.robot, joint, others)
     for run in good.runs:
         rows = good.kept[run]
         q, dq = motion.q[rows, j], motion.dq[rows, j]
         sways = tuple(_sway(found, run, rows, k - 1, log.sample_time, k - 1 < j) for k in beside)
         spoilt = (good.missing | good.spikes | good.saturated)[run, j] | ~np.isfinite(q + dq)
+        doubt = 0.0
         if found.std is not None:
             speed = found.std[1][rows, j]
             spoilt |= speed > _VAGUE * np.nanmedian(found.std[1][:, j])
+            doubt = float(np.nanmedian(speed))
         measured = np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j])
         stretch = Stretch(log.name, good.log.t[run], measured, good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
-                          np.where(np.isfinite(dq), dq, 0.0), spoilt, log.torque != "measured", size,
-                          log.robot.joints[j].revolute, others, sways)
+                          np.where(np.isfinite(dq), dq, 0.0), spoilt, True, size,
+                          log.robot.joints[j].revolute, others, sways, doubt, weighs,
+                          untimed=log.torque == "measured")
         if len(stretch.edges) > _FEWEST and stretch.rows >= _FEWEST:
             stretches.append(stretch)
     return tuple(stretches)

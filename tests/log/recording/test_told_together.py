@@ -100,7 +100,7 @@ def test_a_sliding_joint_in_millimetres_declared_as_metres_is_refused(shared: Pa
 
 def test_a_recipe_given_as_robot_is_recognised(tmp_path: Path) -> None:
     path = write(tmp_path, RECIPE, "recipe.toml")
-    with pytest.raises(UsageError, match=r"RRID-C02.*a recipe of rrrid import.*the recipe names: rrr"):
+    with pytest.raises(UsageError, match=r"RRID-C02.*a recipe of rrrid import.*names: rrr"):
         load_robot(path)
 
 

@@ -1,6 +1,7 @@
 """What has to be in order before any physics is blamed: the doctor's checks, and columns, signs, scales and clocks mixed up.
 
-    said = examined(logs)           what the doctor remarks of each log; InputRejected where no diagnosis makes sense
+    said, boundary = examined(logs)     what the doctor remarks of each log and what their torque is; InputRejected where no
+                                        diagnosis makes sense
 """
 
 from __future__ import annotations
@@ -10,6 +11,8 @@ from dataclasses import replace
 from functools import partial
 
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.estimation.checks.boundary import Boundary, torque_boundary
+from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.log.derive import recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
@@ -21,19 +24,28 @@ from pipelines.model.plausibility import mismatches
 __all__ = ["examined", "logs_of_roles"]
 
 
-def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tuple[Check, ...]:
-    """What the doctor says of the logs, checks that found nothing apart.
+def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tuple[tuple[Check, ...], Boundary | None]:
+    """What the doctor says of the logs, checks that found nothing apart; and the torque boundary.
 
     Raises:
-        InputRejected: its first reason to reject a log; S13, S14, S15, T06: torque and motion of a log do not belong together,
-            with the repair, unless `allow_mismatch`.
+        InputRejected: its first reason to reject a log; S13, S23, S24, S25: the torque is not what the description takes it for;
+            S13, S14, S15, T06: torque and motion of a log do not belong together, with the repair, unless `allow_mismatch`.
     """
     every = list(logs)
     said = shared_out(partial(_said, allow_mismatch=allow_mismatch), every)
-    for told in said:
-        if isinstance(told, Check):
-            raise told.as_error()
-    return tuple(check for told in said if not isinstance(told, Check) for check in told)
+    gates = [told for told in said if isinstance(told, Check)]
+    if reject := next((told for told in gates if told.level == "reject"), None):
+        raise reject.as_error()
+    boundary = torque_boundary(every)
+    findings = boundary_findings(boundary, every[0].source or every[0].name if every else "")
+    for told in (*(() if allow_mismatch else map(_with_way_out, findings)), *gates):
+        raise told.as_error()
+    checks = tuple(check for told in said if not isinstance(told, Check) for check in told)
+    return (*(replace(check, gate=False) for check in findings), *without_followers(checks, findings)), boundary
+
+
+def _with_way_out(check: Check) -> Check:
+    return replace(check, remedy=f"{check.remedy}; if it is right as it is, say --allow-mismatch")
 
 
 def _said(log: ExperimentLog, allow_mismatch: bool) -> tuple[Check, ...] | Check:
@@ -46,7 +58,7 @@ def _said(log: ExperimentLog, allow_mismatch: bool) -> tuple[Check, ...] | Check
         return next((check for check in exact if check.code == "RRID-S10"), reject)
     against = mismatches(subject)
     if not allow_mismatch and (gate := next((check for check in against if check.gate), None)):
-        return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch")
+        return _with_way_out(gate)
     return tuple(replace(check, gate=False) for check in (*checks, *against))
 
 

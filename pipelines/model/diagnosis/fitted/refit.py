@@ -153,7 +153,10 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
     for _ in range(steps):
         better, table, y_left = False, steadied(slopes), steadied(left)
         for ridge in _RIDGES:
-            shift = _within(model, names, table, y_left, ridge, data.rubbing)
+            try:
+                shift = _within(model, names, table, y_left, ridge, data.rubbing)
+            except np.linalg.LinAlgError:  # of numbers at which nothing can be solved: they stay, and gain nothing
+                break
             for share in _SHARES:
                 there = model.moved(share * shift, names)
                 laid = there.laid(data)

@@ -21,7 +21,7 @@ from pipelines.model.diagnosis.fitted.nominal import Fit, fit_columns, fit_nomin
 from pipelines.model.diagnosis.given.compliance import Compliance, compared, compliance
 from pipelines.model.diagnosis.result import Answer, NotTestable, Standing
 from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.diagnosis.searched.beside import Held, beside, less, torque_of
+from pipelines.model.diagnosis.searched.beside import Held, beside, less, torque_of, unsolved
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.worth.numbers import told
 
@@ -69,9 +69,13 @@ def responding(case: Case, prepared: Prepared, without: Sequence[str] = (), only
         stiff = replace(stiff, named=tuple(one for one in stiff.named if one.place in only))
     if stiff is None or not stiff.named:
         return Responding(stiff, Held(case, prepared))
+    stiff, failed = _solvable(stiff, prepared, arm)
+    if not stiff.named:
+        return Responding(stiff, Held(case, prepared), (), failed)
     case, prepared = _told_apart(case, prepared, stiff.named)
     if prepared.reference is None:
-        return Responding(stiff, beside(case, prepared, stiff.named))
+        held = beside(case, prepared, stiff.named)
+        return Responding(stiff, held, (), (*failed, *map(_failed, held.failed)))
     new, old, open_ = _apart(stiff, compliance(logs.frf_before, arm, without), prepared.reference, arm, prepared)
     stands = []
     for acting in (*old, *open_):
@@ -80,7 +84,26 @@ def responding(case: Case, prepared: Prepared, without: Sequence[str] = (), only
             stands.append(Standing(acting.effect.name, acting.effect.joint, told(acting), share))
     left = tuple(NotTestable(one.effect.name, one.effect.joint, _OPEN, f"{one.effect.experiment} Before and after.")
                  for one in open_)
-    return Responding(stiff, beside(case, prepared, new), tuple(stands), left)
+    held = beside(case, prepared, new)
+    return Responding(stiff, held, tuple(stands), (*left, *failed, *map(_failed, held.failed)))
+
+
+def _solvable(stiff: Compliance, prepared: Prepared, arm: Arm) -> tuple[Compliance, tuple[NotTestable, ...]]:
+    """Without those named by the responses whose numbers make no torque; these with their numbers."""
+    kept, failed = [], []
+    for acting in stiff.named:
+        try:
+            torque_of((acting,), arm, prepared.data)
+        except np.linalg.LinAlgError as error:
+            failed.append(_failed((acting, unsolved(acting, error))))
+        else:
+            kept.append(acting)
+    return replace(stiff, named=tuple(kept)), tuple(failed)
+
+
+def _failed(one: tuple[Acting, str]) -> NotTestable:
+    acting, why = one
+    return NotTestable(acting.effect.name, acting.effect.joint, why, acting.effect.experiment)
 
 
 def _told_apart(case: Case, prepared: Prepared, named: Sequence[Acting]) -> tuple[Case, Prepared]:

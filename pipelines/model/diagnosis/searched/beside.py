@@ -31,7 +31,7 @@ from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.parameter import Parameter
 
-__all__ = ["Held", "Judged", "Part", "acted", "beside", "judged", "less", "torque_of"]
+__all__ = ["Held", "Judged", "Part", "acted", "beside", "judged", "less", "torque_of", "unsolved"]
 
 _ROUNDS = 2  # of the arm and the effects' torque in turns
 _STDS = 3.0  # of a response's number, that a refit may move it
@@ -60,19 +60,28 @@ class Held:
     acting: tuple[Acting, ...] = ()
     plain: Refined | None = None  # before anything was taken away; None where nothing was
     judge: Data | None = None  # the held-out rows of that
+    failed: tuple[tuple[Acting, str], ...] = ()  # effects beside which nothing could be fitted, with their numbers and why
 
 
 def beside(case: Case, prepared: Prepared, effects: Sequence[Acting]) -> Held:
-    """One effect after the other; each is refitted, if it can be, to what those before it leave."""
+    """One effect after the other; each is refitted, if it can be, to what those before it leave.
+
+    One at whose numbers nothing can be solved is left out, and told as `failed`.
+    """
     if not effects:
         return Held(case, prepared)
-    plain, judge, own = refine(case.model, case.data, case.weight), case.judge, []
+    plain, judge, own, failed = refine(case.model, case.data, case.weight), case.judge, [], []
     now = plain
     for acting in effects:
-        own.append(_refitted(now, case, acting) or acting)
-        case, prepared = _with(case, prepared, own[-1])
+        try:
+            chosen = _refitted(now, case, acting) or acting
+            case, prepared = _with(case, prepared, chosen)
+        except np.linalg.LinAlgError as error:
+            failed.append((acting, unsolved(acting, error)))
+            continue
+        own.append(chosen)
         now = refine(case.model, case.data, case.weight)
-    return Held(case, prepared, tuple(own), plain, judge)
+    return Held(case, prepared, tuple(own), plain, judge, tuple(failed))
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +139,22 @@ def acted(arm: Arm, acting: Sequence[Acting]) -> Arm:
     return replace(arm, effects=(*acting, *arm.effects)) if acting else arm
 
 
+def unsolved(acting: Acting, error: np.linalg.LinAlgError) -> str:
+    """Why an effect was left out, with its numbers."""
+    numbers = ", ".join(f"{name} {value:.4g}" for name, value in acting.values.items())
+    return f"no model can be fitted beside it with {numbers}: {error}"
+
+
 def torque_of(acting: Sequence[Acting], arm: Arm, data: Data) -> Array:
-    """(rows,) [N m] that these effects add to the torque of `arm`."""
-    return data.lay(lambda motion: arm.extended(*acting).torque(motion) - arm.torque(motion))
+    """(rows,) [N m] that these effects add to the torque of `arm`.
+
+    Raises:
+        LinAlgError: it is not finite, so that nothing can be solved beside it.
+    """
+    torque = data.lay(lambda motion: arm.extended(*acting).torque(motion) - arm.torque(motion))
+    if not np.isfinite(torque).all():
+        raise np.linalg.LinAlgError("its torque is not finite")
+    return torque
 
 
 def less(data: Data, torque: Array, effects: Iterable[Effect] = ()) -> Data:
@@ -169,7 +191,7 @@ def _refitted(now: Refined, case: Case, acting: Acting) -> Acting | None:
     done = refine(now.model.with_effect(effect, effect.amplitudes(acting.values)), case.data, now.weight)
     place = len(done.model.effects) - 1
     one = done.model.effects[place]
-    if not one.possible or done.rss >= now.rss:
+    if not one.possible or not done.rss < now.rss:
         return None
     for name, value in one.values.items():
         known = given[name]

@@ -1,0 +1,1 @@
+"""What is estimated from logs, and what has to be checked before it is."""

@@ -1,0 +1,44 @@
+"""Decide whether a torque has a sign, or is its magnitude alone.
+
+One genuine negative value proves a sign. A torque that comes down to zero again and again and never crosses it is a magnitude: of
+a smooth signal, zero is crossed wherever it is reached, but for chance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipelines.estimation.checks.config import BoundaryConfig
+from pipelines.estimation.checks.torque_rows import Array
+from pipelines.log.doctor.segments import Usable
+
+__all__ = ["touches_of_zero"]
+
+_NEAR, _FAR = 0.03, 0.3  # of the RMS: at zero, and away from it again
+_STANDING = 0.05  # of its RMS: a joint that is slower may stand, held by its brake
+
+
+def touches_of_zero(logs: Sequence[Usable], config: BoundaryConfig) -> tuple[int | None, ...]:
+    """Return how often each joint's torque comes down to zero from above; None where it is negative as well."""
+    joints = logs[0].log.n_joints
+    return tuple(_touches([(good.log.tau[run, j], good.log.q[run, j]) for good in logs for run in good.runs], config)
+                 for j in range(joints))
+
+
+def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> int | None:
+    size = np.sqrt(np.nanmean(np.concatenate([tau for tau, _ in parts]) ** 2)) if parts else 0.0
+    count = 0
+    for tau, q in parts:
+        speed = np.abs(np.gradient(q))
+        moving = speed > _STANDING * np.sqrt(np.nanmean(speed**2))
+        # Of white noise the second difference has six times the variance (Hampel 1974 for the median deviation).
+        noise = 1.4826 * float(np.nanmedian(np.abs(np.diff(tau, 2)))) / np.sqrt(6.0) if tau.size > 2 else 0.0
+        if np.nansum(tau < -max(config.no_negative * noise, 1e-6 * size)) > max(2.0, 1e-3 * tau.size):
+            return None
+        near = tau < max(_NEAR * size, config.no_negative * noise)
+        state = np.where(near & moving, 1, np.where(tau > _FAR * size, -1, 0))
+        state = state[state != 0]
+        count += int(np.sum((state[1:] == 1) & (state[:-1] == -1)))
+    return count

@@ -1,0 +1,77 @@
+"""Limit a diagnosis to what its logs can show: the verdict "cannot-judge", and model checks.
+
+    found = limited_by_estimate(found, prepared)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from pipelines.fit.equations import Block
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.asked.inputs import Prepared
+from pipelines.model.diagnosis.fitted.nominal import fit_nominal
+from pipelines.model.diagnosis.floor.repeated import unrepeated
+from pipelines.model.diagnosis.named.verdict import stands_high
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.estimation.estimate import Estimate, estimate
+from pipelines.model.estimation.judgeable import Facts, cannot_judge, predicted_std, unresolved
+from pipelines.model.estimation.negative_viscous import negative_viscous
+
+__all__ = ["facts", "limited_by_estimate", "nominal_estimate"]
+
+
+def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
+    """Return the diagnosis, "cannot-judge" where its logs cannot show that nothing is wrong.
+
+    An estimate is made only for that verdict, and where viscous friction of the nominal model is
+    negative: its check is added then.
+    """
+    nothing = found.verdict == "nothing-wrong"
+    if not nothing and not _negative(found.nominal):
+        return found
+    estimated = nominal_estimate(prepared)
+    found = replace(found, checks=negative_viscous(estimated, prepared.logs.identify[0].robot_name))
+    why = cannot_judge(facts(found, prepared, estimated)) if nothing else ""
+    if not why:
+        return found
+    return replace(found, verdict="cannot-judge", reason=why,
+                   summary=f"Whether anything is wrong with this arm cannot be judged: {why}.")
+
+
+def nominal_estimate(prepared: Prepared) -> Estimate:
+    """Return the nominal model as `estimate-bps` fits it, on the rows of a diagnosis."""
+    return estimate([one.equations for one in prepared.data.logs], prepared.columns)
+
+
+def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
+    """Return the errors of the nominal model on held-out motion, and the state of its floor."""
+    judge = prepared.data if prepared.judge is None else prepared.judge
+    left = found.residual_rms.validate
+    known = np.full(len(left), found.floor_origin != "blocks")
+    if not known.all():
+        known = ~stands_high(left, _noise(prepared))
+    return Facts(left, judge.rms(judge.y), predicted_std(estimated, _blocks(judge)),
+                 unresolved(estimated), known, found.no_twin)
+
+
+def _noise(prepared: Prepared) -> Array:
+    """Return the noise (joints,) [N m] of the residual by repeated periods; 0 without any."""
+    _, fit = fit_nominal(prepared.data, prepared.columns)
+    return np.sqrt(np.nan_to_num(unrepeated(prepared.data, fit.left)))
+
+
+def _blocks(data: Data) -> Iterator[Block]:
+    for log in data.logs:
+        yield from log.equations
+
+
+def _negative(arm: Arm | None) -> bool:
+    """Return whether viscous friction of any joint is negative."""
+    laws = () if arm is None else arm.friction
+    return any(law.effect.name == "viscous" and law.values["coefficient"] < 0.0 for law in laws)

@@ -1,0 +1,165 @@
+"""Find the rows in which the joint slides: where friction is a function of its speed.
+
+A joint at rest, or one that has turned back and bends its contacts, carries any torque up to the break-away torque: an
+inequality |τ - load| ≤ τ_b, not a value of the sliding law (Karnopp 1985; Armstrong-Hélouvry et al. 1994, Section 2). Each row
+is ordered by its *travel*: how far the joint has moved one way since its last rest or reversal, and how far it will until
+the next, the lesser of the two. A rest is a speed that its own standard deviation does not tell from zero, so that the
+encoder decides. From the longest travel down, a further class of travel is taken in as long as a free curve
+
+    τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed, each way apart
+
+leaves no more of it than of the rows before; f may change slowly in time. No law is assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.friction.weak_form import Stretch
+from pipelines.model.rigid.body import Array
+
+__all__ = ["Sliding", "SlidingConfig", "free_curve", "left_out", "sliding_rows"]
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class SlidingConfig:
+    """Numbers that decide which rows slide."""
+
+    rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
+    worse: float = 4.0  # median square of a class over that of the rows before: twice their size, beyond chance of a few rows
+    rows: int = 3  # for every column of the free curve, that the first class has at least
+    margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel)
+    classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
+    decades: int = 4  # of speed; slower rows are one class
+    course: int = 8  # knots of a change of friction in time: what drifts still is a function of speed
+    halving: float = 2.0  # of travel, from class to class
+    windows: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0, 16.0)  # times the shortest, tried in turn
+    attenuation: float = 2e-3  # noise variance of the acceleration over its own: the relative bias of the inertia
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """Rows that slide, of stretches one after the other."""
+
+    slides: Mask  # (rows,)
+    resting: Mask  # (rows,) at rest or turning back within
+    travel: Array  # (rows,) [rad] since the last rest or reversal, or until the next
+    distance: float  # [rad] of travel from which rows slide
+    mean_square: float  # [N² m²] that the free curve leaves of them
+    attenuation: float  # noise of the acceleration over acceleration (variance), outside all other columns
+    doubtful: bool  # whether some rows do not follow the free curve
+
+
+def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingConfig) -> Sliding:
+    """Order rows by travel and take them in while friction is a function of speed."""
+    equations = LawEquations.of(stretches, joint)
+    travel = np.concatenate([_travel(stretch, config)[stretch.kept] for stretch in stretches])
+    speed = np.concatenate([stretch.middle[1] for stretch in stretches])
+    steady = np.hstack([equations.fixed, free_curve(speed, config)])
+    columns = np.hstack([steady, _free_course(speed, config)])
+    moving = travel > 0.0
+    if not moving.any():
+        return Sliding(moving, ~moving, travel, 0.0, 0.0, np.inf, True)
+    reach = start = float(np.median(travel[moving]))
+    slides = travel >= reach
+    while slides.sum() < min(config.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()):
+        reach = start = reach / config.halving
+        slides = moving & (travel >= reach)
+    while reach > 0.0:
+        lower = reach / config.halving if (moving & (travel < reach)).any() else 0.0
+        wider = moving & (travel >= lower)
+        more = wider & ~slides
+        if more.any():
+            square = np.square(_residual(columns[wider], equations.y[wider]))
+            if np.median(square[more[wider]]) > config.worse * np.median(square[~more[wider]]):
+                break
+            slides = wider
+        reach = lower
+    reach = min(config.margin * reach, start)
+    slides &= travel >= reach
+    left, count = _left(columns[slides], equations.y[slides])
+    mean_square = left / max(count, 1)
+    whole, count_whole = _left(columns, equations.y)
+    rest = int((~slides).sum())
+    doubtful = rest > 0 and (whole - left) / max(count_whole - count, 1) > config.worse * mean_square
+    return Sliding(slides, ~moving, travel, reach, mean_square,
+                   _attenuation(stretches, steady[slides], slides, len(equations.postures)), bool(doubtful))
+
+
+def left_out(stretches: Sequence[Stretch], slides: Mask) -> tuple[Stretch, ...]:
+    """The stretches without the rows that do not slide."""
+    parts = np.split(slides, np.cumsum([stretch.rows for stretch in stretches])[:-1])
+    return tuple(stretch.without(~part) for stretch, part in zip(stretches, parts, strict=True))
+
+
+def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
+    """(windows,) the least travel within each window; zero where the joint rests or turns back."""
+    side = np.sign(stretch.dq)
+    rests = np.abs(stretch.dq) <= config.rest * stretch.speed_std
+    path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(stretch.q)))])
+    turns = np.concatenate([[True], side[1:] != side[:-1]])
+    since = path - np.maximum.accumulate(np.where(rests | turns, path, -np.inf))
+    until = np.where(rests | np.append(turns[1:], True), path, np.inf)
+    travel = np.minimum(since, np.minimum.accumulate(until[::-1])[::-1] - path)
+    edges = stretch.edges
+    within = np.minimum.reduceat(travel, edges)[:len(edges) - 1]
+    return np.minimum(within, travel[edges[1:]])
+
+
+def free_curve(speed: Array, config: SlidingConfig) -> Array:
+    """Columns of a curve that runs straight in every class of speed, each way apart (rows, columns)."""
+    fastest = max(float(np.abs(speed).max()), 1e-12)
+    lowest = -config.classes * config.decades
+    level = np.floor(config.classes * np.log10(np.maximum(np.abs(speed) / fastest, 1e-12)) + 1e-9)
+    code = 2 * np.maximum(level, lowest) + (speed < 0.0)
+    columns = []
+    for one in np.unique(code):
+        here = code == one
+        columns += [here.astype(np.float64), np.where(here, speed - speed[here].mean(), 0.0)]
+    return np.stack(columns, axis=1)
+
+
+def _free_course(speed: Array, config: SlidingConfig) -> Array:
+    """Columns of Coulomb and viscous friction that may change in time: hat functions over the rows, in their order."""
+    place = np.linspace(0.0, config.course - 1.0, len(speed))
+    hats = np.maximum(1.0 - np.abs(place[:, None] - np.arange(1, config.course)), 0.0)
+    return np.hstack([hats * np.sign(speed)[:, None], hats * speed[:, None]])
+
+
+def _left(columns: Array, y: Array) -> tuple[float, int]:
+    """Sum of squares that least squares leaves, and its degrees of freedom."""
+    scale = np.linalg.norm(columns, axis=0)
+    residual = _residual(columns, y)
+    return float(residual @ residual), len(y) - int(np.sum(scale > 0.0))
+
+
+def _residual(columns: Array, y: Array) -> Array:
+    """Return the residual of least squares (rows,)."""
+    scale = np.linalg.norm(columns, axis=0)
+    unit = columns[:, scale > 0.0] / scale[scale > 0.0]
+    return np.asarray(y - unit @ np.linalg.lstsq(unit, y, rcond=1e-9)[0])
+
+
+def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask, postures: int) -> float:
+    """Variance of the noise of (dq(b) - dq(a))/T over what of that column lies outside the others.
+
+    Errors in variables: least squares takes J (1 - that share) for J (Fuller 1987, Section 1.1.1).
+    """
+    noise = np.concatenate([np.broadcast_to(2.0 * (stretch.speed_std / stretch.length[stretch.kept]) ** 2, stretch.rows)
+                            for stretch in stretches])[slides]
+    width = stretches[0].rigid.shape[1]
+    shares = []
+    for k in range(postures):
+        own = columns[:, width * k]
+        others = np.delete(columns, width * k, axis=1)
+        outside, _ = _left(others, own)
+        shares.append(float(noise[own != 0.0].sum()) / max(outside, 1e-300))
+    return max(shares)

@@ -1,0 +1,126 @@
+"""Robots as users bring them: each file of ../shared/cases is read rightly, or refused with a remedy that works when followed."""
+
+from __future__ import annotations
+
+import math
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from pipelines.errors import UsageError
+from pipelines.log.robot_files import load_robot
+from pipelines.model.arm import Arm
+from pipelines.model.excitation.design import Effort, design
+from pipelines.model.excitation.task import Wishes, plan_task
+from tests.cli.commands import rrrid
+
+
+def test_no_limit_of_torque_is_cut(shared: Path) -> None:
+    """Case 37: an arm that holds 589 N m at rest and may have 3000 N m gets a design, held against 2700 N m."""
+    robot = load_robot(shared / "cases" / "37-palletiser-3000-Nm" / "big.urdf")
+    found = design(plan_task(robot, Arm.from_links(robot), Wishes()), Effort(evaluations=30))
+    torques = [peak for peak in found.peaks if peak.quantity == "torque"]
+    assert [abs(peak.limit) for peak in torques] == [2700.0, 2700.0]
+    assert all(peak.share <= 1.0 for peak in torques)
+    assert max(abs(peak.peak) for peak in torques) > 589.0
+
+
+def test_infinite_limits_are_none(shared: Path, tmp_path: Path) -> None:
+    """Case 38: -inf, inf and 1e16 mean no limit; what then lacks is named, and given there it is taken."""
+    path = tmp_path / "arm.urdf"
+    for infinite in ("inf", "1e16", "Infinity"):
+        text = (shared / "cases" / "38-limits-inf" / "inf.urdf").read_text().replace("inf", infinite)
+        path.write_text(text)
+        first, second, _ = load_robot(path).joints
+        assert (first.position, first.velocity, first.torque) == ((-math.inf, math.inf), math.inf, math.inf)
+        assert (second.position, second.velocity, second.torque) == ((-2.5, 2.5), 5.0, 100.0)
+    told = rrrid("design-excitation", path, cwd=tmp_path)
+    assert told.returncode == 2
+    assert "joint 1 'j1' has no limit of speed" in told.stderr
+    assert "velocity in its <limit> in the URDF" in told.stderr
+    path.write_text(text.replace('velocity="Infinity"', 'velocity="2"'))
+    assert load_robot(path).joints[0].velocity == 2.0
+
+
+def test_a_range_open_at_one_end_keeps_the_other(shared: Path, tmp_path: Path) -> None:
+    """lower = -1, upper = inf: the range is from -1 on, and the text that a log carries says the same."""
+    path = tmp_path / "arm.urdf"
+    text = (shared / "cases" / "38-limits-inf" / "inf.urdf").read_text()
+    path.write_text(text.replace('lower="-2.5" upper="2.5"', 'lower="-1" upper="inf"'))
+    robot = load_robot(path)
+    assert robot.joints[1].position == (-1.0, math.inf)
+    path.write_text(str(robot.urdf_text))
+    assert load_robot(path).joints[1].position == (-1.0, math.inf)
+
+
+def test_the_range_of_a_continuous_joint_is_ignored(shared: Path) -> None:
+    """Case 40: lower above upper on a continuous joint says nothing; its effort and velocity count."""
+    robot = load_robot(shared / "cases" / "40-continuous-with-limits" / "contlim.urdf")
+    free = [joint for joint in robot.joints if joint.position == (-math.inf, math.inf)]
+    assert len(free) == 1
+    assert math.isfinite(free[0].velocity)
+    assert math.isfinite(free[0].torque)
+
+
+def test_a_link_that_cannot_exist_is_named(shared: Path, tmp_path: Path) -> None:
+    """Case 41: 0.5 beside 0.001 and 0.001 kg m² is no body's inertia; the others of the arm pass, and so do those of real arms."""
+    checks = load_robot(shared / "cases" / "41-impossible-inertia" / "badtri.urdf").checks
+    assert len(checks) == 1
+    assert checks[0].code == "RRID-S17"
+    assert checks[0].level == "warn"
+    assert re.search(r"link 'l\d'.*0\.5", checks[0].message)
+    for healthy in ("cases/46-panda-tip-link-remedy/arm.urdf:panda_hand", "real/tx40/tx40.urdf"):
+        assert not load_robot(shared / healthy).checks
+    path = tmp_path / "robot.toml"
+    path.write_text('name = "r"\ngravity = [0, 0, -9.81]\n[kinematics]\nconvention = "dh"\n[[joint]]\nname = "j"\n'
+                    'type = "revolute"\na = 0.4\nalpha = 0.0\nd = 0.0\noffset = 0.0\n'
+                    'link = { mass = 2.0, com = [-0.2, 0, 0], inertia = [0.001, 0.02, 0.02, 0, 0, 0] }\n')
+    assert "'j'" in load_robot(path).checks[0].message  # about the origin: m c² alone is 0.08
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ('<mujoco model="arm"><worldbody/></mujoco>', "MJCF"),
+    ('<?xml version="1.0"?>\n<sdf version="1.9"><model name="a"/></sdf>', "SDF")])
+@pytest.mark.parametrize("name", ["arm.xml", "arm.sdf", "arm.urdf", "arm"])
+def test_other_robot_files_are_recognised_by_content(name: str, text: str, words: str, tmp_path: Path) -> None:
+    """Case 44: whatever the file is called, MJCF and SDF are named, and the way out is a URDF."""
+    (tmp_path / name).write_text(text)
+    with pytest.raises(UsageError, match=f"RRID-S17.*{words}.*[Ee]xport a URDF"):
+        load_robot(tmp_path / name)
+
+
+def test_mjcf_of_the_case_and_a_urdf_by_another_name(shared: Path, tmp_path: Path) -> None:
+    """Case 44 as it is given; a URDF that ends in .xml is read."""
+    with pytest.raises(UsageError, match="MJCF"):
+        load_robot(shared / "cases" / "44-mjcf-as-robot" / "arm.xml")
+    shutil.copy(shared / "real" / "tx40" / "tx40.urdf", tmp_path / "arm.xml")
+    assert load_robot(tmp_path / "arm.xml").n_joints == 6
+
+
+def test_the_remedy_for_a_branching_arm_works_where_it_is_given(shared: Path, tmp_path: Path) -> None:
+    """Case 46: seven joints and two fingers. What the error offers works on the command line, in a recipe and in a description."""
+    for file in (shared / "cases" / "46-panda-tip-link-remedy").iterdir():
+        shutil.copyfile(file, tmp_path / file.name)
+    refused = rrrid("design-excitation", "arm.urdf", cwd=tmp_path)
+    assert refused.returncode == 2
+    assert "arm.urdf:panda_hand" in refused.stderr
+    assert 'tip_link = "panda_hand"' in refused.stderr
+    seven = load_robot(tmp_path / "arm.urdf:panda_hand")
+    assert (seven.n_joints, seven.tip_link) == (7, "panda_hand")
+    assert load_robot(tmp_path / "arm.toml").joints == seven.joints
+    recipe = (tmp_path / "r2.toml").read_text()
+    by_colon = recipe.replace('tip_link = "panda_hand"\n', "").replace("arm.urdf", "arm.urdf:panda_hand")
+    for k, written in enumerate((recipe, by_colon)):
+        (tmp_path / "r2.toml").write_text(written)
+        told = rrrid("import", "r2.toml", "--out", f"out{k}", "--no-report", cwd=tmp_path)
+        assert told.returncode == 0, told.stderr
+    inspected = rrrid("inspect", "out1", "--robot", "arm.urdf:panda_hand", "--no-report", "--out", "i", cwd=tmp_path)
+    assert inspected.returncode == 0, inspected.stderr
+
+
+def test_a_recipe_given_as_robot_is_recognised(shared: Path) -> None:
+    """What describes a recording describes no robot; the robot that it names is the remedy."""
+    with pytest.raises(UsageError, match=r"recipe of rrrid import.*arm\.urdf"):
+        load_robot(shared / "cases" / "46-panda-tip-link-remedy" / "r2.toml")

@@ -1,0 +1,237 @@
+"""Faults of files and of the machine: each ends in a clear error or a fallback, in bounded time and memory, never in exit 70."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.mutations import mutations, read_apart, warm_up
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.model_file import parse_model
+from pipelines.log.recording.filenames import matches
+from pipelines.log.shipped import shipped
+from pipelines.log.toml_text import TomlError, parse_toml
+from tests.cli.commands import REPO, RRRID, rrrid
+
+SECONDS, MEGABYTES = 5.0, 500.0  # of CPU and of memory beyond the program's own
+_NUMBERS = ",".join(["0.25"] * 80_000)
+
+HOSTILE: dict[str, tuple[str, str]] = {
+    "dotted key": ("robot", "a." * 50_000 + "a = 1"),
+    "dotted key with blanks": ("recipe", "a . " * 50_000 + "a = 1"),
+    "dotted quoted key": ("settings", '"a".' * 50_000 + "a = 1"),
+    "dotted header": ("robot", "[" + "a." * 50_000 + "a]"),
+    "many deep tables": ("recipe", "".join(f"[a{k}.b.c.d.e.f]\n" for k in range(300_000))),
+    "deep array": ("settings", "a = " + "[" * 100_000),
+    "unterminated strings": ("robot", '\\"' * 500_000),
+    "wide inline table": ("recipe", "a = {" + ",".join(f"a{k} = 1" for k in range(300_000)) + "}"),
+    "line of 80,000 numbers": ("csv", f"{_NUMBERS}\n"),
+    "header of 60,000 names": ("csv", ",".join(f"c{k}" for k in range(60_000)) + "\n" + f"{_NUMBERS[:300_000]}\n" * 3),
+    "60,000 columns of one name": ("csv", ",".join(["q"] * 60_000) + "\n" + f"{_NUMBERS[:300_000]}\n" * 3),
+    "one long line in a recording": ("csv", "t,q,tau\n" + "0,1,2\n" * 2000 + f"{_NUMBERS}\n" + "0,1,2\n" * 2000),
+    "number of 400,000 digits": ("csv", "t,q\n" + "1" * 400_000 + ",2x\n" + "1,2\n" * 50),
+    "name of 400,000 digits": ("csv", "a" + "1" * 400_000 + "x\n1\n2\n"),
+    "blanks before a unit": ("csv", "a" + " " * 200_000 + "[x" + " " * 200_000 + "\n1\n2\n3\n"),
+    "400,000 separators": ("csv", ";" * 400_000 + "\n"),
+    "400,000 quotes": ("csv", '"' * 400_000 + "\n1,2\n3,4\n"),
+    "300,000 elements": ("urdf", "<robot>" + "<link/>" * 300_000 + "</robot>"),
+    "chain of 5,000 joints": ("urdf", '<robot name="r">' + "".join(
+        f'<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/></joint>'
+        for k in range(5000)) + '<link name="l5000"/></robot>'),
+}
+
+
+@pytest.fixture(scope="module")
+def _warm() -> None:
+    warm_up()
+
+
+@pytest.mark.usefixtures("_warm")
+@pytest.mark.parametrize("name", HOSTILE)
+def test_a_hostile_text_costs_little(name: str) -> None:
+    """Reading it ends within 5 s and 500 MB, in a draft or in an error with a code."""
+    kind, text = HOSTILE[name]
+    reading = read_apart(kind, text.encode())
+    assert not reading.outcome.startswith("internal"), reading.outcome
+    assert reading.seconds < SECONDS
+    assert reading.megabytes < MEGABYTES
+
+
+@pytest.mark.usefixtures("_warm")
+def test_mutations_cost_little() -> None:
+    """Of 120 damaged texts none takes 5 s or 500 MB, or ends in an internal error (`python -m benchmarks.mutations`: of 10,000)."""
+    for k, (kind, text) in enumerate(mutations(120, seed=51)):
+        reading = read_apart(kind, text)
+        assert not reading.outcome.startswith("internal"), (k, reading.outcome)
+        assert reading.seconds < SECONDS, k
+        assert reading.megabytes < MEGABYTES, k
+
+
+def test_healthy_toml_is_within_the_bounds() -> None:
+    """Texts in texts, dates, dots in strings and comments, and a recipe of 3000 files are parsed as they are."""
+    long = "\n".join(f'[[file]]\nmatch = "run.{k}.a.b.c.d.e.f.g.csv"  # a.b.c.d.e.f.g.h' for k in range(3000))
+    assert len(parse_toml(long)["file"]) == 3000
+    urdf = "<robot>" + "<a.b.c.d.e.f.g/>\n" * 20_000 + "</robot>"
+    for quotes in ('"""', "'''"):
+        assert parse_toml(f"a.b = 1.5\nurdf = {quotes}\n{urdf}{quotes}\nwhen = 2024-05-17T11:30:00.25Z\n")["urdf"] == urdf
+    matrix = "[" + ", ".join("[" + ", ".join(["1.0"] * 100) + "]" for _ in range(100)) + "]"
+    assert np.shape(parse_toml(f"m = {matrix}")["m"]) == (100, 100)
+    for text in ("a = ", "a = 1\na = 2", "[a", 'a = "x', "a = " + "9" * 5000):
+        with pytest.raises(TomlError):
+            parse_toml(text)
+
+
+@pytest.mark.parametrize("pattern", ["{x:(a+)+}!.csv", "{a}{b}{c}{d}{e}{f}{g}!", "*a" * 20 + "!"])
+def test_a_pattern_cannot_hang_the_import(pattern: str, tmp_path: Path) -> None:
+    """An expression that would take ages is refused after 3 s; healthy ones give their groups as before."""
+    began = time.monotonic()
+    with pytest.raises(UsageError, match=r"RRID-C02.*takes more than 3 s"):
+        matches([pattern], ["a" * 60 + ".csv"], tmp_path)
+    assert time.monotonic() - began < 15.0  # on a busy machine
+    assert matches([r"{x:run}_{n:\d{2}}.csv", "*.mat"], ["run_07.csv", "b.mat"], tmp_path) == [
+        {"run_07.csv": {"stem": "run_07", "x": "run", "n": "07"}}, {"b.mat": {"stem": "b"}}]
+
+
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_numbers_of_hundreds_of_digits_in_a_model(digits: int) -> None:
+    """Wherever a model has a number, one that no float holds rejects it (S18), or its version (F11)."""
+    model = json.loads(shipped("models", "rrr").read_text())
+    places = [(model["base_parameters"][0], "value"), (model["base_parameters"][0], "std"), (model, "format_version"),
+              (model["friction"][0], "joint")]
+    for owner, key in places:
+        before, owner[key] = owner[key], 12345678901
+        text = json.dumps(model).replace("12345678901", "9" * digits)
+        owner[key] = before
+        if key == "joint" and digits == 400:
+            continue  # a whole number: that the arm has fewer joints is told where the arm is made of it
+        with pytest.raises(InputRejected, match=r"RRID-(S18|F11)"):
+            parse_model(text)
+
+
+def _shell(line: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    command = line.replace("RRRID", shlex.join(RRRID))
+    return subprocess.run(["bash", "-c", command], capture_output=True, cwd=cwd, check=False, timeout=120,
+                          env=os.environ | {"PYTHONPATH": str(REPO)} | environment)
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+def test_closed_streams_are_no_error(closed: str, logs: Path) -> None:
+    """Without standard output, error, or any stream the work is done all the same, and an error keeps its code."""
+    done = _shell(f"RRRID convert logs --to csv --out out {closed}; echo $? > code; "
+                  f"RRRID convert nowhere {closed}; echo $? >> code", logs)
+    assert (logs / "code").read_text().split() == ["0", "2"], done.stderr
+    assert (logs / "out" / "provenance.json").is_file()
+
+
+def test_an_encoding_without_our_signs(logs: Path) -> None:
+    """In ASCII the arrow becomes ->, and JSON means what it means in UTF-8."""
+    words = _shell("RRRID convert logs --to csv --out out", logs, PYTHONIOENCODING="ascii")
+    assert words.returncode == 0
+    assert b"-> " in words.stdout
+    texts = [json.loads(_shell("RRRID convert logs --to csv --out out --json", logs, PYTHONIOENCODING=encoding).stdout)
+             for encoding in ("ascii", "utf-8")]
+    assert texts[0] == texts[1]
+
+
+def test_a_deleted_working_folder(logs: Path) -> None:
+    """Exit 6 and one line where the place matters; where all paths are absolute the work is done."""
+    (logs / "gone").mkdir()
+    done = _shell(f"cd gone; rmdir ../gone; RRRID convert {logs}/logs --to csv; echo $?; "
+                  f"RRRID convert {logs}/logs --to csv --out {logs}/out -q; echo $?", logs)
+    assert done.stdout.split() == [b"6", b"0"]
+    assert done.stderr.count(b"\n") == 1
+    assert b"was deleted" in done.stderr
+
+
+def test_control_characters_of_a_path_are_escaped(logs: Path) -> None:
+    """An escape sequence in one's own --out reaches no terminal; the path can still be read."""
+    done = rrrid("convert", "logs", "--to", "csv", "--out", "a\x1b[31mb", cwd=logs)
+    assert done.returncode == 0
+    assert "\x1b" not in done.stdout + done.stderr
+    assert "a\\x1b[31mb" in done.stdout
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="mounts are Linux's")
+def test_without_shared_memory_a_batch_says_so(logs: Path) -> None:
+    """P04, exit 6: the locks of its workers need it."""
+    inside = f"mount -t tmpfs -o ro none /dev/shm && {shlex.join(RRRID)} batch logs --stage convert --jobs 2"
+    done = subprocess.run(["unshare", "-m", "bash", "-c", inside], capture_output=True, text=True, cwd=logs, check=False,
+                          env=os.environ | {"PYTHONPATH": str(REPO)}, timeout=120)
+    if "unshare" in done.stderr or "mount" in done.stderr:
+        pytest.skip("this machine lets nobody mount")
+    assert done.returncode == 6
+    assert "RRID-P04" in done.stderr
+    assert "/dev/shm" in done.stderr
+
+
+def test_the_folders_of_a_killed_batch_are_swept(logs: Path, request: pytest.FixtureRequest) -> None:
+    """What a batch had in the folder for temporary files when it was killed, the next one removes, and its own at its end."""
+    temporary = Path(tempfile.mkdtemp(prefix="r-"))  # short: a socket's name has 108 characters
+    request.addfinalizer(lambda: shutil.rmtree(temporary, ignore_errors=True))
+    for k in range(40):
+        shutil.copytree(logs / "logs", logs / "many" / str(k))
+    words = [*RRRID, "batch", "many", "--stage", "convert", "--jobs", "1", "--out", "out", "-q"]
+    environment = os.environ | {"PYTHONPATH": str(REPO), "TMPDIR": str(temporary)}
+    with subprocess.Popen(words, cwd=logs, env=environment, stderr=subprocess.DEVNULL) as process:
+        while not list(temporary.iterdir()):
+            assert process.poll() is None
+            time.sleep(0.01)
+        process.send_signal(signal.SIGKILL)
+    assert list(temporary.iterdir())
+    shutil.rmtree(logs / "many")
+    shutil.copytree(logs / "logs", logs / "many" / "0")
+    done = subprocess.run([*words[:-1], "--no-report"], cwd=logs, env=environment, capture_output=True, text=True, check=False,
+                          timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert not list(temporary.iterdir())
+
+
+def test_circles_of_links_cost_their_logs_alone(logs: Path) -> None:
+    """A link to itself and two to each other are told; linked logs are read, by a stage and by a batch."""
+    folder = logs / "linked"
+    folder.mkdir()
+    (folder / "self.h5").symlink_to("self.h5")
+    (folder / "round").symlink_to(".")
+    (folder / "a.h5").symlink_to(logs / "logs" / "a.h5")
+    done = rrrid("inspect", "linked", "--no-report", "--json", cwd=logs)
+    assert done.returncode in (0, 3), done.stderr  # 3: the small log is none of a motion
+    assert [log["name"] for log in json.loads(done.stdout)["logs"]] == ["small"]
+    assert {Path(c["where"]).name for c in json.loads(done.stdout)["checks"] if c["code"] == "RRID-X11"} == {"self.h5", "round"}
+
+
+def test_recordings_point_to_the_import(tmp_path: Path) -> None:
+    """`diagnose FOLDER_OF_CSV`: what drafts the recipe is named, with a file of that folder."""
+    (tmp_path / "rec").mkdir()
+    (tmp_path / "rec" / "run1.csv").write_text("t,q\n0,1\n")
+    done = rrrid("diagnose", "rec", cwd=tmp_path)
+    assert done.returncode == 5
+    assert "rrrid import --guess rec/run1.csv" in done.stderr
+
+
+def test_a_short_log_says_by_how_much(tmp_path: Path) -> None:
+    """50 samples at 1 kHz: that 100 are needed, 0.1 s, in inspect and in the stage that refuses it."""
+    from dataclasses import replace
+
+    from pipelines.log.files import write_log
+    from tests.healthy import good_log
+
+    log = good_log()
+    short = {name: replace(signal, values=signal.values[:50]) for name, signal in log.signals.items()}
+    write_log(tmp_path / "logs" / "a.h5", replace(log, signals=short, period=None))
+    for command, code, stream in (("inspect", 0, "stdout"), ("estimate-bps", 3, "stderr")):
+        done = rrrid(command, "logs", "--no-report", cwd=tmp_path)
+        assert done.returncode == code
+        assert "RRID-T08" in getattr(done, stream)
+        assert "50 samples, 0.05 s" in getattr(done, stream)
+        assert "100" in getattr(done, stream)

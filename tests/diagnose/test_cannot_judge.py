@@ -1,0 +1,100 @@
+"""`rrrid diagnose` does not say "nothing wrong" where the logs cannot show it.
+
+The library has two causes that none of these logs holds, for speed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines import diagnose
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.results import encode
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.diagnose import diagnose as diagnosed
+from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.stage import Request
+from tests.diagnose.sessions import but, healthy_again, session, written
+from tests.healthy import fourier, make_log, with_signal
+
+FEW = but("torque_offset", "torque_gain")
+
+
+def undescribed(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
+    """Return the logs without their controller: no simulated arm tells the noise floor."""
+    return [replace(log, controller=None) for log in logs]
+
+
+def rubbing(logs: Sequence[ExperimentLog], size: float) -> list[ExperimentLog]:
+    """Return the logs with friction of joint 3 that depends on the angle of joint 1, a law that no model here has."""
+    def torque(log: ExperimentLog) -> Array:
+        more = size * np.sign(np.gradient(log.q[:, 2])) * np.abs(np.sin(7.0 * log.q[:, 0]))
+        return log.tau + np.column_stack([np.zeros((log.n_samples, 2)), more])
+
+    return [with_signal(log, tau=torque(log)) for log in logs]
+
+
+def asked(logs: Sequence[ExperimentLog], replicas: int = 0) -> Diagnosis:
+    return diagnosed(Logs.by_role(logs), DiagnosisSettings(replicas=replicas, most=1, without=FEW, evidence=False, limits=False))
+
+
+@pytest.fixture(scope="module")
+def rubbed(tmp_path_factory: pytest.TempPathFactory) -> diagnose.Result:
+    """A healthy arm of much friction that the model lacks, whose controller nobody has described."""
+    folder = written(tmp_path_factory.mktemp("rubbing"), rubbing(undescribed(session()), 1.0))
+    settings = diagnose.Settings(without=FEW, most=1)
+    return diagnose.compute(diagnose.read(Request((folder,)), settings), settings, whole=False)
+
+
+def test_what_the_model_leaves_without_a_noise_floor_cannot_be_judged(rubbed: diagnose.Result) -> None:
+    """It is said why, where, and what to record; --check ends in 1."""
+    stored = encode(rubbed)[0]
+    assert (stored["verdict"], stored["findings"]) == ("cannot-judge", [])
+    assert (diagnose.STAGE.exit_code(rubbed, True), diagnose.STAGE.exit_code(rubbed, False)) == (1, 0)
+    for words in ("no noise floor is known", "% of the torque of joint 3", "record reference logs"):
+        assert words in stored["reason"]
+    assert "joint 1" not in stored["reason"]
+
+
+def test_the_report_does_not_call_it_nothing_wrong(rubbed: diagnose.Result) -> None:
+    report = diagnose.report(rubbed)
+    assert report.verdict.startswith("Whether anything is wrong with this arm cannot be judged: no noise floor")
+    assert report.tone == "attention"
+    assert "nothing is wrong" not in str(report).lower()
+
+
+def test_a_model_that_leaves_next_to_nothing_needs_no_floor() -> None:
+    assert asked(undescribed(session())).verdict == "nothing-wrong"
+
+
+def test_reference_logs_are_a_noise_floor() -> None:
+    """The same friction before and after: nothing has changed, however much of it no model has."""
+    logs = rubbing(undescribed(session()), 1.0)
+    assert asked([*logs, *healthy_again(logs)]).verdict == "nothing-wrong"
+
+
+@pytest.mark.parametrize(("repeated", "verdict"), [(True, "nothing-wrong"), (False, "cannot-judge")])
+def test_repeated_periods_are_a_noise_floor(repeated: bool, verdict: str) -> None:
+    """Noise of some hundredths of the torque in a motion that comes three times: what differs from time to time is noise."""
+    rng, logs = np.random.default_rng(5), []
+    for k, role in enumerate(("identify", "validate")):
+        log = make_log(fourier(np.random.default_rng(k), base_hz=0.4), duration=7.5, seed=k)
+        tau = log.tau + 0.25 * np.std(log.tau, axis=0) * rng.standard_normal(log.tau.shape)
+        logs.append(replace(with_signal(log, tau=tau), name=role, role=role, period=2.5 if repeated else None))
+    assert asked(logs).verdict == verdict
+
+
+def test_logs_that_do_not_determine_the_model_cannot_be_judged() -> None:
+    """An arm that hardly moves: the model fits, for nearly any would."""
+    logs = [replace(make_log(fourier(np.random.default_rng(5 + k), level=0.003), seed=k), name=role, role=role)
+            for k, role in enumerate(("identify", "validate"))]
+    found = asked(logs)
+    assert found.verdict == "cannot-judge"
+    assert "the logs do not determine the model" in found.reason
+    assert "move the joints concerned further and faster" in found.reason
+    assert found.checks == ()  # nor the sign of viscous friction

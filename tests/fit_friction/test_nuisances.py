@@ -1,0 +1,103 @@
+"""Rests, a vertical axis, a coarse encoder and friction that drifts, as logs of a joint in a position loop show them.
+
+Recorded cases: ../shared/cases, made by a program of their own (LuGre friction, PD loop); see each README there. Machines
+under gravity: tests/model/friction/closed_loop.py.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines import fit_friction
+from pipelines.fit_friction import Settings
+from pipelines.log.files import Opened
+from pipelines.model.friction.result import JointResult, Result, Value
+from pipelines.stage import Inputs
+from tests.cli.commands import rrrid
+from tests.model.friction.closed_loop import Machine, draw, logs_of
+
+
+def fitted(shared: Path, folder: Path, case: str, law: str | None) -> dict[str, Any]:
+    """The first joint of a recorded case, imported by its recipe, and the checks."""
+    recipe = next((shared / "cases").glob(f"{case}-*")) / "r.toml"
+    made = rrrid("import", str(recipe), "--out", "imp", cwd=folder)
+    assert made.returncode == 0, made.stderr
+    options = () if law is None else ("--law", law)
+    made = rrrid("fit-friction", "imp", *options, "--out", "o", "--no-report", "--json", cwd=folder)
+    assert made.returncode == 0, made.stderr
+    result: dict[str, Any] = json.loads(made.stdout)
+    return result
+
+
+def within(value: dict[str, float], truth: float, std: float, relative: float) -> bool:
+    return abs(value["value"] - truth) <= max(std * value["std"], relative * abs(truth))
+
+
+def test_rests_do_not_count_as_sliding(shared: Path, tmp_path: Path) -> None:
+    """Case 24: 3 and 2 N m, 1.0 and 1.6 N m s/rad, 0.5 kg m²; no gravity about an axis that is parallel to it."""
+    (joint,) = fitted(shared, tmp_path, "24", "asymmetric_friction")["joints"]
+    numbers = joint["parameters"]
+    assert within(numbers["asymmetric_friction.coulomb_difference"], 1.0, 2.0, 0.001)
+    assert within(numbers["asymmetric_friction.viscous_difference"], -0.6, 2.0, 0.001)
+    assert within(joint["inertia"], 0.5, 2.0, 0.001)
+    assert all(value["value"] == 0.0 for value in joint["gravity"].values())
+    assert joint["sticking"]["share"] > 0.2
+    assert joint["drift"] is None
+
+
+def test_a_coarse_encoder_is_given_longer_windows(shared: Path, tmp_path: Path) -> None:
+    """Case 26: 2 mrad a count. The inertia is 0.5 kg m² within two of its standard deviations, and these are below 2 %."""
+    (joint,) = fitted(shared, tmp_path, "26", "coulomb+viscous")["joints"]
+    assert within(joint["inertia"], 0.5, 2.0, 0.0)
+    assert joint["inertia"]["std"] < 0.01
+    assert joint["sticking"]["window"] > 0.02
+
+
+def test_friction_that_warms_up_is_named_with_its_course(shared: Path, tmp_path: Path) -> None:
+    """Case 28: friction falls by 35 % with 15 s, anew in each log of 32 s: by 0.31 of 0.77 in its middle."""
+    result = fitted(shared, tmp_path, "28", "coulomb+viscous")
+    (joint,) = result["joints"]
+    assert joint["drift"]["kind"] == "trend"
+    assert joint["drift"]["when"] == pytest.approx(15.0, rel=0.25)
+    assert joint["drift"]["change"]["value"] == pytest.approx(-0.40, abs=0.03)
+    assert any(check["code"] == "RRID-D26" and "falls" in check["message"] for check in result["checks"])
+    assert within(joint["inertia"], 0.5, 2.0, 0.002)
+
+
+def computed(machine: Machine, law: str) -> tuple[JointResult, Result]:
+    (log,) = logs_of([machine]).values()
+    result = fit_friction.compute(Inputs((Opened(Path("a.h5"), "", log, ()),), label="logs"), Settings(law=law))
+    return result.joints[0], result
+
+
+def sure(value: Value, truth: float) -> bool:
+    assert value.std is not None
+    return abs(value.value - truth) <= max(3.0 * value.std, 0.002 * abs(truth))
+
+
+def test_constant_speeds_under_a_loop_and_gravity() -> None:
+    """Inertia, both sides of gravity and the curve, to three standard deviations or 0.2 %."""
+    machine = replace(draw("rests", 1), seconds=14.0, rests=0.2)
+    joint, result = computed(machine, "asymmetric_friction")
+    assert sure(joint.inertia, machine.inertia)
+    assert sure(joint.gravity["sine"], machine.weight * np.cos(machine.hanging))
+    assert sure(joint.gravity["cosine"], -machine.weight * np.sin(machine.hanging))
+    speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
+    apart = np.abs(np.interp(speed, joint.series.speed, joint.series.curve) - machine.friction(speed))
+    assert np.all(apart <= 0.005 * np.abs(machine.friction(speed)))
+    assert not any(check.code in ("RRID-D26", "RRID-D08", "RRID-S14") for check in result.checks)
+
+
+def test_viscous_friction_below_zero_is_named() -> None:
+    """A drive that regenerates and does not log it: torque that falls as speed rises. It is told with what to look at."""
+    machine = replace(draw("rests", 1), seconds=14.0, rests=0.2, viscous=(-0.4, -0.4), coulomb=(4.0, 4.0))
+    _, result = computed(machine, "coulomb+viscous")
+    (check,) = [check for check in result.checks if check.code == "RRID-S14"]
+    assert "viscous friction" in check.message
+    assert "regenerat" in check.remedy
