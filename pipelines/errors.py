@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Check", "EnvironmentFault", "InputRejected", "Interrupted", "Level", "NothingMatched", "RrridError",
+__all__ = ["Check", "EnvironmentFault", "Gathering", "InputRejected", "Interrupted", "Level", "NothingMatched", "RrridError",
            "UsageError", "clean", "did_you_mean", "escaped"]
 
 Level = Literal["ok", "warn", "repair", "reject"]
@@ -62,6 +63,7 @@ class RrridError(Exception):
         self.message = clean(message)
         self.where = clean(where)
         self.remedy = clean(remedy)
+        self.others: tuple[RrridError, ...] = ()  # of the same work, found in parts that do not depend on this one
         super().__init__(str(self))
 
     def __str__(self) -> str:
@@ -141,6 +143,29 @@ class EnvironmentFault(RrridError):
     """The machine stands in the way: disk full, no permission, a lock."""
 
     exit_code = 6
+
+
+class Gathering:
+    """Collect the errors of parts that do not depend on each other, and raise them together: the first, with the others."""
+
+    def __init__(self) -> None:
+        self.found: list[RrridError] = []
+
+    @contextmanager
+    def part(self) -> Iterator[None]:
+        """Keep the error of a part instead of raising it: of usage or input; any other ends the work."""
+        try:
+            yield
+        except (UsageError, InputRejected) as problem:
+            self.found += [problem, *problem.others]
+            problem.others = ()
+
+    def raise_all(self) -> None:
+        """Raise the errors, each text once."""
+        if self.found:
+            first, *others = {str(problem): problem for problem in self.found}.values()
+            first.others = tuple(others)
+            raise first
 
 
 class Interrupted(KeyboardInterrupt):

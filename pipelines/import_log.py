@@ -1,4 +1,4 @@
-"""Import recordings: CSV, MAT and NumPy files become logs, by a recipe.
+"""Import recordings: CSV, JSON, MAT and NumPy files become logs, by a recipe.
 
 Reads    a recipe (TOML, `pipelines.log.recording.recipe`) and the recorded files its patterns match
 Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet for maps without a clock, result.json, report.html
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected, UsageError
+from pipelines.errors import Check, Gathering, InputRejected, UsageError
 from pipelines.log.doctor.checks_subject import many
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
@@ -112,14 +112,17 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     """Turn every recording of the material into one log, or several where its clock was set back.
 
     Raises:
-        InputRejected, UsageError: what cannot be mended, by the rows S, T and D of the table of bad inputs.
+        InputRejected, UsageError: what cannot be repaired, by the rows S, T and D of the table of bad inputs; all files' together.
     """
     material: Material = inputs.material
     mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
     checks: list[Check] = list(material.robot.checks)
     logs: list[ImportedLog] = []
+    problems = Gathering()
     for source in material.sources:
-        logs += _import(source, material, mapped, settings, checks)
+        with problems.part():
+            logs += _import(source, material, mapped, settings, checks)
+    problems.raise_all()
     names = filenames.unique(item.name for item in logs)
     files = filenames.unique(slug(name) for name in names)
     logs = [replace(item, name=name, file=f"logs/{file}.{material.ending}", log=replace(item.log, name=name),

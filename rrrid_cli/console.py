@@ -26,6 +26,7 @@ _MOST = 12  # remarks
 _SILENT = 20.0  # [s] without a line in a pipe
 _LONG = 5.0  # [s] on one step, before a terminal is told how long
 _TICK = 1.0  # [s]
+_OTHERS = 12  # errors beside the first
 _LOGS = 30  # named for one remark
 _NUMBERS = re.compile(r"(?<![A-Za-z_])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![A-Za-z_])")  # values; p3 and q_1 are names
 _HEADS = (12, 8, 6)  # characters: a heading is broken into lines no shorter than that; shorter ones where the table is too wide
@@ -200,9 +201,14 @@ def _likewise(group: Sequence[Check]) -> str:
 
 
 def say_error(problem: RrridError, *, as_json: bool) -> None:
-    """One line on standard error; with --json the same as an object on standard output."""
+    """One line on standard error for each error; with --json the same as an object on standard output."""
     print(f"rrrid: {problem}", file=sys.stderr)
+    for other in problem.others[:_OTHERS]:
+        print(f"rrrid: {other}", file=sys.stderr)
+    if (more := len(problem.others) - _OTHERS) > 0:
+        print(f"rrrid: and {more} more", file=sys.stderr)
     if as_json:
         from pipelines.log.results import json_text
 
-        sys.stdout.write(json_text({"error": problem.as_dict(), "exit": problem.exit_code}))
+        others = {"others": [other.as_dict() for other in problem.others]} if problem.others else {}
+        sys.stdout.write(json_text({"error": problem.as_dict(), "exit": problem.exit_code, **others}))

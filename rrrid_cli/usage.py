@@ -57,6 +57,6 @@ def as_given(problem: RrridError, words: Iterable[str]) -> RrridError:
             if one == path or one != Path():
                 names.setdefault(str(one.absolute()), str(one))
                 names.setdefault(os.path.abspath(one), str(one))
-    told = (problem.where, problem.message, problem.remedy)
-    problem.where, problem.message, problem.remedy = (renamed(text, names) for text in told)
+    for each in (problem, *problem.others):
+        each.where, each.message, each.remedy = (renamed(text, names) for text in (each.where, each.message, each.remedy))
     return problem

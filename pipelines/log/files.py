@@ -29,7 +29,7 @@ from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_form
 __all__ = ["ENDINGS", "PROVENANCE", "RECORDINGS", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there",
            "open_log", "regular_file", "write_log"]
 
-RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy")  # endings of what `import` reads
+RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".jsonl")  # what `import` reads; JSON as well, but so are results
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"

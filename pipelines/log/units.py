@@ -53,7 +53,10 @@ UNITS: Final[dict[str, Unit]] = {
 _SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "²": "^2", "\u03bc": "µ"})
 _ALIASES: Final = {"Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
                    "radian": "rad", "radians": "rad", "seconds": "s", "sec": "s", "rad/s2": "rad/s^2",
-                   "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "1/min": "rpm"}
+                   "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "N-m": "N m", "1/min": "rpm",
+                   "rad/sec": "rad/s",
+                   "deg/sec": "deg/s", "Rad": "rad", "RAD": "rad", "Deg": "deg", "DEG": "deg", "msec": "ms", "usec": "us",
+                   "nsec": "ns"}
 
 
 def canonical_unit(unit: str) -> str:

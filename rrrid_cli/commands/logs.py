@@ -43,7 +43,7 @@ def import_(
     guess: Annotated[Path | None, typer.Option(
         readable=False, help="Draft a recipe for this recording, with the evidence; print it.")] = None,
 ) -> None:
-    """Make logs of recordings (CSV, MAT, NPY) by a recipe."""
+    """Make logs of recordings (CSV, JSON, MAT, NPY) by a recipe."""
     if guess is not None:
         _guess(guess, common)
         return
@@ -69,7 +69,7 @@ def convert(
 def _guess(path: Path, common: Common) -> None:
     from pipelines.log.recording.guess import guess_recipe
 
-    drafted = guess_recipe(path)
+    drafted = guess_recipe(path, common.robot)
     if common.out is not None:
         raise UsageError("C02", "--guess prints its draft", where="--out",
                          remedy="redirect it: rrrid import --guess FILE > recipe.toml")

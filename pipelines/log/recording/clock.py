@@ -33,7 +33,10 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     step = declared_step(spec)
     if spec.column is None:  # the recipe was checked: then there is a rate
         return table.rows * np.float64(step or math.nan), []
-    name = table.name_of(spec.column, "t")
+    if len(spec.parts) > 1:
+        return _summed(table, spec, step)
+    column, declared = spec.parts[0]
+    name = table.name_of(column, "t")
     where = f"{table.source}, column '{name}'"
     stamps = table.columns[name]
     finite = stamps[np.isfinite(stamps)]
@@ -43,14 +46,14 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
         raise InputRejected("T08", f"{finite.size} time stamp{'s' if finite.size != 1 else ''}, none later than another",
                             where=where, remedy="record again")
     median = float(np.median(steps))
-    unit = spec.unit or table.units.get(name)
+    unit = declared or table.units.get(name)
     checks: list[Check] = []
     if unit is None:
         unit = _detected(median, step, where, assume, checks)
-    elif spec.unit and (other := table.units.get(name)) and _contradict(other, spec.unit):
-        raise InputRejected("S08", f"the header says '{other}', the recipe says '{spec.unit}'", where=where,
+    elif declared and (other := table.units.get(name)) and _contradict(other, declared):
+        raise InputRejected("S08", f"the header says '{other}', the recipe says '{declared}'", where=where,
                             remedy="correct one of them: the unit in [time], or the header")
-    elif not spec.unit:
+    elif not declared:
         checks.append(Check.of("S06", "ok", f"unit '{unit}' of time taken from the header", where=where))
     factor = _factor(unit, step, where)
     _plausible(median, factor, unit, step, where)
@@ -58,6 +61,26 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     if origin:
         checks.append(Check.of("S08", "ok", f"time starts at {finite[0]:.16g} {unit}; counted from there", where=where))
     return (stamps - origin) * factor, checks
+
+
+def _summed(table: RawTable, spec: TimeSpec, step: float | None) -> tuple[Array, list[Check]]:
+    """The sum of several columns [s], each counted from its own first stamp where it is large: no digit of the fraction is lost."""
+    total = np.zeros(table.rows.size)
+    for column, unit in spec.parts:
+        name = table.name_of(column, "t")
+        stamps = table.columns[name]
+        finite = stamps[np.isfinite(stamps)]
+        if unit is None or finite.size < 2:
+            raise InputRejected("S08", "no unit" if unit is None else "no time stamps", where=f"{table.source}, column '{name}'",
+                                remedy='give [time] one unit a column: unit = ["s", "ns"]')
+        factor = to_si(unit, "time", where=f"{table.source}, column '{name}'").factor
+        total += (stamps - (finite[0] if abs(finite[0]) * factor > 1e6 else 0.0)) * factor
+    where = f"{table.source}, columns {', '.join(str(column) for column, _ in spec.parts)}"
+    steps = np.diff(total[np.isfinite(total)])
+    if not (steps > 0).any():
+        raise InputRejected("T08", "no time stamp is later than another", where=where, remedy="choose other columns of time")
+    _plausible(float(np.median(steps[steps > 0])), 1.0, "s", step, where)
+    return total, []
 
 
 def _contradict(header: str, declared: str) -> bool:

@@ -1,94 +1,225 @@
-"""Tell what the columns of a recording are, by their names, their numbers and the name of their file."""
+"""Group the columns of a recording by what their names say, one group a signal, in the joints' order.
+
+A group holds the columns of one quantity, one origin (measured, plain, commanded) and one side. The
+robot beside the recording, where there is one, gives the joints' names and count; otherwise
+numbers give the order, and names without number leave the order of the file.
+"""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-
-import numpy as np
+from typing import Literal
 
 from pipelines.errors import InputRejected
+from pipelines.log.recording.column_names import ColumnName, read_name, words_of
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
-from pipelines.log.units import UNITS, canonical_unit
+from pipelines.log.units import canonical_unit
 
-__all__ = ["companion_of", "named_unit", "role_of", "roles_of"]
+__all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of", "texts_of", "unit_of_group"]
 
-# What a column is, by its name. The first that fits counts; the order keeps "pos_ref" from being a position.
-_NAMES: tuple[tuple[str, str], ...] = (
-    ("q_ref",
-     r"(q|pos|position|angle|theta)_?(ref|des|desired|cmd|target|set)\w*"
-     r"|(ref|des|desired|target|cmd|set)_?(q|pos|position|angle)\w*"),
-    ("dq", r"(dq|qd|qdot|vel|velocity|speed|omega|geschwindigkeit|drehzahl|\w*_(vel|velocity|speed))(?![a-z])\w*"),
-    ("t", r"(t|time|timestamp|stamp|zeit|clock|sec|seconds?)(?![a-z])\w*|(t|time)(_|$).*"),
-    ("tau", r"(tau|torque|trq|moment|effort|mom|drehmoment)\w*|\w*(torque|effort|moment)\w*"),
-    ("current", r"(i|iq|curr|current|amp|strom)(?![a-z])\w*|\w*(current)\w*"),
-    ("q", r"(q|pos|position|angle|theta|joint|enc|encoder|axis|j|winkel|achse|gelenk)(?![a-z])\w*"
-          r"|\w*(_pos|position|_angle|encoder|winkel)\w*"),
-)
-_SUFFIX_UNITS = {"s": "s", "sec": "s", "ms": "ms", "us": "us", "ns": "ns", "rad": "rad", "deg": "deg", "rev": "rev",
-                 "turns": "turn", "counts": "counts",
-                 "cnt": "counts", "ticks": "counts", "a": "A", "ma": "mA", "nm": "N m", "mnm": "mN m", "rpm": "rpm"}
+_GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 
 
-def role_of(column: str) -> str | None:
-    """What a column holds, by its name alone: "t", "q", "tau", …"""
-    word = re.sub(r"[^\w]+", "_", column.strip()).lower()
-    return next((role for role, pattern in _NAMES if re.fullmatch(pattern, word)), None)
+Order = Literal["robot", "numbers", "file", "text"]
 
 
-def _role_by_unit(unit: str) -> str | None:
-    """What a column whose name says nothing holds, by the unit in its header: "M1 [Nm]" is a torque."""
-    known = UNITS.get(canonical_unit(unit))
-    roles = {"time": "t", "position": "q", "velocity": "dq", "torque": "tau", "current": "current"}
-    return roles.get(known.quantity) if known is not None else None
+@dataclass(frozen=True)
+class Group:
+    """Columns that belong together, one a joint."""
+
+    quantity: str
+    origin: Literal["measured", "plain", "commanded"]
+    motor: bool
+    partial: bool
+    filtered: bool
+    columns: tuple[str, ...]
+    order: Order  # text: as columns of text name them, and no robot has these names
+    words: str  # the group in words, for comments
+
+    @property
+    def rank(self) -> tuple[int, bool, bool]:
+        """Order of preference: measured before plain before commanded, joint before motor, raw before filtered."""
+        return (("measured", "plain", "commanded").index(self.origin), self.motor, self.filtered)
 
 
-def roles_of(table: RawTable, path: Path) -> dict[str, tuple[str, ...]]:
-    """Which columns hold what, by their names; a column of time also by rising evenly. The file's name settles "Joint_1"."""
-    found: dict[str, list[str]] = {}
-    for name in table.columns:
-        if (role := role_of(name) or _role_by_unit(table.units.get(name, ""))) is not None:
-            found.setdefault(role, []).append(name)
-    if "t" not in found:
-        first = next(iter(table.columns))
-        steps = np.diff(table.columns[first])
-        if steps.size > 10 and (steps > 0).all() and np.std(steps) < 0.3 * np.mean(steps) and len(table.columns) > 2:
-            found = {"t": [first]} | {role: [c for c in names if c != first] for role, names in found.items()}
-    if re.search(r"tau|torque|curr|effort|moment",
-                 path.stem.lower()) and "tau" not in found and "current" not in found and "q" in found:
-        found["tau"] = found.pop("q")
-    plain = [c for c in table.columns if c not in found.get("t", [])]
-    if not set(found) - {"t"} and re.search(r"tau|torque|curr|effort", path.stem.lower()):
-        found["tau"] = plain
-    elif not set(found) - {"t"} and plain:
-        found["q"] = plain
-    return {role: tuple(names) if role != "t" else tuple(names[:1]) for role, names in found.items() if names}
+@dataclass(frozen=True)
+class Choice:
+    """The group taken for a signal, or None where the names leave it open; and the others of that quantity."""
+
+    group: Group | None
+    others: tuple[Group, ...] = ()
+
+
+def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
+    """Return the groups of the columns of `table`; `joints` names the robot's, from the base to the tip."""
+    texts = texts_of(table, joints)
+    patterns = _patterns(table, joints)
+    found: dict[tuple[object, ...], list[tuple[ColumnName, int | None]]] = {}
+    for column in table.columns:
+        rest, place = _without_joint(column, patterns)
+        name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
+        if place is None:
+            place = _place_by_words(name.label, joints)
+        key = (name.quantity, name.origin, name.motor, name.partial, name.filtered, name.role)
+        found.setdefault(key, []).append((name, place))
+    groups = []
+    for members in found.values():
+        for part in _split(members):
+            groups.append(_ordered(part, joints, texts))
+    return groups
+
+
+def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
+    """Return a pattern for each joint's name, with or without words such as "joint"; none where a joint is not found.
+
+    All of the robot's names, or none: columns joint_0, joint_1, … do not name the robot's joint_1, joint_2, …
+    """
+    for generic in (frozenset[str](), _GENERIC):
+        names = [[w for w in re.findall(r"\d+|[A-Z]?[a-z]+|[A-Z]+", name) if w.lower() not in generic] for name in joints]
+        if any(sum(map(len, words)) < 3 or not any(map(str.isalpha, words)) for words in names):
+            continue
+        found = [re.compile(rf"(?<![A-Za-z0-9]){'[^A-Za-z0-9]?'.join(words)}(?![A-Za-z0-9])", re.IGNORECASE) for words in names]
+        if found and all(any(pattern.search(column) for column in table.columns) for pattern in found):
+            return found
+    return []
+
+
+def _without_joint(column: str, names: Sequence[re.Pattern[str]]) -> tuple[str, int | None]:
+    """Return the column's name without the name of a joint in it, and the place of that joint (from 0)."""
+    for place in sorted(range(len(names)), key=lambda k: -len(names[k].pattern)):
+        if found := names[place].search(column):
+            return column[: found.start()] + " " + column[found.end():], place
+    return column, None
+
+
+def _place_by_words(label: Sequence[str], joints: Sequence[str]) -> int | None:
+    """Return the joint whose name has the words of `label`: ("elbow",) is "elbow_joint". Numbers alone name none."""
+    if not label or not any(word.isalpha() for word in label):
+        return None
+    bare = [[word for word in words_of(name) if word not in _GENERIC] for name in joints]
+    common = set(bare[0]).intersection(*bare[1:]) if len(bare) > 1 else set()
+    matches = [k for k, words in enumerate(bare) if [w for w in words if w not in common] == [
+        w for w in label if w not in common] and words]
+    return matches[0] if len(matches) == 1 else None
+
+
+def texts_of(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
+    """Return the joints that columns of text name, one a column, in the order of the file: name[0] is "elbow_joint" throughout."""
+    texts = list(table.labels.values())
+    known = [k for k, text in enumerate(texts) if text in joints]
+    if known:
+        return tuple(texts[known[0]: known[-1] + 1])
+    families: dict[tuple[str, ...], list[str]] = {}
+    for column, text in table.labels.items():
+        families.setdefault(tuple(word for word in words_of(column) if not word.isdecimal()), []).append(text)
+    found = max(families.values(), key=len, default=[])
+    return tuple(found) if len(set(found)) == len(found) > 1 else ()
+
+
+def by_texts(columns: Sequence[str], texts: Sequence[str], joints: Sequence[str]) -> tuple[list[str], Order | None]:
+    """Return the columns in the robot's order by the `texts` that name them; None where the texts say nothing of them."""
+    if len(texts) != len(columns) or len(texts) < 2:
+        return list(columns), None
+    if joints and set(joints) <= set(texts):
+        return [columns[list(texts).index(joint)] for joint in joints], "robot"
+    numbers = [_number(words_of(text)) for text in texts]
+    rising = None not in numbers and numbers == sorted(numbers, key=lambda number: number or 0)
+    return list(columns), None if rising else "text"
+
+
+def _split(members: list[tuple[ColumnName, int | None]]) -> list[list[tuple[ColumnName, int | None]]]:
+    """Split columns of one kind by the words beside their numbers: arm_q_1 … and leg_q_1 … are two groups.
+
+    Where a word comes once only, the words name the joints: wrist_1, wrist_2, elbow.
+    """
+    if any(place is not None for _, place in members):
+        return [members]
+    parts: dict[tuple[str, ...], list[tuple[ColumnName, int | None]]] = {}
+    for member in members:
+        words = tuple("#" if word.isdecimal() else word for word in member[0].label)
+        parts.setdefault(words, []).append(member)
+    several = [part for part in parts.values() if len(part) > 1]
+    return list(parts.values()) if len(several) == len(parts) else [members]
+
+
+def _ordered(members: list[tuple[ColumnName, int | None]], joints: Sequence[str], texts: Sequence[str]) -> Group:
+    """Return the group with its columns from the base to the tip, as far as that can be known."""
+    names = [name for name, _ in members]
+    places = [place for _, place in members]
+    numbers = [_number(name.label) for name in names]
+    order: Order = "file"
+    if joints and sorted(place for place in places if place is not None) == list(range(len(joints))):
+        names, order = [names[places.index(place)] for place in range(len(joints))], "robot"
+    elif None not in numbers and len(set(numbers)) == len(numbers) and all(place is None for place in places):
+        names, order = [names[k] for k in sorted(range(len(names)), key=lambda k: numbers[k] or 0)], "numbers"
+    columns = [name.column for name in names]
+    if order != "robot":
+        columns, by_text = by_texts(columns, texts, joints)
+        order = by_text or order
+    first = names[0]
+    words = " ".join(first.role) or " ".join(first.label)
+    return Group(first.quantity, first.origin, first.motor, first.partial, first.filtered,
+                 tuple(columns), order, words)
+
+
+def _number(label: Sequence[str]) -> int | None:
+    numbers = [word for word in label if word.isdecimal()]
+    return int(numbers[-1][:9]) if numbers else None
+
+
+def choose(groups: Sequence[Group], quantities: Sequence[str], n: int | None, commanded: bool) -> Choice:
+    """Return the group that holds a signal of one of `quantities`, the earlier ones preferred.
+
+    Args:
+        n: number of joints; None where it is not known.
+        commanded: whether a commanded one will do where no other is there.
+    """
+    fitting = [g for g in groups if g.quantity in quantities and not g.partial and (commanded or g.origin != "commanded")]
+    others = [g for g in groups if g.quantity in quantities and g not in fitting]
+    sized = [g for g in fitting if n is None or len(g.columns) == n]
+
+    def key(group: Group) -> tuple[object, ...]:
+        return (group.origin == "commanded", group.order != "robot", quantities.index(group.quantity), group.rank)
+
+    sized.sort(key=key)
+    rest = tuple(g for g in (*fitting, *others) if not sized or g is not sized[0])
+    if not sized:
+        return Choice(None, rest)
+    best = [g for g in sized if key(g) == key(sized[0])]
+    return Choice(sized[0] if len(best) == 1 else None, rest if len(best) == 1 else (*best, *(g for g in rest if g not in best)))
+
+
+def unit_of_group(group: Sequence[str], table: RawTable) -> tuple[str | None, ...]:
+    """Return the unit of each column as the header or its name says it; None where neither does.
+
+    It may be one that `UNITS` does not have, such as "%".
+    """
+    headers = [canonical_unit(table.units.get(column, "")).strip() for column in group]
+    return tuple(header if header not in ("", "-", "1") else read_name(column).unit or None
+                 for header, column in zip(headers, group, strict=True))
+
+
+def file_quantity(path: Path) -> str:
+    """Return the quantity that the file's name says: "position" of pos_data.csv, "current" of curr_data.csv."""
+    found = read_name(path.stem).quantity
+    return found if found in ("position", "torque", "current") else ""
 
 
 def companion_of(path: Path, table: RawTable) -> RawTable | None:
-    """A file beside it with the same columns and as many rows: positions here, torques there."""
+    """Return a file in the same folder with the same columns and as many rows: positions here, torques there."""
     for other in sorted(path.parent.iterdir())[:200]:
         if other == path or other.suffix.lower() != path.suffix.lower() or not other.is_file() or other.stat().st_size > 1 << 30:
+            continue
+        if (file_quantity(other) in ("torque", "current")) == (file_quantity(path) in ("torque", "current")):
             continue
         try:
             candidate = read_table(other)
         except InputRejected:
-            continue  # whatever else lies there is not what was asked about
-        alike = list(candidate.columns) == list(table.columns) and candidate.rows.size == table.rows.size
-        if alike and _is_torque(other) != _is_torque(path):
+            continue  # another file of the folder
+        if list(candidate.columns) == list(table.columns) and candidate.rows.size == table.rows.size:
             return candidate
     return None
-
-
-def _is_torque(path: Path) -> bool:
-    return re.search(r"tau|torque|curr|effort|moment", path.stem.lower()) is not None
-
-
-def named_unit(column: str, table: RawTable) -> str | None:
-    """The unit in the header, or in the last part of the name."""
-    header = canonical_unit(table.units.get(column, ""))
-    if header in UNITS or header == "counts":
-        return header
-    parts = re.split(r"[_\s.]+", column.lower())
-    return next((_SUFFIX_UNITS[p] for p in reversed(parts[1:]) if p in _SUFFIX_UNITS), None) if len(parts) > 1 else None

@@ -18,7 +18,7 @@ from pipelines.errors import UsageError
 from pipelines.log import schema
 from pipelines.log.atomic import write_file
 from pipelines.log.experiment import Array
-from pipelines.log.recording.joint_side import drive_of
+from pipelines.log.recording.joint_side import drive_of, units_of_joints
 from pipelines.log.recording.recipe import Numbers, Recipe, SignalSpec
 from pipelines.log.robot import RobotDescription
 from pipelines.log.table import csv_cell
@@ -57,7 +57,8 @@ def controller_table(recipe: Recipe | None, robot: RobotDescription, motion: Cal
     spec = recipe.signals.get("q")
     if spec is None:
         raise UsageError("C02", "the recipe has no signal q", where=recipe.where, remedy="give a recipe that imports positions")
-    unit = spec.unit or "rad"
+    units = units_of_joints("q", spec, robot, recipe.where, []) if spec.unit else tuple(
+        schema.joint_unit("q", revolute) for revolute in robot.revolute)
     values = (q - _each(spec.offset, n, recipe)) if np.any(spec.offset) else q
     drive = drive_of(recipe.drive, robot, recipe.where)
     if spec.side == "motor" or (spec.side is None and recipe.drive.transmission is not None):
@@ -65,8 +66,8 @@ def controller_table(recipe: Recipe | None, robot: RobotDescription, motion: Cal
             raise UsageError("C02", "signals.q is on the motor side, but there is no drive.transmission", where=recipe.where,
                              remedy="add [drive] transmission = the gear ratios")
         values = values @ np.array(drive.transmission).T
-    values = values / _factor(unit, spec, n, recipe) / _each(spec.sign, n, recipe) / _each(spec.scale, n, recipe)
-    return _with_time(t, _names(spec, n), (unit,) * n, values, rate)
+    values = values / _factor(units, spec, n, recipe) / _each(spec.sign, n, recipe) / _each(spec.scale, n, recipe)
+    return _with_time(t, _names(spec, n), units, values, rate)
 
 
 def _rate(recipe: Recipe | None, sample_time: float) -> float:
@@ -86,13 +87,15 @@ def _each(value: Numbers, n: int, recipe: Recipe) -> Array:
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (n,))
 
 
-def _factor(unit: str, spec: SignalSpec, n: int, recipe: Recipe) -> Array:
-    """SI per recorded number."""
-    if unit == "counts":
+def _factor(units: tuple[str, ...], spec: SignalSpec, n: int, recipe: Recipe) -> Array:
+    """SI per recorded number of each joint."""
+    if "counts" in units:
         if spec.counts_per_rev is None:
             raise UsageError("C02", "counts without counts_per_rev", where=recipe.where, remedy="add it to signals.q")
-        return 2.0 * math.pi / _each(spec.counts_per_rev, n, recipe)
-    return np.full(n, to_si(unit, "position", where=recipe.where).factor)
+        turn = 2.0 * math.pi / _each(spec.counts_per_rev, n, recipe)
+        return np.array([turn[j] if unit == "counts" else to_si(unit, "position", where=recipe.where).factor
+                         for j, unit in enumerate(units)])
+    return np.array([to_si(unit, "position", where=recipe.where).factor for unit in units])
 
 
 def _names(spec: SignalSpec, n: int) -> tuple[str, ...]:

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from pipelines.log.experiment import Array
+from pipelines.log.recording.recipe_reader import BLANK
+from pipelines.log.robot import Joint
 
-__all__ = ["Guess", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of", "torque_unit"]
+__all__ = ["ANGULAR_RATIOS", "Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
+           "slide_unit", "slope_of", "torque_unit", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
@@ -38,30 +42,134 @@ def rollover(values: Array) -> float | None:
     return near if abs(jumps.max() - near) / near < 0.1 else float(jumps.max())
 
 
-def position_unit(q: Array, t: Array | None, dq: Array | None, named: str | None) -> tuple[Guess, str]:
-    """The unit of positions, and further keys of the recipe (counts_per_rev, wrap)."""
+# Slope of the position over recorded velocity, by their units: q in the first, dq in the second.
+ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
+                  6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
+_ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
+_STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
+_LIKE = 0.95  # correlation over which one block is the slope of another
+_SAME_RATIO = 0.1  # scatter of the ratio over the joints
+
+
+@dataclass(frozen=True)
+class Slope:
+    """How far a velocity is the slope of a position: q[k] - q[l] = factor times the integral of dq."""
+
+    factor: float  # [unit of q / (unit of dq times unit of t)]
+    correlation: float  # the lowest of the joints that move
+
+
+def slope_of(q: Array, dq: Array, t: Array | None) -> Slope | None:
+    """Return the relation of `dq` to `q` (samples, joints); None where it is not its slope.
+
+    Both are compared over stretches of the recording, short ones first: the integral form does not
+    amplify the steps of an encoder as a difference of neighbours does.
+    """
+    clock = np.arange(len(q), dtype=np.float64) if t is None else t
+    if q.shape != dq.shape or len(q) < 50:
+        return None
+    summed = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(clock)[:, None], axis=0)])
+    moving = (np.ptp(q, axis=0) > 1e-3 * np.ptp(q)) & (np.ptp(dq, axis=0) > 1e-3 * np.ptp(dq))
+    if not moving.any():
+        return None
+    widths = sorted({max(2, len(q) // share) for share in _STRETCHES})
+    found = (_slope_over(q[:, moving], summed[:, moving], width) for width in widths)
+    return next((slope for slope in found if slope is not None), None)
+
+
+def _slope_over(q: Array, summed: Array, width: int) -> Slope | None:
+    """The relation over stretches of `width` samples; `summed` is the integral of the velocity."""
+    moved, expected = q[width:] - q[:-width], summed[width:] - summed[:-width]
+    power = (expected**2).sum(axis=0)
+    inner = (moved * expected).sum(axis=0)
+    size = np.sqrt(power * (moved**2).sum(axis=0))
+    if not (size > 0).all():
+        return None
+    correlation, factors = inner / size, inner / power
+    factor = float(inner.sum() / power.sum())
+    if correlation.min() < _LIKE or np.abs(factors / factor - 1.0).max() > _SAME_RATIO:
+        return None
+    return Slope(factor, float(correlation.min()))
+
+
+def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | None,
+                  joints: Sequence[Joint] = ()) -> tuple[Guess, str]:
+    """The unit of the positions of turning joints, "" where it stays open, and further keys of the recipe (counts_per_rev, wrap).
+
+    `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot.
+    """
     span = float(np.ptp(q, axis=0).max())
     wrap = rollover(q)
     further = f", wrap = {wrap:g}" if wrap is not None else ""
     if named == "counts" or (named is None and span > 2000.0 and _whole(q)):
         return _counts(q, span, wrap, named)
-    if named in ("rad", "deg", "rev", "turn", "mm", "m"):
+    if named in ("rad", "mrad", "deg", "rev", "turn"):
         return Guess(named, "sure" if _possible(span, named) else "unsure",
                      f"named so; the largest range is {span:.4g} {named}"), further
-    if (found := _by_velocity(q, t, dq)) is not None:
+    if named is not None:
+        return unknown_unit(named), further
+    if slope is not None and (found := _by_velocity(slope)) is not None:
         return found, further
-    if span > 720.0:
-        return Guess("deg", "unsure",
-                     f"a range of {span:.5g} is neither an arm's in rad nor in deg: motor side, or counts?"), further
     if turns := quarter_turns(q):
         return Guess("rad", "likely", f"starts at {', '.join(f'{x}' for x in turns.values())} times pi/2: "
                      "motor side, and these are likely its gear ratios for [drive]"), further
-    if span > 4.0 * math.pi:
-        return Guess("deg", "unsure",
-                     f"a range of {span:.4g} is too much for a joint in rad; or motor side in rad, then [drive]"), further
-    speed = float(np.abs(np.diff(q, axis=0) / np.diff(t)[:, None]).max()) if t is not None and (np.diff(t) > 0).all() else math.nan
-    why = f"ranges up to {span:.3g}" + (f", speeds up to {speed:.3g} a second" if math.isfinite(speed) else "")
-    return Guess("rad", "likely", f"{why}: a joint's in rad, hardly a movement in deg"), further
+    if _whole(q) and span > 10.0:
+        return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
+    return _by_limits(q, t, joints) or _by_size(q, t, span), further
+
+
+def unknown_unit(named: str) -> Guess:
+    """An open unit: what the file says is no unit of the signal."""
+    return Guess("", "unsure", f"its name or header says '{named}', which is no unit that import knows here")
+
+
+def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | None:
+    """The unit under which the motion keeps the robot's limits."""
+    limited = [(j, joint) for j, joint in enumerate(joints) if all(map(math.isfinite, joint.position))]
+    if not limited or len(joints) != q.shape[1]:
+        return None
+
+    def inside(factor: float) -> bool:
+        for j, joint in limited:
+            low, high = joint.position
+            slack = 0.05 * (high - low)
+            if factor * q[:, j].min() < low - slack or factor * q[:, j].max() > high + slack:
+                return False
+        return True
+
+    if inside(1.0):
+        return Guess("rad", "likely", f"inside the robot's limits in rad; the largest range is {np.ptp(q, axis=0).max():.3g}")
+    if inside(math.pi / 180.0):
+        return Guess("deg", "likely", "beyond the robot's limits in rad, inside them in deg")
+    return Guess("", "unsure", "outside the robot's limits in rad and in deg: motor side, counts, or another robot?")
+
+
+def _by_size(q: Array, t: Array | None, span: float) -> Guess:
+    """The unit by what a joint can do, where no limits are known."""
+    far = float(np.abs(q).max())
+    if far <= 2.05 * math.pi:
+        speed = (float(np.abs(np.diff(q, axis=0) / np.diff(t)[:, None]).max())
+                 if t is not None and (np.diff(t) > 0).all() else math.nan)
+        why = f"ranges up to {span:.3g}" + (f", speeds up to {speed:.3g} a second" if math.isfinite(speed) else "")
+        return Guess("rad", "likely", f"{why}: a joint's in rad, hardly a movement in deg")
+    if far <= 720.0:
+        return Guess("", "unsure", f"up to {far:.4g}: more than a turn in rad, so deg? or the motor's side in rad, then [drive]")
+    return Guess("", "unsure", f"up to {far:.5g}: neither an arm's in rad nor in deg; motor side, or counts?")
+
+
+def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
+    """The unit of the position of one sliding joint, "" where it stays open."""
+    if named in ("m", "mm", "um"):
+        return Guess(named, "sure", "named so")
+    if named is not None:
+        return unknown_unit(named)
+    low, high = joint.position
+    if math.isfinite(low) and math.isfinite(high):
+        slack = 0.05 * (high - low)
+        for unit, factor in (("m", 1.0), ("mm", 1e-3)):
+            if factor * q.min() >= low - slack and factor * q.max() <= high + slack:
+                return Guess(unit, "likely", f"inside the limits of sliding joint '{joint.name}' in {unit}")
+    return Guess("", "unsure", f"'{joint.name}' slides: m or mm?")
 
 
 def quarter_turns(q: Array) -> dict[int, int]:
@@ -90,44 +198,61 @@ def held(tau: Array, q: Array) -> Guess:
 
 
 def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tuple[Guess, str]:
-    resolution = wrap if wrap is not None else min(_RESOLUTIONS, key=lambda r: abs(span - r))
     why = "named so" if named else f"whole numbers over a range of {span:.5g}"
     if wrap is not None:
         return (Guess("counts", "sure" if named else "likely", f"{why}; it starts again after {wrap:g}, taken as one revolution"),
-                f", counts_per_rev = {resolution:g}, wrap = {wrap:g}")
-    return (Guess("counts", "likely" if named else "unsure",
-                  f"{why}; counts_per_rev {resolution:g} is the usual number nearest to the range of {span:.5g}; "
-                  "add wrap where the counter starts again"),
-            f", counts_per_rev = {resolution:g}")
+                f", counts_per_rev = {wrap:g}, wrap = {wrap:g}")
+    near = min(_RESOLUTIONS, key=lambda r: abs(span - r))
+    if abs(span / near - 1.0) < _ONE_TURN:
+        return (Guess("counts", "likely", f"{why}; the range of {span:.5g} is likely one revolution of {near}; "
+                      "add wrap where the counter starts again"), f", counts_per_rev = {near}")
+    return (Guess("counts", "likely" if named else "unsure", f"{why}; the counts of a revolution are in the encoder's data sheet"),
+            f', counts_per_rev = "{BLANK}"')
 
 
-def _by_velocity(q: Array, t: Array | None, dq: Array | None) -> Guess | None:
-    """Where a velocity was recorded, the slope of the position says how their units go together."""
-    if t is None or dq is None or not (np.diff(t) > 0).all():
+def _by_velocity(slope: Slope) -> Guess | None:
+    """The unit that the recorded velocity decides: where both have one unit of angle it decides nothing."""
+    near = min(ANGULAR_RATIOS, key=lambda ratio: abs(math.log(slope.factor / ratio)) if slope.factor > 0 else math.inf)
+    unit, speed = ANGULAR_RATIOS[near]
+    if slope.factor <= 0 or abs(slope.factor / near - 1.0) > 0.1 or not unit:
         return None
-    slope = np.gradient(q, t, axis=0)
-    factor = float((slope * dq).sum() / max(float((dq * dq).sum()), 1e-300))
-    names = {1.0: "rad", 180.0 / math.pi: "deg", 1.0 / 60.0: "rev"}
-    near = min(names, key=lambda f: abs(math.log(abs(factor) / f)) if factor > 0 else math.inf)
-    if factor <= 0 or abs(factor / near - 1.0) > 0.1:
-        return None
-    peak = float(np.abs(dq).max())
-    if near == 1.0 and peak > 50.0:
-        return Guess("deg", "likely", f"its slope is the recorded velocity, which reaches {peak:.4g}: deg/s, not rad/s")
-    other = {"rad": "rad/s", "deg": "rad/s", "rev": "rpm"}[names[near]]
-    return Guess(names[near], "likely",
-                 f"its slope is {factor:.4g} times the recorded velocity (up to {peak:.3g}), as with {names[near]} and {other}")
+    return Guess(unit, "likely", f"its slope is {slope.factor:.4g} times the recorded velocity, as with {unit} and {speed}")
 
 
-def torque_unit(tau: Array, named: str | None, current: bool) -> Guess:
-    """The unit of torques: by name, else by size alone, which cannot be sure."""
-    peak = float(np.abs(tau).max())
-    if named in ("A", "mA", "N m", "mN m"):
+def velocity_unit(slope: Slope, position: str) -> str:
+    """The unit of a velocity by that of the position whose slope it is, "" where their ratio fits none."""
+    near = min(ANGULAR_RATIOS, key=lambda ratio: abs(math.log(slope.factor / ratio)) if slope.factor > 0 else math.inf)
+    if slope.factor <= 0 or abs(slope.factor / near - 1.0) > 0.1:
+        return ""
+    unit, speed = ANGULAR_RATIOS[near]
+    same = {"rad": "rad/s", "deg": "deg/s", "m": "m/s", "mm": "mm/s", "rev": "rev/s", "turn": "rev/s"}
+    return same.get(position, "") if not unit else speed if unit == position else ""
+
+
+def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[float] = ()) -> Guess:
+    """The unit of torques, "" where it stays open: by name, by the robot's limits of effort, by size.
+
+    `limits` holds the joints' limits of effort [N m], infinite where it has no limit.
+    """
+    peaks = np.abs(tau).max(axis=0)
+    peak = float(peaks.max())
+    if named is not None and (named in ("A", "mA") or named.endswith("N m") or named.endswith("N")):
         return Guess(named, "sure", f"named so; up to {peak:.4g} {named}")
+    if named is not None:
+        return unknown_unit(named)
+    if current and (_whole(tau) or 60.0 < peak <= 200.0):
+        return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or the drive's own unit?")
     if current:
         return Guess("mA" if peak > 200.0 else "A", "likely", f"named a current; up to {peak:.4g}")
+    if _whole(tau) and peak > 20.0:
+        return Guess("", "unsure", f"whole numbers up to {peak:.5g}: the drive's own, such as per mille of the rated torque?")
+    use = max((float(p / limit) for p, limit in zip(peaks, limits, strict=False) if math.isfinite(limit)), default=math.nan)
+    if use > 2.0 or use < 0.002:
+        return Guess("", "unsure", f"up to {peak:.4g}, {use:.3g} times the robot's limit of effort: not N m of the joints?")
+    if math.isfinite(use):
+        return Guess("N m", "likely", f"up to {peak:.4g}, {100 * use:.3g} % of the robot's limit of effort at most")
     if peak > 1000.0:
-        return Guess("mN m", "unsure", f"up to {peak:.5g}: too much for N m of an arm")
+        return Guess("", "unsure", f"up to {peak:.5g}: too much for N m of most arms; mN m?")
     return Guess("N m", "unsure", f"up to {peak:.4g}; or a current in A, or motor side")
 
 
@@ -163,4 +288,4 @@ def _whole(q: Array) -> bool:
 
 
 def _possible(span: float, unit: str) -> bool:
-    return span <= {"rad": 400.0, "deg": 36000.0, "rev": 1e4, "turn": 1e4, "mm": 1e5, "m": 100.0}[unit]
+    return span <= {"rad": 400.0, "mrad": 4e5, "deg": 36000.0, "rev": 1e4, "turn": 1e4}[unit]

@@ -1,13 +1,15 @@
-"""Draft a recipe for a recording, with the evidence for every guess, so that a person can correct it in a minute.
+"""Draft a recipe for a recording, with the evidence for every guess, for a person to correct.
 
-The draft says what each number rests on: a name, a range, the agreement of a velocity with the slope of a position,
-jumps of one size, the sign of the power. What nothing in the file can tell is marked FILL IN; what is only likely is
+The draft says what each value rests on: a name, a limit of the robot beside the recording, the
+agreement of a velocity with the slope of a position, jumps of one size, the sign of the power. What
+neither names nor numbers decide is marked FILL IN, with the candidates; what is only likely is
 marked "check:".
 """
 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,24 +20,56 @@ import numpy as np
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
-from pipelines.log.recording.clock import plausible_units
-from pipelines.log.recording.column_roles import companion_of, named_unit, roles_of
+from pipelines.log.recording.clock_guess import SECONDS, unit_of_clock
+from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
+    Slope,
     held,
     motion_of,
     position_unit,
     quarter_turns,
     sign_of,
+    slide_unit,
     torque_unit,
+    velocity_unit,
 )
 from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.reading import (
+    BY_FILE,
+    WITHOUT_NAME,
+    Reading,
+    arm_beside,
+    companion_for,
+    matrix,
+    read_recording,
+    with_companion,
+)
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.recording.sources import read_table
+from pipelines.log.robot import Joint
+from pipelines.log.units import UNITS
 
 __all__ = ["Draft", "guess_recipe"]
 
+_MOST_COLUMNS = 2000
+_BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
+_ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
+name = "one-joint"
+gravity = [0.0, 0.0, -9.81]
+
+[robot.kinematics]
+convention = "dh"
+
+[[robot.joint]]
+name = "joint"
+type = "revolute"
+a = 0.0
+alpha = 0.0
+d = 0.0
+offset = 0.0
+"""
 
 
 @dataclass(frozen=True)
@@ -47,27 +81,33 @@ class Draft:
     blanks: tuple[str, ...]  # what must be filled in before it runs
 
 
-def guess_recipe(path: Path) -> Draft:
-    """A commented recipe for the recording in `path`, its companions in the same folder looked for as well.
+def guess_recipe(path: Path, robot: str | None = None) -> Draft:
+    """Return a commented recipe for the recording in `path`; companion files and the robot in its folder are used.
+
+    Args:
+        robot: description to use instead of the one beside the recording.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
-    table = _sound(read_table(path))
-    roles = roles_of(table, path)
-    both = "q" in roles and ("tau" in roles or "current" in roles)
-    companion = None if both else companion_of(path, table)
-    companion = _sound(companion) if companion is not None else None
-    if companion is not None and not np.array_equal(companion.rows, table.rows):
-        companion = None
-    if companion is not None and "q" not in roles:
-        table, companion, path = companion, table, path.parent / companion.source
-        roles = roles_of(table, path)
-    return _Drafting(path, table, roles, companion).draft()
+    table = read_table(path)
+    if len(table.columns) > _MOST_COLUMNS:
+        raise InputRejected("F16", f"{len(table.columns)} columns: too many to guess what each is", where=path,
+                            remedy="export the joints' signals alone, or write the recipe")
+    for column, period in table.cycles.items():
+        raise InputRejected("S11", f"column '{clean(column, 40)}' goes through {period} texts, again and again: one line a joint?",
+                            where=path, remedy="put the joints beside each other, one line a sample (a pivot of the table)")
+    table = _sound(table)
+    reading = read_recording(path, table, arm_beside(path.parent, robot))
+    companion = companion_for(reading)
+    if companion is not None:
+        companion = _sound(companion)
+        reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
+    return _Drafting(reading).draft()
 
 
 def _sound(table: RawTable) -> RawTable:
-    """The table without what a guess would stumble over: rows with a hole or an absurd number, columns of nothing else."""
+    """Leave out what would disturb a guess: rows with a hole or an absurd number, columns of nothing else."""
     usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) for name, values in table.columns.items()}
     columns = {name: values for name, values in table.columns.items() if usable[name].mean() > 0.8}
     keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
@@ -81,153 +121,267 @@ def _sound(table: RawTable) -> RawTable:
 class _Drafting:
     """Collects the lines of a draft. Not frozen: it is the pencil, the `Draft` is the result."""
 
-    def __init__(self, path: Path, table: RawTable, roles: dict[str, tuple[str, ...]], companion: RawTable | None) -> None:
-        self.path, self.table, self.roles, self.companion = path, table, roles, companion
+    def __init__(self, reading: Reading) -> None:
+        self.reading = reading
         self.evidence: list[str] = []
         self.blanks: list[str] = []
-        q = roles.get("q", ())
-        torque = roles.get("tau") or roles.get("current") or ()
-        self.n = len(q) or len(torque) or 1
-        self.torque_table = companion if companion is not None and not torque else table
-        self.torque = torque or (tuple(companion.columns)[: self.n] if companion is not None else ())
+        q, tau = reading.q.group, reading.tau.group
+        self.q = matrix(reading.table, q.columns) if q else None
+        self.tau = matrix(reading.torque_table, tau.columns) if tau else None
+        self.n = reading.joints
+        arm = reading.arm.robot
+        self.joints: tuple[Joint, ...] = arm.joints if arm is not None else ()
+        self.clock_unit, self.clock_guess = "", Guess("", "unsure", "")
+        self.t: Array | None = None  # [s]
+        if reading.clock is not None:
+            self.clock_unit, self.clock_guess = unit_of_clock(reading.clock, self.q, reading.slope)
+            factor = 1.0 if reading.clock.paired else SECONDS.get(self.clock_unit)
+            self.t = reading.clock.values * factor if factor is not None else None
+        self.current = tau is not None and tau.quantity == "current"
         self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
-        self.current = "tau" not in roles and "current" in roles
 
     def note(self, what: str, guess: Guess) -> str:
-        """The comment behind a guessed value: confidence, evidence, and what to check."""
-        self.evidence.append(f"{what}: {guess.value} ({guess.confidence}: {guess.why})")
-        return f"# {'check: ' if guess.confidence != 'sure' else ''}{guess.confidence}, {guess.why}"
+        """Return the comment behind a guessed value: confidence, evidence, and what to check."""
+        why = clean(guess.why, 300)
+        self.evidence.append(f"{what}: {guess.value or 'open'} ({guess.confidence}: {why})")
+        return f"# {'check: ' if guess.confidence != 'sure' else ''}{guess.confidence}, {why}"
 
     def blank(self, what: str) -> str:
         self.blanks.append(what)
         return BLANK
 
     def draft(self) -> Draft:
-        name = clean(self.path.name, 80)
-        columns = ", ".join(clean(c, 40) for c in self.table.columns)
-        lines = [f"# Drafted by `rrrid import --guess {name}`: {self.table.rows.size} samples, columns {columns}.",
-                 f"# Go through every \"check:\" and fill in what says {BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
-                 ""]
+        table = self.reading.table
+        name = clean(self.reading.path.name, 80)
+        columns = ", ".join(clean(c, 40) for c in table.columns)
+        lines = [f"# Drafted by `rrrid import --guess {name}`: {table.rows.size} samples, columns {columns}."]
+        lines += [f"# {clean(check.message, 200)}." for check in table.checks if check.level != "ok"]
+        lines += [f"# Go through every \"check:\" and fill in what says {BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
+                  ""]
         lines += [*self._robot(), *self._log(), *self._time(), *self._signals(), *self._drive(), *self._resample()]
         return Draft("\n".join(lines) + "\n", tuple(self.evidence), tuple(self.blanks))
 
     def _robot(self) -> list[str]:
-        urdf = next(iter(sorted(self.path.parent.glob("*.urdf"))), None)
-        if urdf is not None:
-            return ["[robot]", f"use = {_quoted(urdf.name)}   # check: likely, the URDF beside the recording", ""]
-        if self.n == 1:
-            return ["[robot]                                 # check: one joint on a vertical axis, where gravity does no work",
-                    'name = "one-joint"', "gravity = [0.0, 0.0, -9.81]", "", "[robot.kinematics]", 'convention = "dh"', "",
-                    "[[robot.joint]]",
-                    'name = "joint"', 'type = "revolute"', "a = 0.0", "alpha = 0.0", "d = 0.0", "offset = 0.0", ""]
-        return ["[robot]",
-                f'use = "{self.blank("robot.use")}"   # the robot of {self.n} joints: robot.toml, a URDF, or a shipped name', ""]
+        arm = self.reading.arm
+        if len(arm.files) == 1:
+            why = "as --robot says" if arm.named else "check: likely, the robot beside the recording"
+            lines = ["[robot]", f"use = {_quoted(arm.files[0])}   # {why}"]
+            if arm.problem:
+                self.evidence.append(f"robot: {clean(arm.problem, 300)}")
+                lines.append(f"# {clean(arm.problem, 300)}")
+                if "tip_link" in arm.problem:
+                    lines.append(f'tip_link = "{self.blank("robot.tip_link")}"')
+            return [*lines, ""]
+        known = self.reading.q.group or self.reading.tau.group
+        if not arm.files and known and self.n == 1:
+            return _ONE_JOINT.split("\n")
+        which = "robot.toml, a URDF, or a shipped name"
+        if arm.files:
+            which = f"one of {', '.join(clean(file, 40) for file in arm.files)}"
+        joints = f" of {self.n} joints" if known else ""
+        return ["[robot]", f'use = "{self.blank("robot.use")}"   # the robot{joints}: {which}', ""]
 
     def _log(self) -> list[str]:
-        return ["[log]", f"match = {_quoted(self.path.name)}      # a pattern such as \"run_{{number}}.csv\" takes many files",
+        name = _quoted(self.reading.path.name)
+        return ["[log]", f"match = {name}      # a pattern such as \"run_{{number}}.csv\" takes many files",
                 'experiment = "free"                     # check: friction | excitation | writing | frf | hold | free',
                 'role = "identify"                       # check: identify | validate | reference',
                 self._held(), ""]
 
     def _held(self) -> str:
-        """`torque = …`: by the name of its columns, else by whether it is held over samples."""
-        name = next((c for c in self.torque if re.search(r"cmd|command|setpoint|soll|desired|target", c.lower())), None)
-        if not self.torque:
-            guess = Guess("measured", "unsure", 'no column of torque was found; "held-command" where the drive was commanded')
+        """Return `torque = …`: by the name of its columns, else by whether it is held over samples."""
+        group = self.reading.tau.group
+        if group is None:
+            guess = Guess("measured", "unsure", 'the torque is open; "held-command" where the drive was commanded')
+        elif group.origin == "commanded":
+            guess = Guess("held-command", "likely", f"column '{clean(group.columns[0], 40)}' is named a command")
         elif self.current:
             guess = Guess("measured", "likely", "a current is sampled like the position")
-        elif name is not None:
-            guess = Guess("held-command", "likely", f"column '{clean(name, 40)}' is named a command")
+        elif group.origin == "measured":
+            guess = Guess("measured", "sure", f"column '{clean(group.columns[0], 40)}' is named a measurement")
         else:
-            q = self.roles.get("q", ())
-            tau = np.column_stack([self.torque_table.columns[c] for c in self.torque])
-            guess = held(tau, np.column_stack([self.table.columns[c] for c in q]) if q else tau)
+            assert self.tau is not None
+            guess = held(self.tau, self.q if self.q is not None else self.tau)
         return f'torque = "{guess.value}"   {self.note("torque", guess)}'
 
     def _time(self) -> list[str]:
-        if "t" not in self.roles:
-            self.evidence.append("rate: no column of time")
-            self.blanks.append("time.rate")
-            lines = ["[time]", f'rate = "{BLANK}"                        # Hz; no column rises steadily, so only you know it']
-            return [*lines, *self._map_hint(), ""]
-        column = self.roles["t"][0]
-        guess = self._time_unit(column)
-        return ["[time]", f"column = {_quoted(column)}", f"unit = \"{guess.value}\"   {self.note('time unit', guess)}", ""]
+        clock = self.reading.clock
+        if clock is None:
+            return self._rate()
+        if clock.paired:
+            return ["[time]", f"column = [{', '.join(map(_quoted, clock.columns))}]",
+                    f'unit = ["{clock.units[0]}", "{clock.units[1]}"]   {self.note("time unit", self.clock_guess)}', ""]
+        lines = ["[time]", f"column = {_quoted(clock.columns[0])}"]
+        unit = self.clock_unit or self.blank("time.unit")
+        lines.append(f'unit = "{unit}"   {self.note("time unit", self.clock_guess)}')
+        if self.clock_unit == "sample":
+            lines.append(f'rate = "{self.blank("time.rate")}"   # Hz')
+        return [*lines, ""]
+
+    def _rate(self) -> list[str]:
+        """Return [time] without a column: the rate, which a recorded velocity may show."""
+        slope = self.reading.slope
+        rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
+        near = _round_number(rate) if math.isfinite(rate) else None
+        if near is not None:
+            guess = Guess(f"{near:g} Hz", "likely", f"the recorded velocity is {rate:.5g} times the step of the position from "
+                          "sample to sample, if both are in one unit of angle")
+            return ["[time]", f"rate = {near:g}   {self.note('rate', guess)}", ""]
+        self.evidence.append("rate: no column of time")
+        self.blanks.append("time.rate")
+        return ["[time]", f'rate = "{BLANK}"                        # Hz; no column rises steadily, so only you know it',
+                *self._map_hint(), ""]
 
     def _map_hint(self) -> list[str]:
         """Positions that rise in even steps without a clock are a map rather than a motion."""
-        q = self.roles.get("q", ())
-        steps = np.diff(self.table.columns[q[0]]) if len(q) == 1 else np.zeros(0)
-        if steps.size < 10 or not ((steps > 0).all() or (steps < 0).all()) or np.std(steps) > 0.2 * abs(np.mean(steps)):
+        group = self.reading.q.group
+        steps = np.diff(self.q[:, 0]) if self.q is not None and self.q.shape[1] == 1 else np.zeros(0)
+        even = (steps > 0).all() or (steps < 0).all()
+        if group is None or steps.size < 10 or not even or np.std(steps) > 0.2 * abs(np.mean(steps)):
             return []
         self.evidence.append("positions rise in even steps without a clock: a map")
-        return [f"# check: likely a map and no log, {clean(q[0], 40)} goes on in even steps of {np.mean(steps):.4g};",
+        name, file = clean(group.columns[0], 40), _quoted(self.reading.path.name)
+        return [f"# check: likely a map and no log, {name} goes on in even steps of {np.mean(steps):.4g};",
                 "#     then delete [log], [time] and [signals], and write",
-                f"#     [[table]] match = {_quoted(self.path.name)}, columns = {{ position = {{ column = …, unit = … }}, … }}"]
-
-    def _time_unit(self, column: str) -> Guess:
-        steps = np.diff(self.table.columns[column])
-        median = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-        rate = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
-        named = named_unit(column, self.table)
-        fits = [unit for unit in plausible_units(median) if 10.0 <= 1.0 / (median * rate[unit]) <= 2e4] or plausible_units(median)
-        if named in rate and named in fits:
-            return Guess(named, "sure", f"named so, and a median step of {median:.4g} makes {1 / (median * rate[named]):.4g} Hz")
-        if len(fits) == 1:
-            return Guess(fits[0], "likely",
-                         f"a median step of {median:.4g} makes {1 / (median * rate[fits[0]]):.4g} Hz; every other unit is absurd")
-        best = fits[0] if fits else self.blank("time.unit")
-        return Guess(best, "unsure", f"a median step of {median:.4g} could be {', '.join(fits) or 'a sample index'}")
-
-    def seconds(self) -> Array | None:
-        if "t" not in self.roles:
-            return None
-        column = self.roles["t"][0]
-        factor = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}.get(self._time_unit(column).value, 1.0)
-        return self.table.columns[column] * factor
+                f"#     [[table]] match = {file}, columns = {{ position = {{ column = …, unit = … }}, … }}"]
 
     def _signals(self) -> list[str]:
-        lines = ["[signals]"]
-        q = self.roles.get("q", ())
-        if q:
-            values = np.column_stack([self.table.columns[c] for c in q])
-            dq = self.roles.get("dq", ())
-            speed = np.column_stack([self.table.columns[c] for c in dq]) if len(dq) == len(q) else None
-            named = named_unit(q[0], self.table)
-            guess, extra = position_unit(values, self.seconds(), speed, named)
-            self.ratios = quarter_turns(values) if guess.value == "rad" and "times pi/2" in guess.why else {}
-            lines += [f"q = {{ {_columns(q)}, unit = \"{guess.value}\"{extra} }}", f"    {self.note('q unit', guess)}"]
-            lines += [f"    {comment}" for comment in motion_of(values, guess.value)]
-        else:
-            lines.append(f'q = {{ columns = "{self.blank("signals.q")}", unit = "{BLANK}" }}')
-        return [*lines, *self._torque(), ""]
+        return ["[signals]", *self._position(), *self._velocity(), *self._torque(), ""]
+
+    def _position(self) -> list[str]:
+        choice = self.reading.q
+        if choice.group is None or self.q is None or self._out_of_order(choice.group):
+            return self._open("q", choice)
+        units, further, why = self._position_units(choice.group)
+        if BLANK in further:
+            self.blanks.append("signals.q.counts_per_rev")
+        lines = [f"q = {{ {_columns(choice.group.columns, self.reading.table)}, unit = {self._units('q', units)}{further} }}"]
+        lines += [f"    {self.note('q unit', guess)}" for guess in why]
+        lines += [f"    {comment}" for comment in (*self._order(choice.group), *motion_of(self.q, units[0]))]
+        return [*lines, *_also(choice, self.reading.table)]
+
+    def _position_units(self, group: Group) -> tuple[list[str], str, list[Guess]]:
+        """Return the unit of each joint, further keys of the recipe, and the reasons."""
+        assert self.q is not None
+        named = unit_of_group(group.columns, self.reading.table)
+        turning = [j for j in range(self.n) if not self.joints or self.joints[j].revolute]
+        units, why, further = [""] * self.n, [], ""
+        if turning:
+            # A velocity decides the unit of angle once the unit of time is known.
+            slope = self.reading.slope
+            if slope is not None and self.clock_unit in SECONDS and not (self.reading.clock and self.reading.clock.paired):
+                slope = Slope(slope.factor / SECONDS[self.clock_unit], slope.correlation)
+            elif self.t is None:
+                slope = None
+            joints = [self.joints[j] for j in turning] if self.joints else ()
+            guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints)
+            for j in turning:
+                said = named[j] or ""
+                units[j] = said if said in UNITS or said == "counts" else guess.value
+            why.append(guess)
+            if guess.value == "rad" and "times pi/2" in guess.why:
+                self.ratios = quarter_turns(self.q)
+        for j in (j for j in range(self.n) if j not in turning):
+            guess = slide_unit(self.q[:, j], named[j], self.joints[j])
+            units[j] = guess.value
+            why.append(guess)
+        return units, further, why
+
+    def _units(self, signal: str, units: Sequence[str]) -> str:
+        """Return the unit in TOML: one text, or one a joint where they differ; FILL IN where one is open."""
+        if "" in units:
+            self.blanks.append(f"signals.{signal}.unit")
+        words = [unit or BLANK for unit in units]
+        return f'"{words[0]}"' if len(set(words)) == 1 else f"[{', '.join(map(_quoted, words))}]"
+
+    def _out_of_order(self, group: Group) -> bool:
+        """Tell whether the order of the joints is open: words that are not the robot's, in no order from base to tip."""
+        if group.order != "file" or len(group.columns) < 2 or self.reading.by_evidence:
+            return group.order == "text"
+        lower = [column.lower() for column in group.columns]
+        ranks = [next((k for k, part in enumerate(_BASE_TO_TIP) if part in name), -1) for name in lower]
+        return -1 in ranks or ranks != sorted(ranks) or lower == sorted(lower)
+
+    def _order(self, group: Group) -> list[str]:
+        if group.order == "robot":
+            return ["# in the order of the robot's joints, by their names"]
+        if group.order == "file" and len(group.columns) > 1:
+            return ["# check: the joints are taken in the order of the file, from the base to the tip"]
+        return []
+
+    def _velocity(self) -> list[str]:
+        """Return the line of a recorded velocity that is the slope of the position; nothing where none is."""
+        group, slope = self.reading.dq.group, self.reading.slope
+        if group is None or slope is None or self.t is None or self.q is None or not self.reading.q.group:
+            return []
+        if any(joint.type != "revolute" for joint in self.joints) or self._out_of_order(group) or (
+                self.reading.q.group.order != group.order):
+            return []
+        clock = self.reading.clock
+        factor = slope.factor if clock is None or clock.paired else slope.factor / SECONDS[self.clock_unit]
+        named = unit_of_group(group.columns, self.reading.table)[0]
+        unit = velocity_unit(Slope(factor, slope.correlation), self._position_units(self.reading.q.group)[0][0])
+        if not unit or named not in (None, unit):
+            return []
+        guess = Guess(unit, "likely", f"the position's slope is {factor:.4g} times it; remove the line where it was not measured")
+        columns = _columns(group.columns, self.reading.table)
+        return [f"dq = {{ {columns}, unit = {_quoted(unit)} }}", f"    {self.note('dq unit', guess)}"]
 
     def _torque(self) -> list[str]:
-        if not self.torque:
-            return [f'tau = {{ columns = "{self.blank("signals.tau")}", unit = "{BLANK}" }}   # no column looks like it']
-        values = np.column_stack([self.torque_table.columns[c] for c in self.torque])
-        named = named_unit(self.torque[0], self.torque_table)
-        guess = torque_unit(values, named, self.current)
+        choice, table = self.reading.tau, self.reading.torque_table
+        if choice.group is None or self.tau is None or self._out_of_order(choice.group):
+            return self._open("tau", choice)
+        named = unit_of_group(choice.group.columns, table)
+        limits = [joint.torque for joint in self.joints]
+        guess = torque_unit(self.tau, named[0], self.current, limits)
+        peak = f"up to {np.abs(self.tau).max():.4g}"
+        if choice.group.words == WITHOUT_NAME:
+            guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
+        elif choice.group.words == BY_FILE and guess.confidence != "sure":
+            guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
         self.current = guess.value in ("A", "mA")
-        file = f", file = {_quoted(self.torque_table.source)}" if self.torque_table is not self.table else ""
-        lines = [f"tau = {{ {_columns(self.torque)}, unit = \"{guess.value}\"{file} }}", f"    {self.note('tau unit', guess)}"]
-        q = self.roles.get("q", ())
-        if len(q) == len(self.torque):
-            lines.append(f"    {self.note('sign', sign_of(np.column_stack([self.table.columns[c] for c in q]), values))}")
-        return lines
+        units = [unit if unit is not None and unit in UNITS else guess.value for unit in named]
+        if guess.value == "N m" and self.joints:
+            units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]
+        file = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
+        lines = [f"tau = {{ {_columns(choice.group.columns, table)}, unit = {self._units('tau', units)}{file} }}",
+                 f"    {self.note('tau unit', guess)}", *(f"    {line}" for line in self._order(choice.group))]
+        if self.q is not None and self.q.shape == self.tau.shape:
+            lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
+        return [*lines, *_also(choice, self.reading.table)]
+
+    def _open(self, signal: str, choice: Choice) -> list[str]:
+        """Return a blank line with the candidates."""
+        lines = [f'{signal} = {{ columns = "{self.blank(f"signals.{signal}")}", unit = "{BLANK}" }}']
+        found = [*([choice.group] if choice.group else []), *choice.others]
+        if not found:
+            lines[0] += "   # no column looks like it"
+            return lines
+        self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
+        texts = ", ".join(clean(text, 40) for text in texts_of(self.reading.table, ())) if found[0].order == "text" else ""
+        order = f"these are {texts}" if texts else "in the order of the file"
+        ask = f"{order}; write them from the base to the tip"
+        return [*lines, *(f"    # {ask if g is choice.group else 'candidate'}: {_columns(g.columns, self.reading.table)}"
+                         for g in found[:8])]
 
     def _drive(self) -> list[str]:
         ratios = [str(abs(self.ratios[j])) + ".0" if j in self.ratios else f'"{BLANK}"' for j in range(self.n)]
         if self.ratios:
             if len(self.ratios) < self.n:
                 self.blanks.append("drive.transmission")
-            unknown = f"; those marked {BLANK} stood near zero: from the data sheet" if len(self.ratios) < self.n else ""
+            unknown = f"; those marked {BLANK} were near zero: from the data sheet" if len(self.ratios) < self.n else ""
             lines = ["[drive]                  # check: likely, positions start at these numbers of quarter turns: motor side",
                      f"transmission = [{', '.join(ratios)}]   # check: sign, + where motor and joint turn alike{unknown}"]
             if self.current:
                 self.blanks.append("drive.torque_constant")
                 lines.append(f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet')
             return [*lines, ""]
+        group = self.reading.q.group
+        if group and group.motor and "theta" not in group.words and not self.joints_side():
+            self.blanks.append("drive.transmission")
+            lines = ["[drive]                  # positions are named the motor's: q_motor = N q_joint, tau_joint = N^T tau_motor",
+                     f'transmission = "{BLANK}"   # gear ratio of each joint; remove [drive] where they are the joints\'']
+            return [*lines, *([f'torque_constant = "{self.blank("drive.torque_constant")}"'] if self.current else []), ""]
         lines = ["# [drive]                # where numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
                  f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
         if not self.current:
@@ -236,11 +390,17 @@ class _Drafting:
         return ["[drive]", f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet',
                 f"# transmission = [{', '.join(['100.0'] * self.n)}]   # where numbers are motor side: q_motor = N q_joint", ""]
 
+    def joints_side(self) -> bool:
+        """Tell whether positions that are named the motor's are inside the limits of the robot's joints, in some unit."""
+        if not self.joints or self.q is None:
+            return False
+        group = self.reading.q.group
+        return group is not None and "" not in self._position_units(group)[0]
+
     def _resample(self) -> list[str]:
-        t = self.seconds()
-        if t is None:
+        if self.t is None:
             return []
-        steps = np.diff(t)
+        steps = np.diff(self.t)
         median = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
         uneven = float(np.percentile(np.abs(steps - median), 95)) / median
         if uneven < 0.05:
@@ -253,17 +413,30 @@ class _Drafting:
         return ["[resample]", f"rate = {rate:g}   {self.note('resample', guess)}", 'method = "spline"']
 
 
+def _also(choice: Choice, table: RawTable) -> list[str]:
+    """Return comments that name the other columns of that quantity."""
+    return [f"    # also there: {group.words} ({group.quantity}, {group.origin}), {_columns(group.columns, table)}"
+            for group in choice.others[:6] if not group.partial]
+
+
 def _round_below(rate: float) -> float:
     decade = 10.0 ** np.floor(np.log10(rate))
     return float(max(m for m in (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0) if m * decade <= rate * (1 + 1e-9)) * decade)
 
 
-def _columns(names: Sequence[str]) -> str:
-    """columns = "q_{j}" where the names count from 1, else a list."""
+def _round_number(rate: float) -> float | None:
+    """Return the rate as recorders are set to, where it is within half a per cent of one."""
+    below = _round_below(1.005 * rate)
+    return below if abs(rate / below - 1.0) < 5e-3 else None
+
+
+def _columns(names: Sequence[str], table: RawTable) -> str:
+    """Return columns = "q_{j}" where the names count from 1, and no further column of `table` goes on, else a list."""
     if len(names) == 1:
         return f"column = {_quoted(names[0])}"
     pattern = re.sub(r"1(?!.*1)", "{j}", names[0])
-    if "{j}" in pattern and all(pattern.replace("{j}", str(j)) == name for j, name in enumerate(names, start=1)):
+    counted = [pattern.replace("{j}", str(j)) for j in range(1, len(names) + 2)]
+    if "{j}" in pattern and counted[:-1] == list(names) and counted[-1] not in table.columns:
         return f"columns = {_quoted(pattern)}"
     return f"columns = [{', '.join(map(_quoted, names))}]"
 

@@ -27,6 +27,8 @@ class RawTable:
     units: Mapping[str, str] = field(default_factory=dict)  # what a header says
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # matrix -> its columns
     text: Mapping[str, str] = field(default_factory=dict)  # columns that are not numbers -> an example
+    labels: Mapping[str, str] = field(default_factory=dict)  # those of them that hold one text throughout -> that text
+    cycles: Mapping[str, int] = field(default_factory=dict)  # columns of text that repeat -> after how many samples
     lines: npt.NDArray[np.int64] | None = None  # (samples,) line numbers, in a text file
     breaks: tuple[int, ...] = ()  # index of the first sample after damage: the clock of a fixed rate is lost there
     checks: tuple[Check, ...] = ()
@@ -59,12 +61,12 @@ class RawTable:
 
     def _remedy(self, column: str, wanted: str) -> str:
         """Which columns could be meant: by their names, those of the signal that was asked for."""
-        from pipelines.log.recording.column_roles import role_of
+        from pipelines.log.recording.column_names import signal_of
 
         if not wanted:
             return "correct the recipe"
         signal = wanted.rpartition("_")[0] or wanted
-        fitting = [name for name in self.columns if role_of(name) == signal]
+        fitting = [name for name in self.columns if signal_of(name) == signal]
         near = difflib.get_close_matches(column, fitting or list(self.columns), n=1) or fitting[:1]
         if not near:
             return f"correct the recipe, or pass --map {wanted}='…' with the column of {wanted}"
@@ -165,13 +167,3 @@ def _upright(name: str, array: npt.NDArray[np.generic], source: str, checks: lis
         return matrix.T
     raise InputRejected("S11", f"'{name}' has shape {matrix.shape}: which side is time cannot be told", where=source,
                         remedy="store one row a sample, with many more samples than columns")
-
-
-def header_unit(name: str) -> tuple[str, str]:
-    """("q1", "deg") from "q1 [deg]" or "q1 (deg)"; the unit is empty where the header says none."""
-    text = name.strip()
-    stem, bracket, rest = text.rpartition(max("[(", key=text.rfind))
-    unit = rest[:-1].strip()
-    if bracket and stem.strip() and rest[-1:] in ("]", ")") and 0 < len(unit) <= 20 and not set(unit) & set("[]()"):
-        return stem.strip(), unit
-    return text, ""

@@ -12,7 +12,7 @@ The shortest recipe, one log a file, everything SI:
 
     [time]
     column = "t"                            # or rate = 1000 [Hz], or sample_time = 0.001 [s], where no column is
-    unit = "s"
+    unit = "s"                              # two columns are added: column = ["sec", "nanosec"], unit = ["s", "ns"]
 
     [signals]
     q   = { columns = "q_{j}", unit = "rad" }
@@ -79,11 +79,21 @@ class LogSpec:
 
 @dataclass(frozen=True)
 class TimeSpec:
-    """`[time]`: a column and its unit, or a rate. Both: the rate checks the column, or finds its unit."""
+    """`[time]`: a column and its unit, or a rate. Both: the rate checks the column, or finds its unit.
+
+    Two columns, such as ["sec", "nanosec"], are added, each in its own unit: ["s", "ns"].
+    """
 
     __pydantic_config__ = _STRICT
-    column: str | int | None = None
-    unit: str | None = None  # s, ms, us, ns, min, or "sample" (needs rate)
+    column: str | int | tuple[str | int, ...] | None = None
+    unit: Texts | None = None  # s, ms, us, ns, min, or "sample" (needs rate)
+
+    @property
+    def parts(self) -> tuple[tuple[str | int, str | None], ...]:
+        """The columns that are added, each with its unit."""
+        columns = self.column if isinstance(self.column, tuple) else () if self.column is None else (self.column,)
+        units = self.unit if isinstance(self.unit, tuple) else (self.unit,) * len(columns)
+        return tuple(zip(columns, units, strict=True))
     rate: float | None = None  # [Hz]
     sample_time: float | None = None  # [s]
     longest_gap: float | None = None  # [s] default 10 samples; a longer one ends a log. Resampling alone bridges more
@@ -96,7 +106,7 @@ class SignalSpec:
     __pydantic_config__ = _STRICT
     columns: Columns | None = None  # a list, a pattern such as "Joint_{j}", a 1-based number, or the name of a matrix
     column: Columns | None = None  # the same, for one joint
-    unit: str | None = None  # required: of the numbers as recorded; "counts" needs counts_per_rev
+    unit: Texts | None = None  # required: of the numbers as recorded, one or one a joint; "counts" needs counts_per_rev
     file: str | None = None  # in another file of the same recording: a name with {groups} and {stem}
     counts_per_rev: Numbers | None = None
     wrap: float | None = None  # the counter starts again after so much, in the recorded unit: unwrapped

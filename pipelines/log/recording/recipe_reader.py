@@ -10,7 +10,7 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
-from pipelines.errors import InputRejected, UsageError, did_you_mean
+from pipelines.errors import Gathering, InputRejected, UsageError, did_you_mean
 from pipelines.log import schema
 from pipelines.log.recording.dialect import TextFormat
 from pipelines.log.recording.recipe import (
@@ -60,7 +60,12 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     try:
         recipe = TypeAdapter(Recipe).validate_json(json.dumps(_plain(table)), strict=True)
     except ValidationError as problem:
-        raise _explain(problem.errors()[0], where) from None
+        found = Gathering()
+        # A value that may be of several types is complained of once a type: the first will do.
+        places = {str(_place(error)): error for error in reversed(problem.errors())}
+        found.found += [_explain(error, where) for error in reversed(places.values())]
+        found.raise_all()
+        raise  # never reached: there is an error at least
     except RecursionError:
         raise UsageError("C02", "the recipe is nested too deeply", where=where,
                          remedy="rrrid import --guess FILE drafts a recipe") from None
@@ -124,6 +129,11 @@ def _utc(value: object, what: str, where: object) -> str:
     return time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
 
 
+def _place(error: Any) -> list[Any]:
+    """Return the keys that lead to the value of a complaint, without the types that pydantic tried."""
+    return [part for part in error["loc"] if not (isinstance(part, str) and ("[" in part or part in ("str", "int", "float")))]
+
+
 _SECTIONS: Mapping[str, type] = {"log": LogSpec, "file": FileSpec, "time": TimeSpec, "signals": SignalSpec, "drive": DriveSpec,
                                  "resample": ResampleSpec,
                                  "missing": MissingSpec, "format": TextFormat, "controller": ControllerSpec, "table": TableSpec}
@@ -131,7 +141,7 @@ _SECTIONS: Mapping[str, type] = {"log": LogSpec, "file": FileSpec, "time": TimeS
 
 def _explain(error: Any, where: object) -> UsageError:
     """The first complaint of pydantic in our words, with the key it is about."""
-    path = [part for part in error["loc"] if not (isinstance(part, str) and ("[" in part or part in ("str", "int", "float")))]
+    path = _place(error)
     place = ".".join(f"[{part + 1}]" if isinstance(part, int) else str(part) for part in path).replace(".[", "[")
     if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         kind = Recipe if len(path) == 1 else ColumnSpec if "columns" in path[:-1] else _SECTIONS[str(path[0])]
@@ -226,7 +236,7 @@ def _meaning(recipe: Recipe, where: object) -> None:
         if (spec.columns is None) == (spec.column is None):
             raise UsageError("C02", f"'signals.{name}' needs columns (a list, a pattern or a name), once", where=where,
                              remedy='write columns = "q_{j}", or columns = ["a", "b", "c"]')
-        if spec.unit == "counts" and spec.counts_per_rev is None:
+        if "counts" in (spec.unit if isinstance(spec.unit, tuple) else (spec.unit,)) and spec.counts_per_rev is None:
             raise UsageError("C02", f"'signals.{name}' is in counts: counts_per_rev is missing", where=where,
                              remedy="add counts_per_rev")
     references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]
@@ -248,6 +258,10 @@ def _meaning(recipe: Recipe, where: object) -> None:
     if recipe.time.sample_time is not None and recipe.time.sample_time > 1.0:
         raise InputRejected("S09", f"time.sample_time is {recipe.time.sample_time:g} s: a rate?", where=where,
                             remedy=f"write rate = {recipe.time.sample_time:g}")
+    parts = recipe.time.column if isinstance(recipe.time.column, tuple) else ()
+    if isinstance(recipe.time.unit, tuple) and len(recipe.time.unit) != len(parts):
+        raise UsageError("C02", f"'time.unit' holds {len(recipe.time.unit)} units for {max(1, len(parts))} columns", where=where,
+                         remedy='give one unit a column: column = ["sec", "nanosec"], unit = ["s", "ns"]')
     if recipe.time.rate is not None and recipe.time.sample_time is not None:
         raise UsageError("C02", "'time' has both rate and sample_time", where=where, remedy="give one of them")
     if recipe.time.column is None and recipe.time.rate is None and recipe.time.sample_time is None:

@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected, NothingMatched, UsageError, did_you_mean
+from pipelines.errors import Check, Gathering, InputRejected, NothingMatched, UsageError, did_you_mean
 from pipelines.log.experiment import Array
 from pipelines.log.files import RECORDINGS
 from pipelines.log.recording import filenames
 from pipelines.log.recording.clock import time_of
 from pipelines.log.recording.joint_side import drive_of, si_of, unit_declared
 from pipelines.log.recording.raw import RawTable, expand
-from pipelines.log.recording.recipe import FileSpec, Recipe, TableSpec
+from pipelines.log.recording.recipe import FileSpec, Recipe, SignalSpec, TableSpec
 from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
 from pipelines.log.recording.repair import Recording
 from pipelines.log.recording.sources import read_table
@@ -83,8 +83,11 @@ def collect(recipe_name: str | Path, source: Path | None, robot: str | None, tel
     fits = filenames.matches([*(case.match for case in cases), *(spec.match for spec in recipe.table)], names, path)
     hits = {name: hit for name in names if (hit := _case(cases, fits, name)) is not None}
     companions = {other for name, (_, groups) in hits.items() for other in _files_of(recipe, groups, name, path) if other != name}
-    sources = [_source(case, groups, name, recipe, table_of, names, path)
-               for name, (case, groups) in hits.items() if name not in companions]
+    sources, problems = [], Gathering()
+    for name, (case, found) in hits.items():
+        with problems.part():
+            sources += [] if name in companions else [_source(case, found, name, recipe, table_of, names, path)]
+    problems.raise_all()
     tables = [(spec, fit[name], table_of(name)) for name in names
               for spec, fit in zip(recipe.table, fits[len(cases):], strict=True) if name in fit]
     if not sources and not tables:
@@ -214,7 +217,7 @@ class Assembled:
     """A recording before any repair: one part a clock, units as declared, columns as used."""
 
     recordings: tuple[Recording, ...]
-    units: Mapping[str, str]
+    units: Mapping[str, tuple[str, ...]]  # one a joint
     columns: Mapping[str, tuple[str, ...]]
     checks: tuple[Check, ...]
     undeclared: tuple[str, ...] = ()  # units that the recipe leaves open and where they come from, in words
@@ -229,33 +232,40 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
     recipe, n = material.recipe, material.robot.n_joints
     time = replace(recipe.time, column=mapped["t"][1]) if "t" in mapped else recipe.time
     checks: list[Check] = [check for table in source.tables.values() for check in table.checks]
-    units: dict[str, str] = {}
+    units: dict[str, tuple[str, ...]] = {}
     columns: dict[str, tuple[str, ...]] = {}
     recordings: list[Recording] = []
     undeclared: list[str] = []
+    problems = Gathering()
     for file, table in source.tables.items():
         here = [s for s in recipe.signals if _file_of(recipe, s, source.groups, source.primary, recipe.where) == file]
         for signal in here:
-            spec = recipe.signals[signal]
-            columns[signal] = expand(table, spec.where or 1, n, signal, mapped.get(signal))
-            units[signal] = unit_declared(signal, spec, table, columns[signal], assume_units, checks)
-            if spec.unit is None:
-                origin = "from the header" if any(c in table.units for c in columns[signal]) else "assumed, as --assume-units says"
-                undeclared.append(f"{signal}: unit {units[signal]} {origin}")
+            with problems.part():
+                columns[signal] = expand(table, recipe.signals[signal].where or 1, n, signal, mapped.get(signal))
+                units[signal] = unit_declared(signal, recipe.signals[signal], table, columns[signal], material.robot, assume_units,
+                                              checks)
+                undeclared += _undeclared(signal, recipe.signals[signal], units[signal], columns[signal], table)
         if not here and file != source.primary:
             continue
-        own_clock = time.column is None or file == source.primary or isinstance(time.column, int) or time.column in table.columns
-        open_unit = own_clock and time.column is not None and time.unit is None
-        if open_unit and (header := table.units.get(table.name_of(time.column or 1, "t"))):
-            undeclared.append(f"t: unit {header} from the header")
-        t, said = time_of(table, time, assume_units) if own_clock else (np.full(table.rows.size, np.nan), [])
+        own_clock = file == source.primary or all(isinstance(c, int) or c in table.columns for c, _ in time.parts)
+        t: Array = np.full(table.rows.size, np.nan)
+        said: list[Check] = []
+        with problems.part():
+            if own_clock and time.unit is None and len(time.parts) == 1 and (
+                    header := table.units.get(table.name_of(time.parts[0][0], "t"))):
+                undeclared.append(f"t: unit {header} from the header")
+            if own_clock:
+                t, said = time_of(table, time, assume_units)
         checks += said
+        if problems.found:
+            continue
         signals: dict[str, Array] = {s: np.column_stack([table.columns[c] for c in columns[s]]) for s in here}
         places = table.rows + 1 if table.lines is None else table.lines
         recordings.append(Recording(t, signals, {s: columns[s] for s in here}, places, table.source,
                                     time.column is not None and own_clock,
                                     "row" if table.lines is None else "line", table.breaks,
                                     {s: si_of(units[s], recipe.signals[s]) for s in here}))
+    problems.raise_all()
     begin = recipe.log.begin if source.case is None or source.case.begin is None else source.case.begin
     joined = tuple(_begun(one, begin, checks) for one in
                    _joined(recordings, list(source.tables.values()), time.column is not None, checks))
@@ -263,6 +273,14 @@ def assemble(source: Source, material: Material, mapped: Map, assume_units: bool
         raise InputRejected("T06", "the files have different time stamps", where=", ".join(source.tables),
                             remedy="add [resample] rate = … to bring them on one clock")
     return Assembled(joined, units, columns, tuple(checks), tuple(undeclared))
+
+
+def _undeclared(signal: str, spec: SignalSpec, units: tuple[str, ...], columns: tuple[str, ...], table: RawTable) -> list[str]:
+    """Say where the unit of a signal comes from that the recipe leaves open."""
+    if spec.unit is not None:
+        return []
+    origin = "from the header" if any(c in table.units for c in columns) else "assumed, as --assume-units says"
+    return [f"{signal}: unit {', '.join(dict.fromkeys(units))} {origin}"]
 
 
 def _begun(one: Recording, begin: float | None, checks: list[Check]) -> Recording:

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import Check, InputRejected
+from pipelines.errors import Check, Gathering, InputRejected
 from pipelines.log import limits as common
 from pipelines.log.experiment import Array
 from pipelines.log.limits import ABSURD, FEWEST, GAP_LIMIT, GAP_TICKS, LARGEST_JITTER, MOST_STEPS, percent, sentinels
@@ -85,7 +85,7 @@ def mend(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], t
 
 def _mark_missing(recording: Recording, missing: tuple[float, ...], checks: list[Check]) -> Recording:
     """D03: declared sentinels become NaN; infinite, absurd and undeclared sentinel-like numbers are refused."""
-    signals = {}
+    signals, problems = {}, Gathering()
     for name, values in recording.signals.items():
         values = values.copy()
         if missing:
@@ -95,8 +95,10 @@ def _mark_missing(recording: Recording, missing: tuple[float, ...], checks: list
                 checks.append(Check.of("D03", "repair", f"{count} numbers of {name} are declared missing values",
                                        where=recording.where, remedy="correct [missing] if these are samples"))
         for joint in range(values.shape[1]):
-            _refuse_absurd(recording, name, joint, values[:, joint])
+            with problems.part():
+                _refuse_absurd(recording, name, joint, values[:, joint])
         signals[name] = values
+    problems.raise_all()
     return replace(recording, signals=signals)
 
 
@@ -105,10 +107,10 @@ def _refuse_absurd(recording: Recording, name: str, joint: int, values: Array) -
     remedy = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
     if bad.size:
         raise InputRejected("D03", f"{values[bad[0]]:g} in {recording.listed(bad)}", where=recording.column(name, joint),
-                            remedy=remedy.format(f"{values[bad[0]]:g}"))
+                            remedy=remedy.format(repr(float(values[bad[0]]))))
     filler = np.flatnonzero(sentinels(values[:, None])[:, 0])
     if filler.size:
-        value = f"{values[filler[0]]:.12g}"
+        value = f"{values[filler[0]]:.17g}"
         raise InputRejected("D03", f"{value} in {recording.listed(filler)} looks like 'no sample': nothing else comes near it",
                             where=recording.column(name, joint), remedy=remedy.format(value))
 

@@ -1,4 +1,4 @@
-"""Read a recorded file by what it is, not by what it is called: text, NPY, MAT v5 or v7.3."""
+"""Read a recorded file by what it is, not by what it is called: text, JSON, NPY, MAT v5 or v7.3."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from pipelines.log.files import regular_file
 from pipelines.log.guard import Answer, guarded
 from pipelines.log.recording.arrays import read_npy
 from pipelines.log.recording.dialect import TextFormat
+from pipelines.log.recording.json_table import is_json, read_json
 from pipelines.log.recording.matlab import damaged, read_mat5, read_mat73
 from pipelines.log.recording.raw import RawTable, columns_of_arrays
 from pipelines.log.recording.tabular import read_text
@@ -23,8 +24,8 @@ from pipelines.log.recording.tabular import read_text
 __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
-_ENDINGS = {"npy": (".npy",), "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5"), "text": ()}
-_REFUSED = ((b"PAR1", "F06", "a Parquet file", "rrrid convert and inspect read logs; import reads CSV, MAT and NPY"),
+_ENDINGS = {"npy": (".npy",), "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5"), "json": (".json", ".jsonl"), "text": ()}
+_REFUSED = ((b"PAR1", "F06", "a Parquet file", "rrrid convert and inspect read logs; import reads CSV, JSON, MAT and NPY"),
             (b"PK\x03\x04", "X12", "an archive (zip, xlsx or npz)", "unpack it, or export the sheet as CSV"),
             (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
             (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"))
@@ -87,7 +88,7 @@ def _kind(data: bytes, source: str) -> str:
         return "mat73"
     if data.startswith(b"MATLAB 5.0") or _is_mat4(data, source):
         return "mat5"
-    return "text"
+    return "json" if is_json(data) else "text"
 
 
 def _is_mat4(data: bytes, source: str) -> bool:
@@ -97,6 +98,8 @@ def _is_mat4(data: bytes, source: str) -> bool:
 def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
     if kind == "text":
         return read_text(data, source, text)
+    if kind == "json":
+        return read_json(data, source)
     if kind == "npy":
         return columns_of_arrays(read_npy(data, source), source)
     if kind == "mat5":

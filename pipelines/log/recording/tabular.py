@@ -15,8 +15,10 @@ import numpy as np
 
 from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
+from pipelines.log.limits import FEWEST
 from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
-from pipelines.log.recording.raw import RawTable, header_unit
+from pipelines.log.recording.header import find_header, names_and_units
+from pipelines.log.recording.raw import RawTable
 
 __all__ = ["TextFormat", "read_text"]
 
@@ -24,7 +26,10 @@ Line = tuple[int, str]
 
 _MOST_DAMAGED = 10  # lines
 _DAMAGED_SHARE = 1e-3
+_MOST_JOINTS = 32
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
+_LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
+_TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
 _FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
 
@@ -45,16 +50,28 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
                             remedy="give delimiter and decimal under [format], or one row a sample")
     if (dialect.delimiter, dialect.decimal) not in ((",", "."), ("\t", "."), ("", ".")) and given.delimiter is None:
         checks.append(Check.of("F16", "warn", f"read as: {dialect.words}", where=source, remedy="say so under [format] to be sure"))
-    names, units, body = _header(lines, text, dialect, source, given, checks)
+    long = dialect.width >= max(_LONGEST_SIDE * len(lines), FEWEST) and given.header is None
+    if long and (turned := _transposed(lines, dialect, source, checks)) is not None:
+        return turned
+    header = find_header(lines, text, dialect, source, given.header)
+    names, units, body = header.names, header.units, lines[header.first :]
+    if header.skipped:
+        checks.append(Check.of("F16", "warn", f"{header.skipped} lines before the table left out",
+                               where=f"{source}, line {lines[0][0]}",
+                               remedy="give header or comment under [format] if these are data"))
     if not body:
         raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
-    kept, columns, words = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
+    kept, columns, words, labels = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
     lines_kept = np.array([number for number, _ in kept], dtype=np.int64)
     # Counted over the lines of data alone: an empty line or a comment between them loses no sample.
     rows = np.searchsorted(np.array([number for number, _ in body], dtype=np.int64), lines_kept)
     breaks = tuple(int(i) + 1 for i in np.flatnonzero(np.diff(rows) > 1))
-    return RawTable(source, columns, rows, units=units, text=words, lines=lines_kept, breaks=breaks, checks=tuple(checks),
-                    groups=_numbered(names))
+    for name in [name for name, values in columns.items() if name.startswith("column_") and np.isnan(values).all()]:
+        del columns[name]  # every line ends in a delimiter
+    clocks = {name: "s" for name in columns if name in labels and labels[name] is None}
+    return RawTable(source, columns, rows, units=units | clocks, text=words, lines=lines_kept, breaks=breaks, checks=tuple(checks),
+                    groups=_numbered(names), labels={name: label for name, label in labels.items() if isinstance(label, str)},
+                    cycles={name: label for name, label in labels.items() if isinstance(label, int)})
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
@@ -67,54 +84,29 @@ def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
     return {stem: tuple(found) for stem, found in groups.items()}
 
 
-def _header(lines: list[Line], text: str, dialect: Dialect, source: str, given: TextFormat,
-            checks: list[Check]) -> tuple[tuple[str, ...], dict[str, str], list[Line]]:
-    """Names, units and the lines of data."""
-    at = next((i for i, (_, line) in enumerate(lines) if len(cells_of(line, dialect.delimiter)) == dialect.width), 0)
-    cells = cells_of(lines[at][1], dialect.delimiter)
-    is_data = given.header is False or all(is_number(cell, dialect.decimal) or cell in MISSING for cell in cells)
-    if at > 0:
-        checks.append(Check.of("F16", "warn", f"{at} lines before the table left out", where=f"{source}, line {lines[0][0]}",
-                               remedy="give header or comment under [format] if these are data"))
-    if is_data:
-        names = _comment_header(text, lines[at][0], dialect) or tuple(f"column_{j + 1}" for j in range(dialect.width))
-        return *_named(names, source, lines[at][0]), lines[at:]
-    body = lines[at + 1 :]
-    names, units = _named(tuple(cells), source, lines[at][0])
-    if len(body) > 1 and _is_unit_row(body[0][1], body[1][1], dialect):
-        row = (cell.strip("[]() ") for cell in cells_of(body[0][1], dialect.delimiter))
-        units |= {name: unit for name, unit in zip(names, row, strict=True) if unit}
-        body = body[1:]
-    return names, units, body
+def _transposed(lines: list[Line], dialect: Dialect, source: str, checks: list[Check]) -> RawTable | None:
+    """S11: a table of few, long lines holds one signal a line; a name and a unit may come before its numbers.
 
-
-def _is_unit_row(line: str, following: str, dialect: Dialect) -> bool:
-    """A second line of the header: one word a column, no number, and numbers below it."""
-    cells = cells_of(line, dialect.delimiter)
-    return (len(cells) == dialect.width and not any(is_number(cell, dialect.decimal) or _FORMULA.fullmatch(cell) for cell in cells)
-            and any(is_number(cell, dialect.decimal) for cell in cells_of(following, dialect.delimiter)))
-
-
-def _comment_header(text: str, first: int, dialect: Dialect) -> tuple[str, ...] | None:
-    """numpy.savetxt and many loggers write the names into the last comment above the numbers."""
-    above = [line for line in text.split("\n")[: first - 1] if line.strip()]
-    if not above:
+    None where some line does not hold numbers from the same cell on.
+    """
+    rows = [cells_of(line, dialect.delimiter) for _, line in lines]
+    begin = next((k for k in range(3) if all(len(row) > k and is_number(row[k], dialect.decimal) for row in rows)), None)
+    if begin is None:
         return None
-    cells = cells_of(above[-1].lstrip().lstrip("#%/").strip(), dialect.delimiter)
-    return tuple(cells) if len(cells) == dialect.width and not any(is_number(cell) for cell in cells) else None
-
-
-def _named(cells: tuple[str, ...], source: str, line: int) -> tuple[tuple[str, ...], dict[str, str]]:
-    """S03: names and units; two columns of one name are refused, both named."""
-    pairs = [header_unit(cell) for cell in cells]
-    names = tuple(name or f"column_{j + 1}" for j, (name, _) in enumerate(pairs))
-    first: dict[str, int] = {}
-    for j, name in enumerate(names):
-        if first.setdefault(name, j) != j:
-            raise InputRejected("S03", f"columns {first[name] + 1} and {j + 1} are both named '{name[:80]}'",
-                                where=f"{source}, line {line}",
-                                remedy="rename one of them in the file")
-    return names, {name: unit for name, (_, unit) in zip(names, pairs, strict=True) if unit}
+    for (number, _), row in zip(lines, rows, strict=True):
+        if abs(len(row) - dialect.width) > 1:
+            raise InputRejected("F09", f"{len(row)} cells, not {dialect.width}", where=f"{source}, line {number}",
+                                remedy="export the file again, one line a sample")
+    names, units = names_and_units([row[0] if begin else f"line_{i}" for i, row in enumerate(rows, start=1)], source, lines[0][0])
+    if begin > 1:
+        units |= {name: row[1].strip("[]() ") for name, row in zip(names, rows, strict=True) if row[1].strip("[]() -")}
+    length = min(len(row) - (not row[-1]) for row in rows)
+    body = [(k + 1, "\t".join(row[k].replace(",", ".") for row in rows)) for k in range(begin, length)]
+    columns, words, _, _ = _parse(body, Dialect("\t", ".", len(rows)), names, source)
+    samples = length - begin
+    checks.append(Check.of("S11", "warn", f"{len(rows)} lines of {samples} numbers, read with time along the line", where=source,
+                           remedy="store one line a sample"))
+    return RawTable(source, columns, np.arange(samples), units=units, text=words, checks=tuple(checks), groups=_numbered(names))
 
 
 @dataclass(frozen=True)
@@ -125,7 +117,7 @@ class _Damage:
 
 
 def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, ...], source: str,
-             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str]]:
+             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str], dict[str, str | int | None]]:
     widths = [line.count(dialect.delimiter) + 1 if dialect.delimiter not in ("", " ") and '"' not in line
               else len(cells_of(line, dialect.delimiter)) for _, line in body]
     damage = [_Damage(i, body[i][0], f"{width} cells, not {dialect.width}") for i,
@@ -141,34 +133,36 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
     good = [i for i in range(len(body)) if i not in torn]
     if not good:
         raise InputRejected("T08", "no whole line of numbers", where=source, remedy="record again, or copy the file again")
-    columns, words, wrong = _parse([body[i] for i in good], dialect, names, source)
+    columns, words, wrong, labels = _parse([body[i] for i in good], dialect, names, source)
     damage += [_Damage(good[i], body[good[i]][0], reason) for i, reason in wrong.items()]
     _judge(damage, len(body), source, checks)
     keep = np.array([i not in wrong for i in range(len(good))], dtype=bool)
     return ([body[i] for i, kept in zip(good, keep, strict=True) if kept],
-            {name: np.ascontiguousarray(values[keep]) for name, values in columns.items()}, words)
+            {name: np.ascontiguousarray(values[keep]) for name, values in columns.items()}, words, labels)
 
 
-def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> tuple[dict[str, Array], dict[str, str],
-                                                                                              dict[int, str]]:
-    """Columns of numbers, columns of text with an example, and the lines (by index) with a cell that is no number."""
+_Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], dict[str, str | int | None]]
+
+
+def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
+    """Columns of numbers, columns of text with an example, the lines (by index) with a cell that is no number, and labels:
+    the text of a column that never changes, the period of one that repeats, None of a column of clock times."""
     # numpy rounds every number correctly; pandas does so only where asked, and newer ones refuse to be asked.
     text = "\n".join(line for _, line in lines)
     try:
         found = np.loadtxt(io.StringIO(text.replace(",", ".") if dialect.decimal == "," else text), dtype=np.float64, comments=None,
                            delimiter=dialect.delimiter.strip(" ") or None, quotechar='"', ndmin=2)
         if found.shape == (len(lines), len(names)):
-            return {name: np.ascontiguousarray(found[:, j]) for j, name in enumerate(names)}, {}, {}
+            return {name: np.ascontiguousarray(found[:, j]) for j, name in enumerate(names)}, {}, {}, {}
     except (ValueError, OverflowError):
         pass
     return _parse_slowly(lines, dialect, names, source)
 
 
-def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> tuple[dict[str, Array],
-                                                                                                     dict[str, str],
-                                                                                                     dict[int, str]]:
+def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Cell by cell, to find out which cell is no number."""
     cells = [cells_of(line, dialect.delimiter) for _, line in lines]
+    labels: dict[str, str | int | None] = {}
     columns: dict[str, Array] = {}
     words: dict[str, str] = {}
     wrong: dict[int, str] = {}
@@ -184,14 +178,33 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
         for i in bad:
             _refuse_formulas(lines[i], [cells[i][j]], (name,), source)
         if len(bad) > max(_MOST_DAMAGED, len(cells) // 2) or (bad and len(bad) == len(cells)):
+            if (clock := _clock_times([row[j] for row in cells])) is not None:
+                columns[name], labels[name] = clock, None
+                continue
             words[name] = cells[bad[0]][j][:40]
+            if (period := _period([row[j] for row in cells])) is not None:
+                labels[name] = cells[0][j] if period == 1 else period
         else:
             columns[name] = values
             wrong |= {i: f"'{cells[i][j][:30]}' in column '{name}' is no number" for i in bad}
     if not columns:
         raise InputRejected("F16", "no column of numbers", where=source,
                             remedy="rrrid import reads CSV and text tables, MAT (v5, v7.3) and NPY")
-    return columns, words, wrong
+    return columns, words, wrong, labels
+
+
+def _period(cells: list[str]) -> int | None:
+    """The number of samples after which a column of text repeats, up to that of the joints of an arm; 1 where it never changes."""
+    return next((k for k in range(1, min(_MOST_JOINTS, len(cells) // 2) + 1) if cells[k:] == cells[:-k]), None)
+
+
+def _clock_times(cells: list[str]) -> Array | None:
+    """Seconds of the day of texts such as "2024-05-17T11:30:00.125Z" or "11:30:00,125", going on over midnight. [s]"""
+    found = [_TIME_OF_DAY.search(cell) for cell in cells]
+    if not all(found):
+        return None
+    seconds = np.array([3600.0 * int(m[1]) + 60.0 * int(m[2]) + float(f"{m[3]}.{m[4] or 0}") for m in found if m is not None])
+    return seconds + 86400.0 * np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -43200.0)])
 
 
 def _refuse_formulas(line: Line, cells: list[str], names: tuple[str, ...], source: str) -> None:

@@ -87,9 +87,10 @@ def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) ->
 @pytest.mark.parametrize("name", ["pos_read_data.csv", "curr_data.csv"])
 def test_the_tx40_draft_finds_both_files_and_the_motor_side(shared: Path, name: str) -> None:
     draft = guess_recipe(shared / "real" / "tx40" / name)
-    assert draft.blanks == ("time.rate", "drive.transmission")
+    assert draft.blanks == ("time.rate", "signals.tau.unit", "drive.transmission")  # the file is named after a current
     assert 'transmission = ["FILL IN", 32.0, 45.0, "FILL IN", "FILL IN", "FILL IN"]' in draft.text
-    recipe = parse_recipe(draft.text.replace('rate = "FILL IN"', "rate = 5000").replace('"FILL IN"', "40.0"))
+    filled = draft.text.replace('rate = "FILL IN"', "rate = 5000").replace('unit = "FILL IN"', 'unit = "N m"')
+    recipe = parse_recipe(filled.replace('"FILL IN"', "40.0"))
     assert recipe.robot["use"] == "tx40.urdf"
     assert recipe.log.match == "pos_read_data.csv"
     assert (recipe.signals["q"].columns, recipe.signals["q"].unit, recipe.signals["tau"].file) == ("Joint_{j}", "rad",

@@ -44,7 +44,8 @@ def recipe(edit: Callable[[str], str] = lambda text: text, more: str = "") -> Re
 def convert(part: Recording, made: Recipe, units: dict[str, str] | None = None) -> dict[str, Array]:
     robot = load_robot("rrr")
     said = units or {name: str(spec.unit) for name, spec in made.signals.items()}
-    converted = joint_side(part, made, said, robot, drive_of(made.drive, robot, ""))
+    each = {name: (unit,) * robot.n_joints for name, unit in said.items()}
+    converted = joint_side(part, made, each, robot, drive_of(made.drive, robot, ""))
     return {name: signal.values for name, signal in converted.signals.items()}
 
 
@@ -98,7 +99,7 @@ def test_d07_a_rollover_is_followed_through() -> None:
     counts = np.round(np.linspace(100, 100 + 4.3 * 8192, 1200))
     wrapped = replace(recording(), signals={**recording().signals, "q": np.column_stack([np.mod(counts, 8192)] * 3)})
     made = recipe(lambda s: s.replace('unit = "rad"', 'unit = "counts", counts_per_rev = 8192, wrap = 8192'))
-    converted = joint_side(wrapped, made, {"q": "counts", "tau": "N m"}, load_robot("rrr"), None)
+    converted = joint_side(wrapped, made, {"q": ("counts",) * 3, "tau": ("N m",) * 3}, load_robot("rrr"), None)
     assert np.allclose(converted.signals["q"].values[:, 0], counts * 2 * np.pi / 8192, rtol=1e-14)
     assert {(c.code, c.level) for c in converted.checks} == {("RRID-D07", "warn")}
     assert "4 rollovers of 8192" in converted.altered[0]

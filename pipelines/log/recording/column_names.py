@@ -1,0 +1,350 @@
+"""Tell from a column's name what quantity it holds, whether it was measured, and of which joint.
+
+A name is split into words: at signs, at changes of case, between letters and digits, and where
+a run of letters is made of known words ("jointpos", "taucmd"). Known words give the quantity, its
+source and its side; the other words and the numbers name the joint. The head noun is the last one:
+a "torque current" is a current, a "current torque" a torque as it is now.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+from pipelines.log.units import UNITS, canonical_unit
+
+__all__ = ["ColumnName", "read_name", "signal_of", "words_of"]
+
+Origin = Literal["measured", "plain", "commanded"]
+
+
+def _set(words: str) -> frozenset[str]:
+    return frozenset(words.split())
+
+
+_QUANTITIES: dict[str, frozenset[str]] = {
+    "position": _set(
+        "q qpos pos position positions posn angle angles theta enc encoder winkel lage jpos "
+        "qs stellung joint_angle ang drehwinkel"
+    ),
+    "velocity": _set(
+        "dq qd qdot dqdt qvel vel vels velo velocity velocities speed speeds omega dtheta "
+        "geschwindigkeit drehzahl jvel winkelgeschwindigkeit spd"
+    ),
+    "acceleration": _set(
+        "ddq qdd qddot acc accel acceleration accelerations beschleunigung ddtheta qacc jacc"
+    ),
+    "torque": _set(
+        "tau torque torques trq tq moment moments effort efforts eff mom drehmoment moment "
+        "drehmomente qfrc jtau tauj jtrq"
+    ),
+    "current": _set("i iq isq curr current currents cur amp amps ampere strom motorstrom"),
+    "time": _set(
+        "t time times timestamp timestamps stamp zeit clock sec secs second seconds nsec nsecs nanosec "
+        "nanosecs nanosecond nanoseconds usec usecs microsec microseconds msec millisec milliseconds "
+        "millis micros nanos elapsed zeitstempel ts uptime datetime date uhrzeit"
+    ),
+    "index": _set(
+        "idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id cycle"
+    ),
+    "temperature": _set("temp temperature temperatures temperatur tmp"),
+    # Numbers of the tool, the mains and the state of the machine: of no joint, or no motion of it.
+    "other": _set(
+        "pose ee eef eff_pose tcp tool flange cart cartesian force forces wrench ft voltage voltages volt volts "
+        "gripper finger fingers status mode error errors err deviation lag limit limits flag digital "
+        "analog io quat quaternion orientation rpy euler translation rotation dtau dtauj jacobian "
+        "power energy pwm duty safety imu gyro camera reward done success rate bus supply battery "
+        "spannung kraft temp_core protective payload mass elbow_config distance schleppfehler"
+    ),
+}
+_COMMANDED = _set(
+    "cmd command commanded commands des desired ref reference references target targets tgt set "
+    "setpoint setpoints sp goal goals soll demand demanded nominal plan planned action actions "
+    "traj trajectory output vorgabe request requested sollwert cmds as"
+)
+_MEASURED = _set(
+    "meas measured measure measurement msr act actual fb feedback ist real present istwert read "
+    "observation observed sensor sensed obs ai"
+)
+# A part of a torque, or what a controller computed: not the torque that moved the joint.
+_PARTIAL = _set(
+    "ext external gravity grav friction residual inertia coriolis ff feedforward dist disturbance contact "
+    "collision model modelled est estimate estimated calc calculated computed predicted sim simulated "
+    "rnea bias observer expected compensation ripple"
+)
+_VARIANT = _set("filtered filt filter lp smooth smoothed lowpass hat")
+_MOTOR = _set("motor mot motors rotor drive antrieb")
+_JOINT = _set("joint joints jnt jnts axis axes achse gelenk link actuator actuators servo arm j a")
+_NOISE = _set(
+    "field fields data msg value values val state states robot robots header vector array log record signal "
+    "channel ch info feedback_data raw side of the in and ma"
+)
+_COMPOUND = sorted(
+    {word for words in _QUANTITIES.values() for word in words if len(word) > 1}
+    | _COMMANDED
+    | _MEASURED
+    | _PARTIAL
+    | _MOTOR
+    | {"joint", "jnt", "axis", "achse", "q"} - {"a", "j"},
+    key=len,
+    reverse=True,
+)
+_SUFFIX_UNITS = {
+    "s": "s",
+    "sec": "s",
+    "secs": "s",
+    "second": "s",
+    "seconds": "s",
+    "ms": "ms",
+    "msec": "ms",
+    "millis": "ms",
+    "millisec": "ms",
+    "milliseconds": "ms",
+    "us": "us",
+    "usec": "us",
+    "usecs": "us",
+    "micros": "us",
+    "microsec": "us",
+    "microseconds": "us",
+    "ns": "ns",
+    "nsec": "ns",
+    "nsecs": "ns",
+    "nanosec": "ns",
+    "nanosecs": "ns",
+    "nanos": "ns",
+    "nanosecond": "ns",
+    "nanoseconds": "ns",
+    "rad": "rad",
+    "radian": "rad",
+    "radians": "rad",
+    "mrad": "mrad",
+    "deg": "deg",
+    "degree": "deg",
+    "degrees": "deg",
+    "grad": "deg",
+    "rev": "rev",
+    "turns": "turn",
+    "counts": "counts",
+    "cnt": "counts",
+    "cnts": "counts",
+    "ticks": "counts",
+    "inc": "counts",
+    "incs": "counts",
+    "a": "A",
+    "ma": "mA",
+    "amps": "A",
+    "nm": "N m",
+    "mnm": "mN m",
+    "rpm": "rpm",
+    "rads": "rad/s",
+    "radps": "rad/s",
+    "degs": "deg/s",
+    "degps": "deg/s",
+    "dps": "deg/s",
+    "mm": "mm",
+    "pct": "%",
+    "percent": "%",
+    "permille": "‰",
+    "promille": "‰",
+    "lsb": "LSB",
+}
+
+
+_OTHERS = (_COMMANDED, _MEASURED, _PARTIAL, _VARIANT, _MOTOR, _JOINT, _NOISE)
+_ROLE_WORDS = frozenset[str]().union(*_OTHERS, {"d", "hat"})
+
+
+@dataclass(frozen=True)
+class ColumnName:
+    """A column's name, understood as far as its words go."""
+
+    column: str
+    quantity: str  # "position", …, "other"; "" where no word is known
+    origin: Origin
+    motor: bool  # on the motor's side of the gear
+    partial: bool  # a part of the torque, or a computed one
+    filtered: bool
+    label: tuple[str, ...]  # the words and numbers that are left: the joint
+    role: tuple[str, ...]  # the words that say what it is, without the joint
+    unit: str  # named by a part of the name; "" where no part does
+
+
+def words_of(name: str) -> list[str]:
+    """Return the words and numbers of a name in lower case: "measuredJointPos_A1" -> measured joint pos a 1."""
+    words: list[str] = []
+    name = _whole_words(name)
+    for part in re.findall(r"\d+|[^\W\d_]+", name):
+        pieces = re.findall(r"[A-ZÄÖÜ]+(?![a-zäöüß])|[A-ZÄÖÜ]?[^A-ZÄÖÜ]+", part)
+        for piece in pieces if len(pieces) > 1 else [part]:
+            words += _parts(piece.lower())
+    # "q_dot" and "q_ddot" are one word, and so is "d_q".
+    for dots, joined in (
+        (("q", "dot"), "dq"),
+        (("q", "ddot"), "ddq"),
+        (("d", "q"), "dq"),
+        (("dd", "q"), "ddq"),
+        (("q", "dd"), "ddq"),
+        (("theta", "dot"), "dtheta"),
+        (("d", "tau"), "dtau"),
+        (("tau", "dot"), "dtau"),
+    ):
+        for k in range(len(words) - 1, 0, -1):
+            if (words[k - 1], words[k]) == dots:
+                words[k - 1 : k + 1] = [joined]
+    return words
+
+
+def _whole_words(name: str) -> str:
+    """Return the name in which "NanoSec" and "nano_sec" are a single word."""
+    return re.sub(
+        r"(?i)(nano|micro|milli)[\s_]*(s(?:ec(?:ond)?s?)?)(?![a-z])",
+        lambda m: (m[1] + m[2]).lower(),
+        name,
+    )
+
+
+@lru_cache(maxsize=4096)
+def _parts(word: str) -> tuple[str, ...]:
+    """Return the known words that `word` is made of without a rest, else `word` alone."""
+    if len(word) > 40 or any(
+        word in words for words in (*_QUANTITIES.values(), *_OTHERS, _SUFFIX_UNITS)
+    ):
+        return (word,)
+    for first in _COMPOUND:
+        if word.startswith(first) and len(word) > len(first):
+            rest = _parts(word[len(first) :])
+            if all(part in _KNOWN for part in rest):
+                return (first, *rest)
+    return (word,)
+
+
+_KNOWN = frozenset(_COMPOUND) | _VARIANT | {"raw"}
+
+
+_SIGNALS = {
+    "position": "q",
+    "velocity": "dq",
+    "acceleration": "ddq",
+    "torque": "tau",
+    "current": "current",
+    "time": "t",
+}
+
+
+def signal_of(column: str) -> str | None:
+    """Return the signal of a log that a column of that name can be: "q", "q_ref", "dq", "tau", "t", …"""
+    name = read_name(column)
+    if name.quantity == "position" and name.origin == "commanded":
+        return "q_ref"
+    return _SIGNALS.get(name.quantity)
+
+
+def read_name(column: str, unit: str = "") -> ColumnName:
+    """Return what the name of a column says; `unit` is what the header adds to it."""
+    words = words_of(column)
+    held = set(words)
+    nouns = [
+        (k, quantity)
+        for k, word in enumerate(words)
+        for quantity, known in _QUANTITIES.items()
+        if word in known and not (word in ("a", "j") and len(words) > 2)
+    ]
+    at, quantity = _head(nouns)
+    if not quantity:
+        quantity = _without_noun(held)
+    named, unit_words = _unit_in_name(column, quantity)
+    # A unit in the header is stronger than a word: "temps (s)" is a time, in French.
+    quantity = quantity if quantity == "other" else _quantity_of(unit) or quantity
+    unit = unit or named
+    quantity = quantity or _quantity_of(unit)
+    desired = at is not None and "d" in words[at + 1 :]  # Franka Emika: q_d, tau_J_d
+    commanded = bool(held & _COMMANDED) or desired or any(word.startswith("soll") for word in words)
+    now = quantity not in ("", "current") and bool(held & {"current", "cur", "curr"})
+    measured = bool(held & _MEASURED) or now or any(word.startswith("ist") for word in words)
+    origin: Origin = "commanded" if commanded else "measured" if measured else "plain"
+    places = {place for place, _ in nouns}
+    is_role = [
+        k in places or word in _ROLE_WORDS or word in unit_words for k, word in enumerate(words)
+    ]
+    label = tuple(word for word, known in zip(words, is_role, strict=True) if not known)
+    role = tuple(
+        sorted(
+            word
+            for word, known in zip(words, is_role, strict=True)
+            if known and word not in unit_words
+        )
+    )
+    # Where both are recorded, q is the joint's position and theta the motor's (Spong 1987, eq. 1).
+    motor = bool(held & (_MOTOR | {"theta", "dtheta"}))
+    return ColumnName(
+        column,
+        quantity,
+        origin,
+        motor,
+        bool(held & _PARTIAL),
+        bool(held & _VARIANT),
+        label,
+        role,
+        unit,
+    )
+
+
+def _without_noun(words: set[str]) -> str:
+    """Return the quantity of a name without a noun: data sets of robot learning call positions states and actions."""
+    return "position" if {"observation", "state"} <= words or words & {"action", "actions"} else ""
+
+
+def _quantity_of(unit: str) -> str:
+    known = UNITS.get(canonical_unit(unit))
+    return "position" if unit == "counts" else known.quantity if known is not None else ""
+
+
+def _head(nouns: Sequence[tuple[int, str]]) -> tuple[int | None, str]:
+    """Return the head noun's place and the quantity."""
+    found = {quantity for _, quantity in nouns}
+    for whole in ("temperature", "other"):
+        if whole in found:
+            return None, whole
+    motion = [noun for noun in nouns if noun[1] not in ("time", "index")]
+    times = [noun for noun in nouns if noun[1] == "time"]
+    if motion:
+        return motion[-1]
+    return times[0] if times else nouns[0] if nouns else (None, "")
+
+
+def _unit_in_name(column: str, quantity: str) -> tuple[str, frozenset[str]]:
+    """Return the unit that a part of the name is, and its words: "pos_deg" -> "deg".
+
+    A single letter is a unit of the quantity that the name says, and nothing else.
+    """
+    parts = [
+        part for part in re.split(r"[\W_]+", _whole_words(column)) if part and not part.isdecimal()
+    ]
+    if len(parts) > 2 and (ratio := f"{parts[-2]}/{parts[-1]}".lower()) in (
+        "rad/s",
+        "deg/s",
+        "m/s",
+        "mm/s",
+    ):
+        return ratio, frozenset(parts[-2:])
+    pieces = [
+        *parts,
+        *(
+            piece
+            for part in parts
+            for piece in re.findall(r"[A-Z]?[a-z]+", part)
+            if 1 < len(piece) < len(part)
+        ),
+    ]
+    for piece in reversed(pieces):
+        word = piece.lower()
+        unit = _SUFFIX_UNITS.get(word, "")
+        if not unit or (len(pieces) == 1 and quantity != "time") or piece == "a":
+            continue
+        relative = unit in ("%", "‰", "LSB")  # of a rated value that only the drive knows
+        if relative or _quantity_of(unit) == quantity or (not quantity and len(word) > 1):
+            return unit, frozenset({word, *words_of(piece)})
+    return "", frozenset()

@@ -1,0 +1,178 @@
+"""Read a JSON recording: a list of frames, frames one a line, or arrays by name.
+
+[{"t": 0.0, "q": [0.1, 0.2]}, …]            columns t, q[0], q[1]
+{"frames": [{"joints": {"j1": {"pos": 0.1}}}, …]}       joints.j1.pos
+{"t": [0.0, …], "q": [[0.1, 0.2], …]}       t, q_1, q_2
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import InputRejected
+from pipelines.log.experiment import Array
+from pipelines.log.limits import FEWEST
+from pipelines.log.recording.raw import RawTable, columns_of_arrays
+
+__all__ = ["is_json", "read_json"]
+
+_LARGEST = 200_000_000  # [bytes]; parsed, JSON takes about ten times its size
+_DEEPEST = 8  # levels of names within a frame
+_MOST_COLUMNS = 2000
+
+
+def is_json(data: bytes) -> bool:
+    """Tell whether the file begins as JSON does: a list of lists or objects, or an object."""
+    head = (
+        data[:256]
+        .lstrip(b"\xef\xbb\xbf \t\r\n")
+        .replace(b" ", b"")
+        .replace(b"\n", b"")
+        .replace(b"\r", b"")
+    )
+    return head.startswith((b'{"', b"[{", b"[[", b"{}", b"[]"))
+
+
+def read_json(data: bytes, source: str) -> RawTable:
+    """Return the table of a JSON recording.
+
+    Raises:
+        InputRejected: F08 not JSON, S12 no recording in it, X05 larger than a recording.
+    """
+    if len(data) > _LARGEST:
+        raise InputRejected(
+            "X05",
+            f"{len(data)} bytes of JSON; import reads up to {_LARGEST}",
+            where=source,
+            remedy="split the recording, or save it as CSV or NPY",
+        )
+    document = _parsed(data, source)
+    frames = _frames(document, _DEEPEST)
+    if frames is not None:
+        return _table_of_frames(frames, source)
+    arrays = {
+        name: values
+        for name, value in _named(document, "", _DEEPEST)
+        if (values := _array(value)) is not None
+    }
+    if not arrays:
+        raise InputRejected(
+            "S12",
+            "no list of samples in the JSON file",
+            where=source,
+            remedy="save a list of frames, or one array a signal",
+        )
+    return columns_of_arrays(arrays, source)
+
+
+def _parsed(data: bytes, source: str) -> Any:
+    try:
+        text = data.decode("utf-8-sig")
+        try:
+            return json.loads(text)
+        except json.JSONDecodeError:
+            lines = text.splitlines()
+            return [json.loads(line) for line in lines if line.strip()]
+    except (ValueError, RecursionError) as problem:
+        raise InputRejected(
+            "F08",
+            f"not valid JSON: {problem}",
+            where=source,
+            remedy="copy the file again, or end the recording before it is copied",
+        ) from None
+
+
+def _frames(value: Any, depth: int) -> list[Mapping[str, Any]] | None:
+    """Return the longest list of objects in the document."""
+    if isinstance(value, list):
+        enough = len(value) >= FEWEST and all(isinstance(item, dict) for item in value)
+        return value if enough else None
+    if not isinstance(value, dict) or depth == 0:
+        return None
+    found = [frames for item in value.values() if (frames := _frames(item, depth - 1)) is not None]
+    return max(found, key=len, default=None)
+
+
+def _named(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
+    """Yield (path, value) of everything in nested objects that is no object itself."""
+    if isinstance(value, dict) and depth > 0:
+        for key, item in value.items():
+            yield from _named(item, f"{path}.{key}" if path else str(key), depth - 1)
+    elif not isinstance(value, dict):
+        yield path or "column", value
+
+
+def _array(value: Any) -> Array | None:
+    if not isinstance(value, list) or len(value) < FEWEST:
+        return None
+    try:
+        return np.array(value, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        return None
+
+
+def _cells(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
+    """Yield (path, group, value) of every number and text of a frame."""
+    for path, value in _named(frame, "", _DEEPEST):
+        if not isinstance(value, list):
+            yield path, path, value
+            continue
+        for k, item in enumerate(value):
+            if isinstance(item, dict):
+                yield from (
+                    (f"{path}[{k}].{inner}", f"{path}[{k}].{inner}", cell)
+                    for inner, cell in _named(item, "", _DEEPEST)
+                    if not isinstance(cell, list)
+                )
+            elif not isinstance(item, list):
+                yield f"{path}[{k}]", path, item
+
+
+def _table_of_frames(frames: list[Mapping[str, Any]], source: str) -> RawTable:
+    columns: dict[str, Array] = {}
+    groups: dict[str, list[str]] = {}
+    texts: dict[str, list[str]] = {}
+    for i, frame in enumerate(frames):
+        for path, group, value in _cells(frame):
+            if isinstance(value, str):
+                texts.setdefault(path, []).append(value[:200])
+            elif isinstance(value, int | float):
+                if path not in columns:
+                    if len(columns) == _MOST_COLUMNS:
+                        raise InputRejected(
+                            "X05",
+                            f"more than {_MOST_COLUMNS} numbers in a frame",
+                            where=source,
+                            remedy="save the signals of the joints alone",
+                        )
+                    columns[path] = np.full(len(frames), np.nan)
+                    groups.setdefault(group, []).append(path)
+                columns[path][i] = _real(value)
+    if not columns:
+        raise InputRejected(
+            "S12", "the frames hold no numbers", where=source, remedy="save the samples as numbers"
+        )
+    labels = {
+        path: found[0]
+        for path, found in texts.items()
+        if len(found) == len(frames) and len(set(found)) == 1
+    }
+    return RawTable(
+        source,
+        columns,
+        np.arange(len(frames)),
+        labels=labels,
+        groups={name: tuple(paths) for name, paths in groups.items() if paths != [name]},
+        text={path: found[0][:40] for path, found in texts.items() if path not in columns},
+    )
+
+
+def _real(value: float) -> float:
+    try:
+        return float(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return float("inf")
