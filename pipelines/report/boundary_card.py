@@ -14,7 +14,7 @@ CARD = "What the logged torque is"
 _UNKNOWN = "not identifiable"
 _SIDES = {
     "joint": "joint side: beyond the friction of the drive, or compensated for it",
-    "motor": "motor side: with the friction of the drive",
+    "motor": "with friction: motor side, or a joint sensor with friction behind it",
 }
 
 

@@ -77,7 +77,7 @@ def _verdict(result: Result) -> str:
     if poor:
         words += f" The simulation of {', '.join(poor)} does not follow the measurement well."
     words += "".join(f" {words}" for joint in result.joints if (words := ripple_in_words(joint)))
-    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint.drift, joint.name)))
+    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint.drift, joint.name, joint.revolute)))
     if open_:
         words += f" What the logs of {', '.join(open_)} leave open is listed with what to record."
     return words
@@ -198,7 +198,8 @@ def _words(joint: JointResult) -> tuple[str, ...]:
     slowest, fastest = joint.driven
     unit = _speed_unit(joint)
     words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}; logs: {', '.join(joint.logs)}."]
-    words += [text for text in (drift_in_words(joint.drift, joint.name), sticking_in_words(joint.sticking, joint.name)) if text]
+    words += [text for text in (drift_in_words(joint.drift, joint.name, joint.revolute),
+                                sticking_in_words(joint.sticking, joint.name, joint.revolute)) if text]
     if joint.held is not None:
         low, high = joint.held
         words.append(f"At rest friction carried from {format_number(low, 3)} to {format_number(high, 3)} N m.")

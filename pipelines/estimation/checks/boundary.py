@@ -559,15 +559,16 @@ def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
     speed = rows.own[:, :, 2]
     size = np.sqrt(np.mean(speed**2, axis=1) * np.mean(rows.tau**2, axis=1))
     weights = np.zeros((n, n * c))
-    for j in range(n):
+    moves = size > 0.0  # a joint that is held, or without torque, has no friction to tell
+    for j in np.flatnonzero(moves).tolist():
         power = rows.own[j, :, FRICTION] * speed[j][:, None]
         weights[j, j * c + FRICTION.start : j * c + FRICTION.stop] = power.mean(axis=0) / size[j]
     each = weights @ coefficients.ravel()
     std = np.sqrt(np.maximum(np.einsum("jk,kl,jl->j", weights, covariance, weights), 0.0))
-    sure = 1.0 / (
+    sure = moves / (
         std**2 + (0.25 * config.friction_absent) ** 2
     )  # a joint whose friction no motion tells has no say
-    mean = sure @ weights / sure.sum()
+    mean = sure @ weights / max(float(sure.sum()), 1e-300)
     share, own = (
         float(mean @ coefficients.ravel()),
         float(np.sqrt(max(mean @ covariance @ mean, 0.0))),
@@ -575,7 +576,7 @@ def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
     upper = share + 2.0 * own
     present: bool | None = None
     reason = ""
-    read = std < config.friction_absent
+    read = moves & (std < config.friction_absent)
     if (each - 3.0 * std > config.friction_absent).any():
         present = True
     elif (
@@ -590,9 +591,11 @@ def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
         )
     else:
         reason = "not identifiable: the motion does not tell friction from none"
-    return Share(
-        share, own, tuple(map(float, each)), tuple(map(float, std)), present, upper, reason
+    joints = (
+        tuple(float(v) if m else None for v, m in zip(values, moves, strict=True))
+        for values in (each, std)
     )
+    return Share(share, own, *joints, present, upper, reason)
 
 
 def _in_words(fits: _Fits, gravity: Share, friction: Share) -> list[str]:
@@ -602,8 +605,8 @@ def _in_words(fits: _Fits, gravity: Share, friction: Share) -> list[str]:
         fits.rms,
     )
     said = [
-        f"residual over the torque: {rms[0]:.2g} with gravity as described, "
-        f"{rms[1]:.2g} with none, {rms[2]:.2g} with the best"
+        f"relative residual, joints weighted alike: {rms[0]:.2g} with gravity as described, "
+        f"{rms[1]:.2g} with none, {rms[2]:.2g} with the best-fitting vector"
     ]
     if gravity.share is not None and gravity.std is not None:
         said.append(
@@ -611,7 +614,7 @@ def _in_words(fits: _Fits, gravity: Share, friction: Share) -> list[str]:
         )
     if friction.share is not None and friction.upper is not None:
         said.append(
-            f"friction takes {100 * friction.share:.1f} % of torque times speed, "
+            f"friction dissipates {100 * friction.share:.1f} % of rms torque times rms speed, "
             f"at most {100 * friction.upper:.1f} %"
         )
     return said

@@ -104,7 +104,7 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     config = config or SlidingConfig()
     rows = _usable_rows(logs, window, beside, arm, config)
     stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
-    if rows.sliding.doubtful and not _followed(stretches, fit, rows.sliding, config):
+    if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
     course = _course(stretches, rows, arm, config, DriftConfig())
     stretches = _along(stretches, course, fit)
@@ -142,6 +142,11 @@ class _Rows:
     window: float  # [s]
     sliding: Sliding
 
+    @property
+    def any_slide(self) -> bool:
+        """Whether rows of the fitted stretches slide."""
+        return bool(self.sliding.slides[:sum(stretch.rows for stretch in self.stretches[:self.fitted])].any())
+
 
 def _usable_rows(logs: JointLogs, window: float, beside: tuple[int, ...], arm: OneJoint, config: SlidingConfig) -> _Rows:
     """The shortest windows over which the encoder shows the acceleration."""
@@ -151,7 +156,9 @@ def _usable_rows(logs: JointLogs, window: float, beside: tuple[int, ...], arm: O
         if not identify:
             break
         both = tuple(replace(stretch, part=k) for k, stretch in enumerate((*identify, *validate)))
-        found = _Rows(both, len(identify), factor * window, sliding_rows(both, arm, config))
+        rows = _Rows(both, len(identify), factor * window, sliding_rows(both, arm, config))
+        if found is None or rows.sliding.attenuation < found.sliding.attenuation:  # longer ones may all hold a reversal
+            found = rows
         if found.sliding.attenuation <= config.attenuation:
             break
     if found is None:
@@ -181,6 +188,8 @@ def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, con
 def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
             drift: DriftConfig) -> Course | None:
     """How friction changes in time over the logs that are fitted."""
+    if not rows.any_slide:
+        return None
     slides = rows.sliding.slides
     if all(stretch.sticks is None for stretch in stretches):
         stretches = left_out(stretches, slides)

@@ -16,28 +16,30 @@ _FALLING = {"stribeck", "concave_friction", "three_sigmoid"}  # laws that may fa
 _COARSE = 0.05  # of the inertia, its bias by errors in variables: beyond it is not an estimate
 
 
-def drift_in_words(drift: Drift | None, name: str) -> str:
+def drift_in_words(drift: Drift | None, name: str, revolute: bool) -> str:
     """Say how friction drifts, by how much, and at what time the law holds; empty without a drift."""
     if drift is None or drift.change.std is None:
         return ""
     percent, std = 100.0 * drift.change.value, 100.0 * drift.change.std
     size = f"{'rises' if percent > 0.0 else 'falls'} by {plain_number(abs(percent))} ± {plain_number(std)} %"
     part = {"viscous": "Viscous friction", "coulomb": "Coulomb friction"}.get(drift.form, "Friction")
-    size += "" if drift.form == "whole" else f" of all friction at {plain_number(drift.speed)} rad/s"
+    size += "" if drift.form == "whole" else f" of all friction at {plain_number(drift.speed)} {'rad/s' if revolute else 'm/s'}"
     if drift.kind == "step":
         return (f"{part} of {name} {size} at once, {plain_number(drift.when)} s into {drift.log}; the law "
                 "is that before.")
-    return (f"{part} of {name} {size} in the course of each log, with a time constant of "
-            f"{plain_number(drift.when)} s; the law is that at {plain_number(drift.holds_at)} s.")
+    middle = plain_number(drift.holds_at)
+    return (f"{part} of {name} {size} of its value at {middle} s in the course of each log, with a time constant of about "
+            f"{plain_number(drift.when)} s; the law holds at {middle} s.")
 
 
-def sticking_in_words(sticking: Sticking | None, name: str) -> str:
+def sticking_in_words(sticking: Sticking | None, name: str, revolute: bool) -> str:
     """Say how many rows are left out, and why."""
     if sticking is None:
         return ""
     share = plain_number(100.0 * sticking.share)
     words = (f"{share} % of the rows of {name} are left out: the joint rests or bends its contacts there, "
-             f"up to a travel of {plain_number(sticking.distance)} rad, and friction is no function of its speed.")
+             f"up to a travel of {plain_number(sticking.distance)} {'rad' if revolute else 'm'}, and friction is no "
+             "function of its speed.")
     if sticking.slips:
         words += f" It sticks and slips on {sticking.slips} times amid motion one way."
     return words
@@ -47,7 +49,7 @@ def nuisance_findings(joint: JointFit, name: str) -> tuple[Check, ...]:
     """D26 friction that drifts, D08 an encoder too coarse, S14 viscous friction below zero."""
     where = joint.logs.identify[0][0].source or joint.logs.identify[0][0].name
     found = []
-    if words := drift_in_words(drift_of_joint(joint), name):
+    if words := drift_in_words(drift_of_joint(joint), name, joint.fit.joint.revolute):
         found.append(Check.of("D26", "warn", words[:-1], where=where,
                               remedy="warm the joint up before it is measured, or record one speed for minutes to see it settle"))
     attenuation = joint.sliding.attenuation
