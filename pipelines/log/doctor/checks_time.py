@@ -142,7 +142,9 @@ def _stale(s: Subject) -> str:
     finest = int(np.argmin(same.mean(axis=0)))
     others = np.delete(same, finest, axis=1).all(axis=1)
     stale, fresh = others[same[:, finest]], others[~same[:, finest]]
-    if len(fresh) < 2 or len(stale) < _STALE_LEAST * len(same) or stale.mean() < _STALE_TOGETHER or fresh.mean() > 1.0 - _STALE_TOGETHER:
+    if len(fresh) < 2 or len(stale) < _STALE_LEAST * len(same):
+        return ""
+    if stale.mean() < _STALE_TOGETHER or fresh.mean() > 1.0 - _STALE_TOGETHER:
         return ""
     between = np.diff(np.flatnonzero(~same[:, finest]))
     every = int(np.median(between))
