@@ -50,7 +50,10 @@ def robot_sources(source: str | Path) -> tuple[Path, ...]:
     if path.suffix.lower() in (*_URDF, *ENDINGS):
         return (path,)
     urdf = _urdf_named(_table_of(read_small_text(path)))
-    return (path,) if urdf is None else (path, _file_and_tip(path.parent / urdf)[0])
+    if urdf is None:
+        return (path,)
+    whole = path.parent / urdf
+    return path, whole if os.path.lexists(whole) else Path(split_tip(str(whole))[0])
 
 
 def split_tip(source: str) -> tuple[str, str | None]:
@@ -135,8 +138,9 @@ def _embed_urdf(text: str, path: Path) -> RobotDescription | None:
     if named is None or not isinstance(kinematics, dict):
         return None
     tip = kinematics.get("tip_link")
-    file, after_colon = _file_and_tip(path.parent / named)
-    arm = _from_urdf(file, tip_link=tip if isinstance(tip, str) else after_colon)
+    whole = str(path.parent / named)
+    file, after_colon = (whole, None) if os.path.lexists(whole) else split_tip(whole)
+    arm = _from_urdf(Path(file), tip_link=tip if isinstance(tip, str) else after_colon)
     kinematics.pop("urdf")
     kinematics["urdf_text"] = arm.urdf_text
     given = table.setdefault("joint", [{"name": j.name, "type": j.type} for j in arm.joints])

@@ -38,8 +38,6 @@ def _arms(path: Path) -> list[RobotDescription]:
         try:
             return [load_robot(path)]
         except UsageError as problem:
-            if problem.code != "RRID-S17":
-                raise
             if offered := re.findall(r"arm\.urdf:([^\s,;]+)", problem.remedy):
                 return [load_robot(f"{path}:{link}") for link in offered]
             _follow(path, problem)

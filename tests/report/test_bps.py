@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
+from pipelines.model.estimation.floor import Beside
 from pipelines.model.estimation.result import Result
 from pipelines.report.bps_report import bps_report
 from pipelines.report.render import render_report
@@ -36,6 +37,15 @@ def test_a_good_estimate_is_called_good(result: Result) -> None:
     assert f"{len(clear)} of {len(result.parameters)} parameters are clearly visible, {small} known to be small" in report.verdict
     assert "for none has role validate" in report.verdict  # blocks were held out, and that is said
     assert "gives the same parameters" in page(result)
+
+
+def test_a_residual_far_above_the_noise_is_not_called_good(result: Result) -> None:
+    """44 times what the noise between periods leaves: the torque error is as small as before, and the model lacks something."""
+    n = np.ones(len(result.joints))
+    log = Beside("a", "identify", 3, True, "", (), n, n, n, n, n, 44.0 * n, 44.0 * n)
+    report = bps_report(replace(result, noise_floor=(log,)))
+    assert report.tone == "attention"
+    assert "44 times what the noise between periods leaves" in report.verdict
 
 
 def test_what_is_not_determined_has_no_number(result: Result) -> None:
