@@ -142,7 +142,7 @@ def _examine(opened: Opened, robot: RobotDescription | None, settings: Settings)
 def _periods(subject: Subject, opened: Opened) -> list[Check]:
     """T10 as the stages say it that average periods: those that are unlike the others, and how long the first takes to settle."""
     log = recording(subject.log)
-    if log.period is None or not subject.good.runs:
+    if not subject.sampled or log.period is None or not subject.good.runs:
         return []
     # Observers, for the few logs that have periods.
     from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff

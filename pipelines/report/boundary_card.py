@@ -84,14 +84,14 @@ def _direction(boundary: Boundary) -> Row:
     direction = boundary.direction
     if direction.vector is None or direction.std is None or direction.angle is None:
         return (
-            "gravity [m/s^2]",
+            "gravity [m/s²]",
             _UNKNOWN,
             direction.reason,
         ), "bad" if boundary.turned else "neutral"
     vector = ", ".join(f"{x + 0.0:.2f}" for x in direction.vector)
     angle, std = math.degrees(direction.angle), math.degrees(direction.std)
     remark = f"{angle:.1f} ± {std:.1f} degrees from the description"
-    return ("gravity [m/s^2]", f"[{vector}]", remark), "bad" if boundary.turned else "neutral"
+    return ("gravity [m/s²]", f"[{vector}]", remark), "bad" if boundary.turned else "neutral"
 
 
 def _friction(boundary: Boundary) -> Row:

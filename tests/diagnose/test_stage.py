@@ -73,7 +73,8 @@ def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> Non
     """Verdict in words, the remedy, the joint, millimetres at the tip; and the figure that proves it."""
     report = rippled.report
     assert "Cogging at joint 2" in report.verdict
-    first = report.sections[0]
+    assert report.sections[0].title == "What the logged torque is"
+    first = report.sections[1]
     assert any(text.startswith("What to check: ") for text in first.text)
     assert any(" mm " in text for text in first.text)
     assert first.figures[0].name == "proof-1"

@@ -37,6 +37,7 @@ KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
 
 NOTHING: Any = {field.name: () for field in fields(Result)} | {
+    "boundary": None,
     "verdict": "nothing-wrong", "question": "what is wrong", "reason": "", "floor_origin": "twin", "held_out": "logs",
     "held_out_floor": None, "replicas": 0, "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
     "after_rms": ResidualRms(*(np.ones(3),) * 3), "noise": np.ones(3), "memory": None, "rated": (50.0,) * 3}

@@ -57,6 +57,7 @@ def boundary_findings(boundary: Boundary | None, where: str) -> tuple[Check, ...
 
 
 def _order(order: JointOrder, where: str) -> Check:
+    where = f"{where}, signal {order.signal}"
     residual = f"residual {order.before:.2f} -> {order.after:.2f}"
     if order.columns is None:
         return Check.of(

@@ -14,6 +14,7 @@ import numpy as np
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.torque_rows import Array
 from pipelines.log.doctor.segments import Usable
+from pipelines.log.order_statistics import median
 
 __all__ = ["touches_of_zero"]
 
@@ -45,7 +46,7 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
         # median deviation).
 
         noise = (
-            1.4826 * float(np.nanmedian(np.abs(np.diff(tau, 2)))) / np.sqrt(6.0)
+            1.4826 * _finite_median(np.abs(np.diff(tau, 2))) / np.sqrt(6.0)
             if tau.size > 2
             else 0.0
         )
@@ -58,3 +59,9 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
         state = state[state != 0]
         count += int(np.sum((state[1:] == 1) & (state[:-1] == -1)))
     return count
+
+
+def _finite_median(x: Array) -> float:
+    """Return the median of the finite values of `x`; 0 where there are none."""
+    finite = x[np.isfinite(x)]
+    return float(median(finite)) if finite.size else 0.0

@@ -5,12 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
-from pipelines.fit.equations import Block
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
@@ -22,6 +21,7 @@ from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.judgeable import Facts, cannot_judge, predicted_std, unresolved
 from pipelines.model.estimation.negative_viscous import negative_viscous
+from pipelines.model.estimation.regression import Columns, LogEquations
 
 __all__ = ["facts", "limited_by_estimate", "nominal_estimate"]
 
@@ -46,7 +46,7 @@ def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
 
 def nominal_estimate(prepared: Prepared) -> Estimate:
     """Return the nominal model as `estimate-bps` fits it, on the rows of a diagnosis."""
-    return estimate([one.equations for one in prepared.data.logs], prepared.columns)
+    return estimate(_equations(prepared.data, prepared.columns), prepared.columns)
 
 
 def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
@@ -56,7 +56,7 @@ def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
     known = np.full(len(left), found.floor_origin != "blocks")
     if not known.all():
         known = ~stands_high(left, _noise(prepared))
-    return Facts(left, judge.rms(judge.y), predicted_std(estimated, _blocks(judge)),
+    return Facts(left, judge.rms(judge.y), predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns))),
                  unresolved(estimated), known, found.no_twin)
 
 
@@ -66,9 +66,9 @@ def _noise(prepared: Prepared) -> Array:
     return np.sqrt(np.nan_to_num(unrepeated(prepared.data, fit.left)))
 
 
-def _blocks(data: Data) -> Iterator[Block]:
-    for log in data.logs:
-        yield from log.equations
+def _equations(data: Data, columns: Columns) -> list[LogEquations]:
+    """Return the equations of each log in `columns`; rows may hold more terms of a friction law."""
+    return [replace(log.equations, columns=columns) for log in data.logs]
 
 
 def _negative(arm: Arm | None) -> bool:
