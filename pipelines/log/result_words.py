@@ -165,9 +165,6 @@ WORDS: Final[dict[str, str]] = {
     "revolute": "whether the joint turns; else it slides", "controller": "control law of the log",
     "detected_odd": "odd distortion that was detected", "expected_from": "what the rigid response is known from",
     "misfit": "how far the fitted response is from the measured one", "damping": "damping, with its unit",
-    "excited": "[Hz] bands where the excitation has power and its responses are known; nothing is fitted or named outside",
-    "filled": "share of the samples that were lost, and filled alike in all signals",
-    "others_held": "whether the motion of the other joints was taken out of the relative response",
     "seen_at": "numbers of the responses that show it", "candidates": "what it could be",
     # model.json
     "base_parameters": "base parameters of the rigid body", "validity": "range of the logs behind the model", "notes": "remarks",

@@ -81,7 +81,7 @@ def test_an_inconsistent_estimate_names_the_link(good: ExperimentLog, tmp_path: 
     wrong = with_signal(good, tau=good.tau * np.array([1.0, 1.0, -1.0]))
     out = stage(tmp_path, wrong, check=True, settings=replace(SYMMETRIC, allow_mismatch=True))
     assert out.exit_code == 1
-    (check,) = [c for c in out.checks if c.code == "RRID-D15"]
+    (check,) = [c for c in out.checks if c.code == "RRID-D15" and "links" in c.message]
     assert check.gate
     assert good.robot.joints[2].name in check.message
     assert out.result.physically_consistent is False

@@ -37,8 +37,8 @@ def test_a_simulation_that_runs_away_is_said_to(with_: float | None, without: fl
 
 
 def test_more_numbers_are_given_a_reason(samples: Path) -> None:
-    """Three sigmoids at the waist, which has that law: why not the plainer one, and what that would change; no key of a law."""
-    opened = open_log(samples / "rrr-healthy/friction-1-1.h5")
+    """Three sigmoids at the shoulder, which has that law: why not the plainer one, and what that would change; no key of a law."""
+    opened = open_log(samples / "rrr-healthy/friction-2-1.h5")
     found = fit_friction.compute(Inputs((opened,), label="logs"), fit_friction.Settings())
     told = fit_friction.report(found)
     words = next(" ".join(section.text) for section in told.sections if section.title.endswith(": choice of the law"))

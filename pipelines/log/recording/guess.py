@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -434,7 +433,8 @@ def _columns(names: Sequence[str], table: RawTable) -> str:
     """Return columns = "q_{j}" where the names count from 1, and no further column of `table` goes on, else a list."""
     if len(names) == 1:
         return f"column = {_quoted(names[0])}"
-    pattern = re.sub(r"1(?!.*1)", "{j}", names[0])
+    before, one, after = names[0].rpartition("1")
+    pattern = f"{before}{{j}}{after}" if one else names[0]
     counted = [pattern.replace("{j}", str(j)) for j in range(1, len(names) + 2)]
     if "{j}" in pattern and counted[:-1] == list(names) and counted[-1] not in table.columns:
         return f"columns = {_quoted(pattern)}"

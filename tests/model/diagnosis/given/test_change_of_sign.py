@@ -224,6 +224,7 @@ def test_where_the_first_look_shows_one_law_at_several_joints_the_twin_is_made_o
 
     monkeypatch.setattr(diagnose_module, "greatest", lambda rough: [("concave_friction", 1), ("concave_friction", 2)])
     monkeypatch.setattr(diagnose_module, "_diagnosed", diagnosed)
+    monkeypatch.setattr(diagnose_module, "limited_by_estimate", lambda found, prepared: found)
     assert diagnose_module.diagnose(Logs((hidden(1),)), NO_LIMITS).verdict == verdict
     assert made == asked
 
