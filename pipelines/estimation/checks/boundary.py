@@ -591,11 +591,11 @@ def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
         )
     else:
         reason = "not identifiable: the motion does not tell friction from none"
-    joints = (
+    told = [
         tuple(float(v) if m else None for v, m in zip(values, moves, strict=True))
         for values in (each, std)
-    )
-    return Share(share, own, *joints, present, upper, reason)
+    ]
+    return Share(share, own, told[0], told[1], present, upper, reason)
 
 
 def _in_words(fits: _Fits, gravity: Share, friction: Share) -> list[str]:
