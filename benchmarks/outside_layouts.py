@@ -186,6 +186,11 @@ def expanded(entry: dict[str, object], n: int) -> tuple[str, ...] | None:
     return None if columns is None or any(ASK in c for c in columns) else tuple(columns)
 
 
+def plain(name: str) -> str:
+    """Return a column's name as a draft writes it: without a unit in brackets and without the % of a comment."""
+    return re.sub(r"\s*[\[(][^\])0-9]+[\])]$", "", name).lstrip("%")
+
+
 def unit_of(entry: dict[str, object]) -> str:
     unit = entry.get("unit", "")
     return ",".join(unit) if isinstance(unit, list) else str(unit)
@@ -201,8 +206,9 @@ def wrong_fields(draft: dict, answer: Answer, run: Run, robot: str | None) -> li
     column, unit = time.get("column"), time.get("unit", "")
     column = "+".join(column) if isinstance(column, list) else column
     unit = "+".join(unit) if isinstance(unit, list) else unit
+    clocks = {plain(name): u for name, u in answer.time.items()}
     if column is not None and ASK not in column and answer.texts and (
-            column not in answer.time or (ASK not in unit and answer.time[column] not in ("*", unit))):
+            column not in clocks or (ASK not in unit and clocks[column] not in ("*", unit))):
         wrong.append(f"time: {column} [{unit}]")
     rate = time.get("rate")
     if isinstance(rate, (int, float)) and (answer.rate is None or abs(rate / answer.rate - 1) > 0.02):
@@ -213,7 +219,7 @@ def wrong_fields(draft: dict, answer: Answer, run: Run, robot: str | None) -> li
         columns, unit, accepted = expanded(entry, run.n), unit_of(entry), answer.right.get(name, ())
         if columns is None or (not answer.texts and accepted):
             continue
-        same = [s for s in accepted if s.columns == columns]
+        same = [s for s in accepted if tuple(map(plain, s.columns)) == columns]
         if not same:
             wrong.append(f"{name}: {', '.join(columns[:3])} …")
         elif ASK not in unit and not any(unit in s.units for s in same):
