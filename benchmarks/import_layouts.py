@@ -96,7 +96,7 @@ def motion(
         dq += w * (a * c - b * s)
         ddq -= w * w * (a * s + b * c)
     size = np.where(np.isin(np.arange(n), slides), 0.1, 1.0) * np.minimum(
-        1.0 / np.abs(q).max(axis=0), 30.0 / np.abs(ddq).max(axis=0)
+        1.3 / np.abs(q).max(axis=0), 120.0 / np.abs(ddq).max(axis=0)
     )
     q, dq, ddq = (x * size for x in (q, dq, ddq))
     q += rng.uniform(-0.5, 0.5, n) * np.where(np.isin(np.arange(n), slides), 0.05, 1.0)
@@ -315,10 +315,10 @@ def layout_ur_currents_only() -> Layout:
 @layout
 def layout_libfranka() -> Layout:
     """The record that libfranka writes on an error: states and commands side by side."""
-    m = motion(7, 0.001)
+    m = motion(7, 0.001, samples=2000)
     columns: Columns = {
         "time [ms]": np.round(m.t * 1e3),
-        "success_rate": np.ones(SAMPLES),
+        "success_rate": np.ones(len(m.t)),
         "O_T_EE[#]": np.tile(m.q[:, :1], (1, 16)),
         "q[#]": m.q,
         "q_d[#]": m.q + 1e-3,
@@ -338,9 +338,9 @@ def layout_libfranka() -> Layout:
 @layout
 def layout_panda_py() -> Layout:
     """panda_py's log through pandas: an index column without a name, stamps in ms."""
-    m = motion(7, 0.001)
+    m = motion(7, 0.001, samples=2000)
     columns: Columns = {
-        "": np.arange(SAMPLES),
+        "": np.arange(len(m.t)),
         "time": 88000.0 + np.round(m.t * 1e3),
         "q_#": m.q,
         "dq_#": m.dq,

@@ -72,7 +72,7 @@ _MEASURED = _set(
 # A part of a torque, or what a controller computed: not the torque that moved the joint.
 _PARTIAL = _set(
     "ext external gravity grav friction residual inertia coriolis ff feedforward dist disturbance contact "
-    "collision model modelled est estimate estimated calc calculated computed predicted sim simulated "
+    "collision model modelled est estimate estimated calc calculated computed predicted sim simulated disturb "
     "rnea bias observer expected compensation ripple"
 )
 _VARIANT = _set("filtered filt filter lp smooth smoothed lowpass hat")
@@ -201,7 +201,7 @@ def _whole_words(name: str) -> str:
     """Return the name in which "NanoSec" and "nano_sec" are a single word."""
     return re.sub(
         r"(?i)(nano|micro|milli)[\s_]*(s(?:ec(?:ond)?s?)?)(?![a-z])",
-        lambda m: (m[1] + m[2]).lower(),
+        lambda m: (m[1] + m[2]).capitalize(),
         name,
     )
 
@@ -253,6 +253,9 @@ def read_name(column: str, unit: str = "") -> ColumnName:
         if word in known and not (word in ("a", "j") and len(words) > 2)
     ]
     at, quantity = _head(nouns)
+    path, _, last = column.rpartition(".")
+    if quantity not in ("temperature", "other") and path and read_name(last).quantity == "time":
+        quantity = "time"  # "q_meas.time" is the clock beside a position
     if not quantity:
         quantity = _without_noun(held)
     named, unit_words = _unit_in_name(column, quantity)

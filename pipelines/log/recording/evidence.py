@@ -29,6 +29,9 @@ class Guess:
     why: str
 
 
+_RAD_OR_TURNS = Guess("", "unsure", "within half a turn in rad and in revolutions: rad, or rev as servo drives count?")
+
+
 def rollover(values: Array) -> float | None:
     """The size of the jumps where a counter starts again: several times larger than any step, and all alike."""
     steps = np.diff(values, axis=0)
@@ -49,6 +52,7 @@ _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
+_CLEAR = 4.0  # standard errors of a jump of friction
 
 
 @dataclass(frozen=True)
@@ -108,6 +112,8 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
                      f"named so; the largest range is {span:.4g} {named}"), further
     if named is not None:
         return unknown_unit(named), further
+    if wrap in (360.0, 2.0 * math.pi):
+        return Guess("deg" if wrap == 360.0 else "rad", "likely", f"it starts again after {wrap:.4g}, one turn"), further
     if slope is not None and (found := _by_velocity(slope)) is not None:
         return found, further
     if turns := quarter_turns(q):
@@ -137,6 +143,8 @@ def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | No
                 return False
         return True
 
+    if inside(1.0) and inside(2.0 * math.pi):
+        return _RAD_OR_TURNS
     if inside(1.0):
         return Guess("rad", "likely", f"inside the robot's limits in rad; the largest range is {np.ptp(q, axis=0).max():.3g}")
     if inside(math.pi / 180.0):
@@ -147,6 +155,8 @@ def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | No
 def _by_size(q: Array, t: Array | None, span: float) -> Guess:
     """The unit by what a joint can do, where no limits are known."""
     far = float(np.abs(q).max())
+    if far <= 0.5:
+        return _RAD_OR_TURNS
     if far <= 2.05 * math.pi:
         speed = (float(np.abs(np.diff(q, axis=0) / np.diff(t)[:, None]).max())
                  if t is not None and (np.diff(t) > 0).all() else math.nan)
@@ -257,23 +267,31 @@ def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[f
 
 
 def sign_of(q: Array, tau: Array) -> Guess:
-    """Friction takes power out: beside inertia, springs and a constant, torque must grow with speed on every joint."""
-    width = max(5, len(q) // 300)
-    smooth = np.ones(width) / width
-    share = np.zeros(q.shape[1])
+    """Dry friction turns with the speed: where a joint reverses, its torque jumps the same way, and all else is smooth.
+
+    About each reversal, tau = a + b k + c k² + d k³ + F sign(dq); F is positive (Coulomb's law; Armstrong-Hélouvry 1991).
+    """
+    half = max(6, len(q) // 200)
+    k = np.linspace(-1.0, 1.0, 2 * half + 1)
+    smooth = np.ones(max(3, half // 2)) / max(3, half // 2)
+    strength = np.zeros(q.shape[1])  # mean jump over its standard error
     for j in range(q.shape[1]):
-        position, torque = (np.convolve(x[:, j], smooth, mode="valid") for x in (q, tau))
-        speed = np.gradient(position)
-        columns = np.column_stack([speed, np.gradient(speed), position, np.ones(position.size)])
-        columns /= np.maximum(np.abs(columns).max(axis=0), 1e-300)
-        share[j] = np.linalg.lstsq(columns, torque, rcond=1e-9)[0][0] * np.std(columns[:, 0]) / max(float(np.std(torque)), 1e-300)
-    wrong = [str(j + 1) for j in np.flatnonzero(share < -0.02)]
+        speed = np.gradient(np.convolve(q[:, j], smooth, mode="same"))
+        jumps = []
+        for at in np.flatnonzero(speed[half + 1 : -half - 1] * speed[half : -half - 2] < 0) + half + 1:
+            turn = np.sign(speed[at - half : at + half + 1])
+            if (turn[: half - 1] == turn[0]).all() and (turn[half + 2 :] == -turn[0]).all() and turn[0] != 0:
+                columns = np.column_stack([turn, k**0, k, k**2, k**3])
+                jumps.append(np.linalg.lstsq(columns, tau[at - half : at + half + 1, j], rcond=None)[0][0])
+        if len(jumps) > 2:
+            strength[j] = np.mean(jumps) / max(float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps)), 1e-300)
+    wrong = [str(j + 1) for j in np.flatnonzero(strength < -_CLEAR)]
     if wrong:
         return Guess("sign = -1?", "likely",
-                     f"torque of joint {', '.join(wrong)} takes energy out of the motion where friction should: "
+                     f"torque of joint {', '.join(wrong)} jumps against the speed where it reverses, unlike friction: "
                      "add sign = -1 there, unless its transmission is negative")
-    if (share > 0.02).all():
-        return Guess("as recorded", "likely", "sign: torque grows with speed on every joint, as friction asks for")
+    if (strength > _CLEAR).all():
+        return Guess("as recorded", "likely", "sign: torque jumps with the speed where a joint reverses, as friction does")
     return Guess("as recorded", "unsure", "sign: torque and motion do not tell")
 
 

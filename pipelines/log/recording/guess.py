@@ -93,9 +93,6 @@ def guess_recipe(path: Path, robot: str | None = None) -> Draft:
     if len(table.columns) > _MOST_COLUMNS:
         raise InputRejected("F16", f"{len(table.columns)} columns: too many to guess what each is", where=path,
                             remedy="export the joints' signals alone, or write the recipe")
-    for column, period in table.cycles.items():
-        raise InputRejected("S11", f"column '{clean(column, 40)}' goes through {period} texts, again and again: one line a joint?",
-                            where=path, remedy="put the joints beside each other, one line a sample (a pivot of the table)")
     table = _sound(table)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
     companion = companion_for(reading)

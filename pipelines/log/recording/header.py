@@ -75,6 +75,8 @@ def find_header(
     if names is None:
         return _numbered(width, first, skipped=first)
     plain = {n for n, _ in lines[:first]}
+    if len(set(names)) < width:
+        names = _with_spans(names, [(n, line) for n, line, _ in above if n < min(used)], dialect)
     named, found = names_and_units(names, source, min(used))
     found |= {
         name: unit for name, unit in zip(named, units, strict=True) if unit.lower() not in _NO_UNIT
@@ -152,6 +154,26 @@ def _names_above(
             )
         return None, units, set()
     return best[1], units, {best[2], unit_line} - {0}
+
+
+def _with_spans(
+    names: tuple[str, ...], above: Sequence[Line], dialect: Dialect
+) -> tuple[str, ...]:
+    """Return names that come several times with what the line above says of several columns.
+
+    "waist", "", "", "elbow", "", "" above Angle, Torque, Speed, …: "waist Angle", "waist Torque", …
+    """
+    for _, line in reversed(above):
+        cells = cells_of(line, dialect.delimiter)
+        if len(cells) != len(names) or not _words(cells):
+            continue
+        span = ""
+        spanned = []
+        for cell, name in zip(cells, names, strict=True):
+            span = cell or span
+            spanned.append(f"{span} {name}".strip())
+        return tuple(spanned)
+    return names
 
 
 def _fitted(cells: list[str], width: int, rows: Sequence[Sequence[str]]) -> list[str] | None:

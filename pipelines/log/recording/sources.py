@@ -18,7 +18,7 @@ from pipelines.log.recording.arrays import read_npy
 from pipelines.log.recording.dialect import TextFormat
 from pipelines.log.recording.json_table import is_json, read_json
 from pipelines.log.recording.matlab import damaged, read_mat5, read_mat73
-from pipelines.log.recording.raw import RawTable, columns_of_arrays
+from pipelines.log.recording.raw import RawTable, columns_of_arrays, unstacked
 from pipelines.log.recording.tabular import read_text
 
 __all__ = ["read_table"]
@@ -53,7 +53,7 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
         raise fault_of(problem, path) from None
     source = name or path.name
     kind = _kind(data, source)
-    table = _read(kind, data, path, source, text)
+    table = unstacked(_read(kind, data, path, source, text))
     checks = table.checks
     named = {ending: what for what, endings in _ENDINGS.items() for ending in endings}.get(path.suffix.lower(), "text")
     if path.suffix.lower() not in _ENDINGS[kind] and named != kind:

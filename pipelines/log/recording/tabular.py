@@ -71,7 +71,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     clocks = {name: "s" for name in columns if name in labels and labels[name] is None}
     return RawTable(source, columns, rows, units=units | clocks, text=words, lines=lines_kept, breaks=breaks, checks=tuple(checks),
                     groups=_numbered(names), labels={name: label for name, label in labels.items() if isinstance(label, str)},
-                    cycles={name: label for name, label in labels.items() if isinstance(label, int)})
+                    cycles={name: label for name, label in labels.items() if isinstance(label, tuple)})
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
@@ -117,7 +117,7 @@ class _Damage:
 
 
 def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, ...], source: str,
-             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str], dict[str, str | int | None]]:
+             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str], _Labels]:
     widths = [line.count(dialect.delimiter) + 1 if dialect.delimiter not in ("", " ") and '"' not in line
               else len(cells_of(line, dialect.delimiter)) for _, line in body]
     damage = [_Damage(i, body[i][0], f"{width} cells, not {dialect.width}") for i,
@@ -141,12 +141,13 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
             {name: np.ascontiguousarray(values[keep]) for name, values in columns.items()}, words, labels)
 
 
-_Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], dict[str, str | int | None]]
+_Labels = dict[str, str | tuple[str, ...] | None]
+_Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], _Labels]
 
 
 def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Columns of numbers, columns of text with an example, the lines (by index) with a cell that is no number, and labels:
-    the text of a column that never changes, the period of one that repeats, None of a column of clock times."""
+    the text of a column that never changes, the texts that one goes through, None of a column of clock times."""
     # numpy rounds every number correctly; pandas does so only where asked, and newer ones refuse to be asked.
     text = "\n".join(line for _, line in lines)
     try:
@@ -162,7 +163,7 @@ def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: 
 def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Cell by cell, to find out which cell is no number."""
     cells = [cells_of(line, dialect.delimiter) for _, line in lines]
-    labels: dict[str, str | int | None] = {}
+    labels: _Labels = {}
     columns: dict[str, Array] = {}
     words: dict[str, str] = {}
     wrong: dict[int, str] = {}
@@ -183,7 +184,7 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
                 continue
             words[name] = cells[bad[0]][j][:40]
             if (period := _period([row[j] for row in cells])) is not None:
-                labels[name] = cells[0][j] if period == 1 else period
+                labels[name] = cells[0][j] if period == 1 else tuple(row[j] for row in cells[:period])
         else:
             columns[name] = values
             wrong |= {i: f"'{cells[i][j][:30]}' in column '{name}' is no number" for i in bad}
