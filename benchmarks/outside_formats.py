@@ -364,7 +364,12 @@ def twincat_scope(folder: Path, run: Run) -> Answer:
             )
         )
     (folder / "scope.csv").write_text("\n".join("\t".join(r) for r in rows) + "\nEOF\n")
-    return Answer("scope.csv", texts=False, draftable=False)
+    right = {
+        "q": (Signal(names("GVL_Axes.axis{}.NcToPlc.ActPos", 3), DEG),),
+        "dq": (Signal(names("GVL_Axes.axis{}.NcToPlc.ActVelo", 3), DEGS),),
+        "tau": (Signal(names("GVL_Axes.axis{}.Drive.nActTorque", 3)),),
+    }
+    return Answer("scope.csv", {"SymbolName": "ms"}, right=right, draftable=False)
 
 
 @layout(THREE, robot="robot.toml")

@@ -416,7 +416,12 @@ def main() -> None:
     for part in options.set or SETS:
         import_module(f"benchmarks.outside_{part}")
     counts: dict[str, int] = {}
-    chosen = [lay for lay in LAYOUTS if not options.names or lay.name in options.names]
+    chosen = [
+        lay
+        for lay in LAYOUTS
+        if lay.write.__module__.removeprefix("benchmarks.outside_") in (options.set or SETS)
+        and (not options.names or lay.name in options.names)
+    ]
     for k, lay in enumerate(chosen):
         with tempfile.TemporaryDirectory() as scratch:
             folder = (options.keep or Path(scratch)) / lay.name

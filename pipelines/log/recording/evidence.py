@@ -63,17 +63,19 @@ class Slope:
     correlation: float  # the lowest of the joints that move
 
 
-def slope_of(q: Array, dq: Array, t: Array | None) -> Slope | None:
+def slope_of(q: Array, dq: Array, t: Array | None, every: bool = False) -> Slope | None:
     """Return the relation of `dq` to `q` (samples, joints); None where it is not its slope.
 
     Both are compared over stretches of the recording, short ones first: the integral form does not
-    amplify the steps of an encoder as a difference of neighbours does.
+    amplify the steps of an encoder as a difference of neighbours does. With `every`, columns that
+    hardly move beside the others must agree as well: they may be something else.
     """
     clock = np.arange(len(q), dtype=np.float64) if t is None else t
     if q.shape != dq.shape or len(q) < 50:
         return None
     summed = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(clock)[:, None], axis=0)])
-    moving = (np.ptp(q, axis=0) > 1e-3 * np.ptp(q)) & (np.ptp(dq, axis=0) > 1e-3 * np.ptp(dq))
+    least = 0.0 if every else 1e-3
+    moving = (np.ptp(q, axis=0) > least * np.ptp(q)) & (np.ptp(dq, axis=0) > least * np.ptp(dq))
     if not moving.any():
         return None
     widths = sorted({max(2, len(q) // share) for share in _STRETCHES})

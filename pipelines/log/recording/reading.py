@@ -293,7 +293,7 @@ def _pairs(table: RawTable, blocks: list[list[str]], t: Array | None) -> list[tu
         (a, b)
         for a in range(len(blocks))
         for b in range(len(blocks))
-        if a != b and slope_of(values[a], values[b], t) is not None
+        if a != b and slope_of(values[a], values[b], t, every=True) is not None
     ]
     derived = {b for _, b in found}
     return [(a, b) for a, b in found if a not in derived]

@@ -17,7 +17,7 @@ from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
-from pipelines.log.recording.header import find_header, names_and_units
+from pipelines.log.recording.header import Header, find_header, names_and_units, without_repeats
 from pipelines.log.recording.raw import RawTable
 
 __all__ = ["TextFormat", "read_text"]
@@ -62,6 +62,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     if not body:
         raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
     kept, columns, words, labels = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
+    columns = without_repeats(columns, header, source)
     lines_kept = np.array([number for number, _ in kept], dtype=np.int64)
     # Counted over the lines of data alone: an empty line or a comment between them loses no sample.
     rows = np.searchsorted(np.array([number for number, _ in body], dtype=np.int64), lines_kept)
@@ -97,12 +98,13 @@ def _transposed(lines: list[Line], dialect: Dialect, source: str, checks: list[C
         if abs(len(row) - dialect.width) > 1:
             raise InputRejected("F09", f"{len(row)} cells, not {dialect.width}", where=f"{source}, line {number}",
                                 remedy="export the file again, one line a sample")
-    names, units = names_and_units([row[0] if begin else f"line_{i}" for i, row in enumerate(rows, start=1)], source, lines[0][0])
+    names, units, again = names_and_units([row[0] if begin else f"line_{i}" for i, row in enumerate(rows, start=1)])
     if begin > 1:
         units |= {name: row[1].strip("[]() ") for name, row in zip(names, rows, strict=True) if row[1].strip("[]() -")}
     length = min(len(row) - (not row[-1]) for row in rows)
     body = [(k + 1, "\t".join(row[k].replace(",", ".") for row in rows)) for k in range(begin, length)]
     columns, words, _, _ = _parse(body, Dialect("\t", ".", len(rows)), names, source)
+    columns = without_repeats(columns, Header(names, units, 0, 0, again, lines[0][0]), source)
     samples = length - begin
     checks.append(Check.of("S11", "warn", f"{len(rows)} lines of {samples} numbers, read with time along the line", where=source,
                            remedy="store one line a sample"))
