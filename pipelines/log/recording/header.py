@@ -251,14 +251,14 @@ def names_and_units(
     """
     pairs = [split_unit(cell) for cell in cells]
     times = Counter(name for name, _ in pairs)
-    names: list[str] = []
+    names: dict[str, None] = {}
     again: dict[str, str] = {}
     for j, (cell, (short, _)) in enumerate(zip(cells, pairs, strict=True)):
         name = (cell.strip() if times[short] > 1 else short) or f"column_{j + 1}"
         if name in names:
             again[f"{name}, column {j + 1}"] = name
             name = f"{name}, column {j + 1}"
-        names.append(name)
+        names[name] = None
     # Where brackets alone distinguish columns, only a known unit in them is one: not a joint's name.
     units = {
         name: unit

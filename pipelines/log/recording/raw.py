@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -198,7 +199,7 @@ def unstacked(table: RawTable) -> RawTable:
     continue each other and neighbouring rows do not: what merely counts modulo k in one motion is no key. Of key "joint",
     "position" becomes "position[elbow]", …; what the k rows of every sample share stays one column.
     """
-    for key, words in (*table.cycles.items(), *_numbers_in_turn(table)):
+    for key, words in (*table.cycles.items(), *itertools.islice(_numbers_in_turn(table), _MOST_KEYS)):
         k = len(words)
         if len(set(words)) < k or not any(_interleaved(values, k) for values in table.columns.values()):
             continue
