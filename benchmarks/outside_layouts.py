@@ -16,7 +16,7 @@ import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from math import sqrt
@@ -362,42 +362,51 @@ def _same(
     return bool(np.all(np.sqrt(np.mean(error**2, axis=0)) <= SAME * 4 * truth.std(axis=0)))
 
 
-def judge(lay: Layout, folder: Path, seed: int) -> tuple[str, str]:
-    """Return (class, details) of one layout, written into `folder`."""
+def written(lay: Layout, folder: Path, seed: int) -> tuple[Run, Answer]:
+    """Write a recording, and the robot beside it, into `folder`."""
     run = simulate(lay.arm, seed, lay.rate)
     if lay.robot:
-        (folder / lay.robot).write_text(
-            lay.arm.urdf() if lay.robot.endswith("urdf") else lay.arm.toml()
-        )
-    answer = lay.write(folder, run)
+        text = lay.arm.urdf() if lay.robot.endswith("urdf") else lay.arm.toml()
+        (folder / lay.robot).write_text(text)
+    return run, lay.write(folder, run)
+
+
+def asks(draft: str) -> list[str]:
+    """Return the lines of a draft that hold a blank."""
+    return [line.strip() for line in draft.splitlines() if ASK in line.partition("#")[0]]
+
+
+def untrue(draft: str, lay: Layout, answer: Answer, run: Run) -> list[str]:
+    """Return what a draft claims that is not true, advice in its comments included."""
+    recipe = tomllib.loads(draft)
+    wrong = wrong_fields(recipe, answer, run, lay.robot)
+    torque = recipe.get("log", {}).get("torque")
+    line = next((line for line in draft.splitlines() if line.startswith("torque =")), "")
+    claimed = torque not in (None, ASK, *answer.torque) and "unsure" not in line
+    if claimed and recipe.get("signals", {}).get("tau"):
+        wrong.append(f"torque: {torque}")
+    if "add sign = -1" in draft:
+        wrong.append("sign")
+    if not asks(draft) and not answer.draftable:
+        wrong.append("a draft without blanks")
+    return wrong
+
+
+def judge(lay: Layout, folder: Path, seed: int) -> tuple[str, str]:
+    """Return (class, details) of one layout, written into `folder`."""
+    run, answer = written(lay, folder, seed)
     done = rrrid("import", "--guess", answer.file, cwd=folder)
     (folder / "draft.toml").write_text(done.stdout)
     if done.returncode:
-        return (
-            "refused" if done.returncode in (2, 3) and "RRID" in done.stderr else "wrong"
-        ), done.stderr.strip()[-300:]
-    draft = tomllib.loads(done.stdout)
-    blank = ASK in re.sub(r"#.*", "", done.stdout)
-    wrong = wrong_fields(draft, answer, run, lay.robot)
-    torque = draft.get("log", {}).get("torque")
-    doubt = next((line for line in done.stdout.splitlines() if line.startswith("torque =")), "")
-    if (
-        torque
-        and ASK not in torque
-        and torque not in answer.torque
-        and "unsure" not in doubt
-        and draft.get("signals", {}).get("tau")
-    ):
-        wrong.append(f"torque: {torque}")
-    if not blank and not answer.draftable:
-        wrong.append("a draft without blanks")
-    if not blank and not wrong:
+        refused = done.returncode in (2, 3) and "RRID" in done.stderr
+        return ("refused" if refused else "wrong"), done.stderr.strip()[-300:]
+    blanks = asks(done.stdout)
+    wrong = untrue(done.stdout, lay, answer, run)
+    if not blanks and not wrong:
         wrong = wrong_values(folder, answer, run)
     if wrong:
         return "wrong", "; ".join(wrong)
-    return ("asks" if blank else "right"), ", ".join(
-        line.strip()[:60] for line in done.stdout.splitlines() if ASK in line.partition("#")[0]
-    )
+    return ("asks" if blanks else "right"), ", ".join(line[:60] for line in blanks)
 
 
 def wilson(k: int, n: int) -> tuple[float, float]:
@@ -407,21 +416,23 @@ def wilson(k: int, n: int) -> tuple[float, float]:
     return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
 
 
+def load(sets: Sequence[str] = SETS) -> list[Layout]:
+    """Return the layouts of some modules, in the order in which they are written."""
+    for part in sets:
+        import_module(f"benchmarks.outside_{part}")
+    wanted = [f"benchmarks.outside_{part}" for part in sets]
+    return [lay for lay in LAYOUTS if lay.write.__module__ in wanted]
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("names", nargs="*")
     parser.add_argument("--set", choices=SETS, action="append")
     parser.add_argument("--keep", type=Path)
     options = parser.parse_args()
-    for part in options.set or SETS:
-        import_module(f"benchmarks.outside_{part}")
+    layouts = load(options.set or SETS)
     counts: dict[str, int] = {}
-    chosen = [
-        lay
-        for lay in LAYOUTS
-        if lay.write.__module__.removeprefix("benchmarks.outside_") in (options.set or SETS)
-        and (not options.names or lay.name in options.names)
-    ]
+    chosen = [lay for lay in layouts if not options.names or lay.name in options.names]
     for k, lay in enumerate(chosen):
         with tempfile.TemporaryDirectory() as scratch:
             folder = (options.keep or Path(scratch)) / lay.name

@@ -24,7 +24,8 @@ from pipelines.log.recording.tabular import read_text
 __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
-_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5"), "json": (".json", ".jsonl"), "text": ()}
+_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "json": (".json", ".jsonl"), "text": (), "mat5": (".mat",),
+            "mat73": (".mat", ".h5", ".hdf5")}
 _REFUSED = ((b"PAR1", "F06", "a Parquet file",
              "rrrid convert and inspect read logs; import reads CSV, JSON, MAT, NPY and NPZ"),
             (b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
