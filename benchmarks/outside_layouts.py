@@ -3,7 +3,7 @@
     python -m benchmarks.outside_layouts [NAME ...] [--set formats] [--keep FOLDER]
 
 Every layout of `outside_formats` (ROS, controllers), `outside_formats_2` (drives, tools, files:
-thirty with these) and `outside_formats_3` (ten made later) copies a real export after its
+thirty with these), `outside_formats_3` and `_4` (ten made later each) copies a real export after its
 documentation or public source code, and states the right answer beside it. A draft is "right" where
 every field that is filled in is true (with no blank it is also imported, and the log compared with
 the simulated motion), "asks" where a field that it cannot know is blank, "refused" with a remedy,
@@ -27,7 +27,7 @@ import numpy as np
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("formats", "formats_2", "formats_3")
+SETS = ("formats", "formats_2", "formats_3", "formats_4")
 
 
 @dataclass(frozen=True)
