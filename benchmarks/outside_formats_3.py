@@ -26,7 +26,8 @@ from benchmarks.outside_layouts import Answer, Run, Signal, layout
 
 @layout(SIX, robot=None, rate=500.0)
 def abb_test_signals(folder: Path, run: Run) -> Answer:
-    """ABB Test Signal Viewer: signals by number (1718 position, 1717 speed, 4947 torque), motor side.
+    """ABB Test Signal Viewer: signals by number (1718 position, 1717 speed, 4947 torque), motor
+    side.
 
     No name says a quantity, and no unit is given: an arm's angle in rad these numbers are not.
     """
@@ -45,7 +46,8 @@ def abb_test_signals(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=100.0)
 def xarm_report(folder: Path, run: Run) -> Answer:
-    """xArm SDK report saved by a script: angles in deg without a unit, currents, no torque, state."""
+    """xArm SDK report saved by a script: angles in deg without a unit, currents, no torque,
+    state."""
     table: dict[str, object] = {"stamp": 1.7e9 + run.t, "state": 1, "mode": 0, "cmdnum": 3}
     table |= block("angle_j{}", np.degrees(run.q)) | block("speed_j{}", np.degrees(run.dq))
     table |= block("current_j{}", run.current) | block("voltage_j{}", 24 + 0 * run.q)
@@ -75,7 +77,8 @@ def matlab_timetable(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, robot="robot.toml")
 def excel_quoted(folder: Path, run: Run) -> Answer:
-    """Excel-minded logger: a line "sep=;", every number in quotes with a decimal comma, German names."""
+    """Excel-minded logger: a line "sep=;", every number in quotes with a decimal comma, German
+    names."""
     table = {"Zeit [s]": run.t} | block("Istwinkel {} [°]", np.degrees(run.q))
     table |= block("Sollwinkel {} [°]", np.degrees(run.q_ref)) | block(
         "Drehmoment {} [Nm]", run.tau
@@ -91,7 +94,8 @@ def excel_quoted(folder: Path, run: Run) -> Answer:
 
 @layout(UR)
 def one_file_an_axis(folder: Path, run: Run) -> Answer:
-    """A folder with a file for each of six axes: axis1.csv holds one joint of the six-joint robot."""
+    """A folder with a file for each of six axes: axis1.csv holds one joint of the six-joint
+    robot."""
     for j in range(6):
         table = {"time": run.t, "pos": run.q[:, j], "vel": run.dq[:, j], "torque": run.tau[:, j]}
         csv(folder / f"axis{j + 1}.csv", table)
@@ -134,7 +138,8 @@ def reversed_joints(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, robot=None, rate=500.0)
 def canopen_objects(folder: Path, run: Run) -> Answer:
-    """CiA 402 objects off the bus: 6064h increments, 606Ch increments/s, 6077h per mille of rated torque."""
+    """CiA 402 objects off the bus: 6064h increments, 606Ch increments/s, 6077h per mille of
+    rated torque."""
     counts = 2**20 / (2 * np.pi)
     table: dict[str, object] = {"timestamp_ns": np.round(run.t * 1e9).astype(np.int64)}
     for j in range(3):
@@ -157,7 +162,8 @@ def canopen_objects(folder: Path, run: Run) -> Answer:
 
 @layout(PANDA, rate=20.0)
 def robomimic_hdf5(folder: Path, run: Run) -> Answer:
-    """robomimic demonstrations in HDF5: data/demo_0/obs/robot0_joint_pos, actions of the tip, no clock."""
+    """robomimic demonstrations in HDF5: data/demo_0/obs/robot0_joint_pos, actions of the tip, no
+    clock."""
     with h5py.File(folder / "demo.hdf5", "w") as file:
         obs = file.create_group("data/demo_0/obs")
         obs["robot0_joint_pos"], obs["robot0_joint_vel"] = run.q, run.dq
@@ -171,7 +177,8 @@ def robomimic_hdf5(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=100.0)
 def long_table_with_holes(folder: Path, run: Run) -> Answer:
-    """A database query result: one row a joint, some rows lost, ISO stamps; no two joints in one row."""
+    """A database query result: one row a joint, some rows lost, ISO stamps; no two joints in one
+    row."""
     n, order = run.n, [5, 3, 4, 0, 1, 2]
     stamp = pd.to_datetime(1.71e18 + np.round(np.repeat(run.t, n) * 1e9, -3))
     table = pd.DataFrame(

@@ -1,4 +1,5 @@
-"""Write one simulated motion as ten exports of yet other kinds do, made after the thirty and the ten were mended."""
+"""Write one simulated motion as ten exports of yet other kinds do, made after the thirty and the
+ten were mended."""
 
 from pathlib import Path
 
@@ -30,7 +31,8 @@ SO100 = Arm(
 
 @layout(THREE, robot="robot.toml")
 def dymola_result(folder: Path, run: Run) -> Answer:
-    """Modelica result as CSV: quoted paths, phi, w, a and tau of each flange (Modelica.Mechanics.Rotational)."""
+    """Modelica result as CSV: quoted paths, phi, w, a and tau of each flange
+    (Modelica.Mechanics.Rotational)."""
     table: dict[str, np.ndarray] = {"time": run.t}
     for j in range(3):
         flange = f"robot.axis{j + 1}"
@@ -68,7 +70,8 @@ def controldesk_csv(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, robot=None, rate=250.0)
 def sinamics_trace(folder: Path, run: Run) -> Answer:
-    """Siemens drive trace: parameters by number (r482 encoder, r61 speed, r80 torque) a drive, motor side."""
+    """Siemens drive trace: parameters by number (r482 encoder, r61 speed, r80 torque) a drive,
+    motor side."""
     gear = np.array([121.0, 121.0, 101.0, 80.0, 80.0, 51.0])
     table: dict[str, np.ndarray] = {"Time [ms]": run.t * 1000}
     for j in range(6):
@@ -87,7 +90,8 @@ def sinamics_trace(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=125.0)
 def webots_sensors(folder: Path, run: Run) -> Answer:
-    """Webots controller log: NAME_sensor positions, torque feedback by motor name, gripper fingers."""
+    """Webots controller log: NAME_sensor positions, torque feedback by motor name, gripper
+    fingers."""
     table: dict[str, np.ndarray] = {"sim_time": run.t + 0.032}
     for j, joint in enumerate(run.arm.joints):
         table[f"{joint}_sensor"] = run.q[:, j]
@@ -123,7 +127,8 @@ def coppelia_graph(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=500.0)
 def dot_by_letter_p(folder: Path, run: Run) -> Answer:
-    """A German laboratory's notation: q, qp and qpp for the derivatives ("Punkt"), Q for the torque."""
+    """A German laboratory's notation: q, qp and qpp for the derivatives ("Punkt"), Q for the
+    torque."""
     table: dict[str, np.ndarray] = {"t": run.t}
     for name, v in (("q", run.q), ("qp", run.dq), ("qpp", run.ddq), ("qsoll", run.q_ref)):
         table |= block(f"{name}{{}}", v)
@@ -141,7 +146,8 @@ def dot_by_letter_p(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, robot="robot.toml")
 def adams_table(folder: Path, run: Run) -> Answer:
-    """MSC Adams result table: a title, quoted names, fixed width, Fortran exponents, degrees, N mm."""
+    """MSC Adams result table: a title, quoted names, fixed width, Fortran exponents, degrees, N
+    mm."""
     head = ["Time", *names(".arm.JOINT_{}_ANGLE.Q", 3), *names(".arm.MOTION_{}.TORQUE.Q", 3)]
     values = np.column_stack([run.t, np.degrees(run.q), 1000 * run.tau])
     rows = ["".join(f"{x:18.8E}".replace("E", "D") for x in row) for row in values]
@@ -156,7 +162,8 @@ def adams_table(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=100.0)
 def two_arms(folder: Path, run: Run) -> Answer:
-    """Two arms of one type in a table, left/joint_1 … right/joint_6, beside the description of one."""
+    """Two arms of one type in a table, left/joint_1 … right/joint_6, beside the description of
+    one."""
     left = np.roll(run.q, 200, axis=0), np.roll(run.dq, 200, axis=0), np.roll(run.tau, 200, axis=0)
     table: dict[str, np.ndarray] = {"time": 1.7e9 + run.t}
     for side, (q, dq, tau) in (("left", left), ("right", (run.q, run.dq, run.tau))):
@@ -169,7 +176,8 @@ def two_arms(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, robot="robot.toml")
 def greek_names(folder: Path, run: Run) -> Answer:
-    """A notebook's data frame with Greek names: φ1 [°], φ̇1 [°/s], τ1 [N·m], written by pandas with its index."""
+    """A notebook's data frame with Greek names: φ1 [°], φ̇1 [°/s], τ1 [N·m], written by pandas
+    with its index."""
     table: dict[str, np.ndarray] = {"t [s]": run.t}
     table |= block("φ{} [°]", np.degrees(run.q)) | block("φ̇{} [°/s]", np.degrees(run.dq))
     table |= block("τ{} [N·m]", run.tau) | block("ϑ{} [°C]", run.temperature)
@@ -184,7 +192,8 @@ def greek_names(folder: Path, run: Run) -> Answer:
 
 @layout(SO100, rate=30.0)
 def so100_normalised(folder: Path, run: Run) -> Answer:
-    """LeRobot SO-100 table: positions normalised to -100..100 of the calibrated range; no unit of angle."""
+    """LeRobot SO-100 table: positions normalised to -100..100 of the calibrated range; no unit
+    of angle."""
     reach = np.array([1.9, 1.7, 1.6, 1.8, 2.8])
     table: dict[str, object] = {"timestamp": run.t, "frame_index": np.arange(len(run.t))}
     table |= {

@@ -3,9 +3,9 @@
     python -m benchmarks.outside_layouts [NAME ...] [--set formats] [--keep FOLDER]
 
 Every layout of `outside_formats` (ROS, controllers), `outside_formats_2` (drives, tools, files:
-thirty with these), `outside_formats_3` and `_4` (ten made later each) copies a real export after its
-documentation or public source code, and states the right answer beside it. A draft is "right" where
-every field that is filled in is true (with no blank it is also imported, and the log compared with
+thirty with these), `outside_formats_3` and `_4` (ten made later each) copies a real export after
+its documentation or public source code, and states the right answer beside it. A draft is "right"
+where every field that is filled in is true (with no blank it is also imported, and the log compared with
 the simulated motion), "asks" where a field that it cannot know is blank, "refused" with a remedy,
 or "wrong": a field is filled in that is not true.
 """
@@ -429,6 +429,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*")
     parser.add_argument("--set", choices=SETS, action="append")
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--seed", type=int, default=5100, help="of the first motion")
     options = parser.parse_args()
     layouts = load(options.set or SETS)
     counts: dict[str, int] = {}
@@ -437,7 +438,7 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as scratch:
             folder = (options.keep or Path(scratch)) / lay.name
             folder.mkdir(parents=True, exist_ok=True)
-            verdict, details = judge(lay, folder, seed=5100 + k)
+            verdict, details = judge(lay, folder, seed=options.seed + k)
         counts[verdict] = counts.get(verdict, 0) + 1
         print(f"{lay.name:26} {verdict:8} {details}", flush=True)
     good, n = sum(counts.get(c, 0) for c in ("right", "asks")), len(chosen)

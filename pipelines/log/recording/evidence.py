@@ -13,8 +13,8 @@ from pipelines.log.experiment import Array
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 
-__all__ = ["ANGULAR_RATIOS", "Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
-           "slide_unit", "slope_of", "torque_unit", "unknown_unit", "velocity_unit"]
+__all__ = ["Guess", "Slope", "held", "motion_of", "normalised", "position_unit", "quarter_turns", "rollover", "sign_of", "slide_unit",
+           "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
@@ -46,7 +46,7 @@ def rollover(values: Array) -> float | None:
 
 
 # Slope of the position over recorded velocity, by their units: q in the first, dq in the second.
-ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
+_ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
                   6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
 _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
@@ -169,6 +169,12 @@ def _by_size(q: Array, t: Array | None, span: float) -> Guess:
     return Guess("", "unsure", f"up to {far:.5g}: neither an arm's in rad nor in deg; motor side, or counts?")
 
 
+def normalised(q: Array) -> bool:
+    """Tell whether positions may be scaled to their range: within -1..1, or beyond that within -100..100."""
+    far = float(np.abs(q).max())
+    return far <= 1.0 or 2.0 * math.pi < far <= 100.0
+
+
 def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
     """The unit of the position of one sliding joint, "" where it stays open."""
     if named in ("m", "mm", "um"):
@@ -222,21 +228,25 @@ def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tup
             f', counts_per_rev = "{BLANK}"')
 
 
+def units_of_ratio(factor: float, tolerance: float = 0.1) -> tuple[str, str] | None:
+    """The units of position and velocity that are a factor apart, ("", "") where both have one unit of angle, else None."""
+    return next((units for ratio, units in _ANGULAR_RATIOS.items() if abs(factor / ratio - 1.0) <= tolerance), None)
+
+
 def _by_velocity(slope: Slope) -> Guess | None:
     """The unit that the recorded velocity decides: where both have one unit of angle it decides nothing."""
-    near = min(ANGULAR_RATIOS, key=lambda ratio: abs(math.log(slope.factor / ratio)) if slope.factor > 0 else math.inf)
-    unit, speed = ANGULAR_RATIOS[near]
-    if slope.factor <= 0 or abs(slope.factor / near - 1.0) > 0.1 or not unit:
+    unit, speed = units_of_ratio(slope.factor) or ("", "")
+    if not unit:
         return None
     return Guess(unit, "likely", f"its slope is {slope.factor:.4g} times the recorded velocity, as with {unit} and {speed}")
 
 
 def velocity_unit(slope: Slope, position: str) -> str:
     """The unit of a velocity by that of the position whose slope it is, "" where their ratio fits none."""
-    near = min(ANGULAR_RATIOS, key=lambda ratio: abs(math.log(slope.factor / ratio)) if slope.factor > 0 else math.inf)
-    if slope.factor <= 0 or abs(slope.factor / near - 1.0) > 0.1:
+    units = units_of_ratio(slope.factor)
+    if units is None:
         return ""
-    unit, speed = ANGULAR_RATIOS[near]
+    unit, speed = units
     same = {"rad": "rad/s", "deg": "deg/s", "m": "m/s", "mm": "mm/s", "rev": "rev/s", "turn": "rev/s"}
     return same.get(position, "") if not unit else speed if unit == position else ""
 
