@@ -230,7 +230,8 @@ def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tup
 
 def units_of_ratio(factor: float, tolerance: float = 0.1) -> tuple[str, str] | None:
     """The units of position and velocity that are a factor apart, ("", "") where both have one unit of angle, else None."""
-    return next((units for ratio, units in _ANGULAR_RATIOS.items() if abs(factor / ratio - 1.0) <= tolerance), None)
+    nearest = min(_ANGULAR_RATIOS, key=lambda ratio: abs(factor / ratio - 1.0))
+    return _ANGULAR_RATIOS[nearest] if abs(factor / nearest - 1.0) <= tolerance else None
 
 
 def _by_velocity(slope: Slope) -> Guess | None:
