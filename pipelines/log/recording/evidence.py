@@ -13,8 +13,8 @@ from pipelines.log.experiment import Array
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 
-__all__ = ["Guess", "Slope", "held", "motion_of", "normalised", "position_unit", "quarter_turns", "rollover", "sign_of", "slide_unit",
-           "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
+__all__ = ["Guess", "Slope", "held", "motion_of", "normalised", "position_unit", "quarter_turns", "rollover", "sign_of",
+           "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
