@@ -198,20 +198,6 @@ def _tau_unit(unit: str = "N m") -> dict[str, Any]:
 
 
 @layout
-def layout_plotjuggler_brackets() -> Layout:
-    """The same without names: /joint_states/position[0]."""
-    m = motion(6, 0.01)
-    columns: Columns = {
-        "__time": 1.65e9 + m.t,
-        "/joint_states/header/seq": 10.0 + np.arange(SAMPLES),
-        "/joint_states/position[#]": m.q,
-        "/joint_states/velocity[#]": m.dq,
-        "/joint_states/effort[#]": m.tau,
-    }
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
 def layout_ur_rtde() -> Layout:
     """RTDE_Python_Client_Library record.py: blanks between, target and actual of everything."""
     m = motion(6, 0.008)
@@ -394,34 +380,6 @@ def layout_json_lines_by_name() -> Layout:
 
 
 @layout
-def layout_german_spreadsheet() -> Layout:
-    """Semicolons, decimal commas, German names, Windows' encoding."""
-    m = motion(6, 0.01)
-    columns: Columns = (
-        {"Zeit [s]": m.t}
-        | {f"Achse {j + 1} Istwinkel [°]": np.rad2deg(m.q[:, j]) for j in range(6)}
-        | {f"Achse {j + 1} Sollwinkel [°]": np.rad2deg(m.q[:, j]) + 0.1 for j in range(6)}
-        | {f"Achse {j + 1} Drehmoment [Nm]": m.tau[:, j] for j in range(6)}
-    )
-    return Layout(
-        ARM | {"run.csv": table(columns, ";", decimal=",", encoding="cp1252")}, m.t, m.q, m.tau
-    )
-
-
-@layout
-def layout_tabs_units_row() -> Layout:
-    """Tabs, and a row of units below the names."""
-    m = motion(6, 0.01)
-    body = (
-        table({"time": m.t * 1e3, "pos#1": np.rad2deg(m.q), "trq#1": m.tau * 1e3}, "\t")
-        .decode()
-        .split("\n")
-    )
-    body.insert(1, "\t".join(["ms", *["deg"] * 6, *["mNm"] * 6]))
-    return Layout(ARM | {"run.tsv": "\n".join(body).encode()}, m.t, m.q, m.tau, recording="run.tsv")
-
-
-@layout
 def layout_r_write_table() -> Layout:
     """R's write.table: the rows' numbers have no name."""
     m = motion(3, 0.01)
@@ -530,19 +488,6 @@ def layout_headerless_two_references() -> Layout:
 
 
 @layout
-def layout_header_stamp() -> Layout:
-    """header.stamp.sec and nanosec beside a time of writing."""
-    m = motion(6, 0.01)
-    columns: Columns = {
-        "header.stamp.sec": 1.6e9 + np.floor(m.t),
-        "header.stamp.nanosec": np.round((m.t % 1.0) * 1e9),
-        "position[#]": m.q,
-        "effort[#]": m.tau,
-    }
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
 def layout_time_sec_nsec() -> Layout:
     """time_sec and time_nsec, torques called effort, references beside."""
     m = motion(6, 0.01)
@@ -643,27 +588,6 @@ def layout_names_without_robot() -> Layout:
         m.q,
         m.tau,
         answers,
-    )
-
-
-@layout
-def layout_beckhoff_per_mille() -> Layout:
-    """Torques in per mille of the rated torque, whole numbers; positions in degrees."""
-    m = motion(6, 0.01)
-    rated = 40.0
-    raw = np.round(m.tau / rated * 1e3)
-    columns: Columns = {
-        "TimeMs": np.round(m.t * 1e3),
-        "Axis#1.ActPos": np.rad2deg(m.q),
-        "Axis#1.SetPos": np.rad2deg(m.q) + 0.01,
-        "Axis#1.ActTorque": raw,
-    }
-    return Layout(
-        ARM | {"run.csv": table(columns)},
-        m.t,
-        m.q,
-        raw * rated / 1e3,
-        {"signals.tau.unit": "N m", "signals.tau.scale": rated / 1e3},
     )
 
 

@@ -12,10 +12,8 @@ from benchmarks.outside_layouts import Layout, untrue, written
 from pipelines.log.recording.guess import guess_recipe
 
 RIGHT = {
-    "clock_times", "command_only", "german_spreadsheet", "header_stamp", "json_arrays", "json_frames",
-    "json_lines_by_name", "matlab_struct", "names_in_front", "panda_py",
-    "percent_header_units", "plotjuggler_brackets", "savetxt_header", "tabs_units_row",
-    "time_sec_nsec", "trailing_comma", "transposed_named",
+    "clock_times", "command_only", "json_arrays", "json_frames", "json_lines_by_name", "matlab_struct", "names_in_front",
+    "panda_py", "percent_header_units", "savetxt_header", "time_sec_nsec", "trailing_comma", "transposed_named",
 }  # fmt: skip
 
 
