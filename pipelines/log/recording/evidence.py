@@ -131,6 +131,13 @@ def unknown_unit(named: str) -> Guess:
     return Guess("", "unsure", f"its name or header says '{named}', which is no unit that import knows here")
 
 
+def _inside(q: Array, joint: Joint) -> bool:
+    """Tell whether positions keep the limits of a joint, but for a twentieth of its range."""
+    low, high = joint.position
+    slack = 0.05 * (high - low)
+    return bool(q.min() >= low - slack and q.max() <= high + slack)
+
+
 def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | None:
     """The unit under which the motion keeps the robot's limits."""
     limited = [(j, joint) for j, joint in enumerate(joints) if all(map(math.isfinite, joint.position))]
@@ -138,12 +145,7 @@ def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | No
         return None
 
     def inside(factor: float) -> bool:
-        for j, joint in limited:
-            low, high = joint.position
-            slack = 0.05 * (high - low)
-            if factor * q[:, j].min() < low - slack or factor * q[:, j].max() > high + slack:
-                return False
-        return True
+        return all(_inside(factor * q[:, j], joint) for j, joint in limited)
 
     if inside(1.0) and inside(2.0 * math.pi):
         return _RAD_OR_TURNS
@@ -181,12 +183,9 @@ def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
         return Guess(named, "sure", "named so")
     if named is not None:
         return unknown_unit(named)
-    low, high = joint.position
-    if math.isfinite(low) and math.isfinite(high):
-        slack = 0.05 * (high - low)
-        for unit, factor in (("m", 1.0), ("mm", 1e-3)):
-            if factor * q.min() >= low - slack and factor * q.max() <= high + slack:
-                return Guess(unit, "likely", f"inside the limits of sliding joint '{joint.name}' in {unit}")
+    for unit, factor in (("m", 1.0), ("mm", 1e-3)):
+        if all(map(math.isfinite, joint.position)) and _inside(factor * q, joint):
+            return Guess(unit, "likely", f"inside the limits of sliding joint '{joint.name}' in {unit}")
     return Guess("", "unsure", f"'{joint.name}' slides: m or mm?")
 
 
