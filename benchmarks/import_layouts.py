@@ -96,7 +96,7 @@ def motion(
         dq += w * (a * c - b * s)
         ddq -= w * w * (a * s + b * c)
     size = np.where(np.isin(np.arange(n), slides), 0.1, 1.0) * np.minimum(
-        1.0 / np.abs(q).max(axis=0), 30.0 / np.abs(ddq).max(axis=0)
+        1.3 / np.abs(q).max(axis=0), 120.0 / np.abs(ddq).max(axis=0)
     )
     q, dq, ddq = (x * size for x in (q, dq, ddq))
     q += rng.uniform(-0.5, 0.5, n) * np.where(np.isin(np.arange(n), slides), 0.05, 1.0)
@@ -198,84 +198,6 @@ def _tau_unit(unit: str = "N m") -> dict[str, Any]:
 
 
 @layout
-def layout_rostopic_echo_p() -> Layout:
-    """`rostopic echo -p /joint_states`: %time header, names as text, joints in alphabetical order."""
-    m = motion(6, 0.008)
-    stamp = 1.6e18 + np.round(m.t * 1e9)
-    o = ALPHABETICAL
-    rows: Columns = {
-        "%time": stamp,
-        "field.header.seq": np.arange(SAMPLES),
-        "field.header.stamp": stamp,
-        "field.header.frame_id": [""] * SAMPLES,
-    }
-    names: Columns = {f"field.name{k}": [UR[j]] * SAMPLES for k, j in enumerate(o)}
-    data = table(
-        rows
-        | names
-        | {
-            "field.position#": m.q[:, o],
-            "field.velocity#": m.dq[:, o],
-            "field.effort#": m.tau[:, o],
-        }
-    )
-    return Layout(ARM | {"run.csv": data}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_ros2_topic_echo_csv() -> Layout:
-    """`ros2 topic echo --csv`: no header; sec, nanosec, frame, names, positions, velocities, efforts."""
-    m = motion(6, 0.008)
-    o = ALPHABETICAL
-    columns: Columns = {
-        "a": 1.7e9 + np.floor(m.t),
-        "b": np.round((m.t % 1.0) * 1e9),
-        "c": [""] * SAMPLES,
-    }
-    names: Columns = {f"n{k}": [UR[j]] * SAMPLES for k, j in enumerate(o)}
-    data = table(
-        columns | names | {"p#": m.q[:, o], "v#": m.dq[:, o], "e#": m.tau[:, o]}, header=False
-    )
-    q, tau = ([f"column_{10 + 6 * b + o.index(j)}" for j in range(6)] for b in (0, 2))
-    return Layout(
-        ARM | {"run.csv": data},
-        m.t,
-        m.q,
-        m.tau,
-        _tau_unit() | {"signals.q.columns": q, "signals.q.unit": "rad", "signals.tau.columns": tau},
-    )
-
-
-@layout
-def layout_plotjuggler() -> Layout:
-    """PlotJuggler's CSV export: __time, then one column a path, sorted."""
-    m = motion(6, 0.01)
-    o = ALPHABETICAL
-    columns: Columns = {"__time": 1.65e9 + m.t}
-    for j in o:
-        columns |= {
-            f"/joint_states/{UR[j]}/effort": m.tau[:, j],
-            f"/joint_states/{UR[j]}/position": m.q[:, j],
-            f"/joint_states/{UR[j]}/velocity": m.dq[:, j],
-        }
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_plotjuggler_brackets() -> Layout:
-    """The same without names: /joint_states/position[0]."""
-    m = motion(6, 0.01)
-    columns: Columns = {
-        "__time": 1.65e9 + m.t,
-        "/joint_states/header/seq": 10.0 + np.arange(SAMPLES),
-        "/joint_states/position[#]": m.q,
-        "/joint_states/velocity[#]": m.dq,
-        "/joint_states/effort[#]": m.tau,
-    }
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
 def layout_ur_rtde() -> Layout:
     """RTDE_Python_Client_Library record.py: blanks between, target and actual of everything."""
     m = motion(6, 0.008)
@@ -313,34 +235,11 @@ def layout_ur_currents_only() -> Layout:
 
 
 @layout
-def layout_libfranka() -> Layout:
-    """The record that libfranka writes on an error: states and commands side by side."""
-    m = motion(7, 0.001)
-    columns: Columns = {
-        "time [ms]": np.round(m.t * 1e3),
-        "success_rate": np.ones(SAMPLES),
-        "O_T_EE[#]": np.tile(m.q[:, :1], (1, 16)),
-        "q[#]": m.q,
-        "q_d[#]": m.q + 1e-3,
-        "dq[#]": m.dq,
-        "dq_d[#]": m.dq,
-        "ddq_d[#]": m.dq * 0.1,
-        "tau_J[#]": m.tau,
-        "tau_J_d[#]": m.tau - 5.0,
-        "dtau_J[#]": m.tau * 3.0,
-        "tau_ext_hat_filtered[#]": m.tau * 0.1,
-        "theta[#]": m.q + 1e-4,
-        "dtheta[#]": m.dq,
-    }
-    return Layout({"panda.urdf": urdf(PANDA), "run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
 def layout_panda_py() -> Layout:
     """panda_py's log through pandas: an index column without a name, stamps in ms."""
-    m = motion(7, 0.001)
+    m = motion(7, 0.001, samples=2000)
     columns: Columns = {
-        "": np.arange(SAMPLES),
+        "": np.arange(len(m.t)),
         "time": 88000.0 + np.round(m.t * 1e3),
         "q_#": m.q,
         "dq_#": m.dq,
@@ -398,82 +297,6 @@ def layout_kuka_rsi() -> Layout:
 
 
 @layout
-def layout_kuka_fri() -> Layout:
-    """KUKA Sunrise FRI client log: measured, commanded and external torque, stamp in two columns."""
-    m = motion(7, 0.005)
-    columns: Columns = {
-        "TimeStampSec": 1.6e9 + np.floor(m.t),
-        "TimeStampNanoSec": np.round((m.t % 1.0) * 1e9),
-        "MeasuredJointPosition_A#1": m.q,
-        "CommandedJointPosition_A#1": m.q + 1e-3,
-        "MeasuredTorque_A#1": m.tau,
-        "CommandedTorque_A#1": m.tau - 1.0,
-        "ExternalTorque_A#1": 0.1 * m.tau,
-    }
-    names = tuple(f"lbr_A{j}" for j in range(1, 8))
-    return Layout({"iiwa.urdf": urdf(names), "run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_doosan() -> Layout:
-    """Doosan's real-time output: degrees, several torques, tool position."""
-    m = motion(6, 0.01)
-    deg = np.rad2deg(m.q)
-    columns: Columns = {
-        "time_stamp": 12.5 + m.t,
-        "actual_joint_position#": deg,
-        "actual_joint_velocity#": np.rad2deg(m.dq),
-        "actual_tcp_position#": 100.0 * m.q,
-        "actual_motor_torque#": m.tau * 1.1,
-        "actual_joint_torque#": m.tau,
-        "raw_joint_torque#": m.tau + 0.5,
-        "external_joint_torque#": 0.1 * m.tau,
-        "target_joint_position#": deg + 0.01,
-        "target_motor_torque#": m.tau - 1.0,
-        "joint_temperature#": 35.0 + 0.1 * m.q,
-    }
-    names = tuple(f"joint_{j}" for j in range(1, 7))
-    return Layout({"m1013.urdf": urdf(names), "run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_xarm() -> Layout:
-    """xArm report: angles in degrees without a unit, joint torques, no robot beside."""
-    m = motion(7, 0.01)
-    columns: Columns = {"time": m.t, "angle_#1": np.rad2deg(m.q), "joint_torque_#1": m.tau}
-    return Layout(
-        {"run.csv": table(columns), "robot/x.urdf": urdf(PANDA)},
-        m.t,
-        m.q,
-        m.tau,
-        {"robot.use": "robot/x.urdf", "signals.q.unit": "deg", "signals.tau.unit": "N m"},
-    )
-
-
-@layout
-def layout_kinova() -> Layout:
-    """Kinova Kortex feedback: a record an actuator, degrees from 0 to 360, currents and temperatures."""
-    m = motion(7, 0.01)
-    columns: Columns = {"timestamp_us": np.round(m.t * 1e6)}
-    for j in range(7):
-        columns |= {
-            f"actuators[{j}].position": np.rad2deg(m.q[:, j]),
-            f"actuators[{j}].velocity": np.rad2deg(m.dq[:, j]),
-            f"actuators[{j}].torque": m.tau[:, j],
-            f"actuators[{j}].current_motor": m.tau[:, j] / 9.0,
-            f"actuators[{j}].voltage": 24.0 + 0.01 * m.q[:, j],
-            f"actuators[{j}].temperature_motor": 40.0 + 0.1 * m.q[:, j],
-        }
-    columns |= {f"base.tool_pose_{c}": m.q[:, k] for k, c in enumerate("xyz")}
-    return Layout(
-        {"gen3.urdf": urdf(tuple(f"Actuator{j}" for j in range(1, 8))), "run.csv": table(columns)},
-        m.t,
-        m.q,
-        m.tau,
-    )
-
-
-@layout
 def layout_matlab_writematrix() -> Layout:
     """writematrix([t q dq tau]): no header."""
     m = motion(6, 0.002)
@@ -492,24 +315,6 @@ def layout_matlab_struct() -> Layout:
         file, {"data": {"t": m.t[:, None], "q": m.q, "qd": m.dq, "tau": m.tau, "q_ref": m.q + 1e-3}}
     )
     return Layout(ARM | {"run.mat": file.getvalue()}, m.t, m.q, m.tau, recording="run.mat")
-
-
-@layout
-def layout_matlab_timetable() -> Layout:
-    """writetimetable: durations with their unit as text, "0.002 sec"."""
-    m = motion(3, 0.002)
-    columns: Columns = {
-        "Time": [f"{x:.6g} sec" for x in m.t],
-        "Position_#1": m.q,
-        "Torque_#1": m.tau,
-    }
-    return Layout(
-        {"run.csv": table(columns)},
-        m.t,
-        m.q,
-        m.tau,
-        {"robot.use": "rrr", "time.rate": 500.0} | _tau_unit(),
-    )
 
 
 @layout
@@ -572,56 +377,6 @@ def layout_json_lines_by_name() -> Layout:
         m.tau,
         recording="run.jsonl",
     )
-
-
-@layout
-def layout_labview_lvm() -> Layout:
-    """A LabVIEW measurement file: two headers, a last column for comments."""
-    m = motion(3, 0.002)
-    head = (
-        "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\nDecimal_Separator\t.\nTime_Pref\tRelative\n"
-        "***End_of_Header***\t\n\t\nChannels\t6\nSamples\t700\t700\t700\n***End_of_Header***\t\n"
-    )
-    body = (
-        table({"X_Value": m.t, "Position #1": m.q, "Torque #1": m.tau}, "\t").decode().split("\n")
-    )
-    body[0] += "\tComment"
-    return Layout(
-        {"run.lvm": (head + "\n".join(body)).encode()},
-        m.t,
-        m.q,
-        m.tau,
-        {"robot.use": "rrr"} | _tau_unit(),
-        "run.lvm",
-    )
-
-
-@layout
-def layout_german_spreadsheet() -> Layout:
-    """Semicolons, decimal commas, German names, Windows' encoding."""
-    m = motion(6, 0.01)
-    columns: Columns = (
-        {"Zeit [s]": m.t}
-        | {f"Achse {j + 1} Istwinkel [°]": np.rad2deg(m.q[:, j]) for j in range(6)}
-        | {f"Achse {j + 1} Sollwinkel [°]": np.rad2deg(m.q[:, j]) + 0.1 for j in range(6)}
-        | {f"Achse {j + 1} Drehmoment [Nm]": m.tau[:, j] for j in range(6)}
-    )
-    return Layout(
-        ARM | {"run.csv": table(columns, ";", decimal=",", encoding="cp1252")}, m.t, m.q, m.tau
-    )
-
-
-@layout
-def layout_tabs_units_row() -> Layout:
-    """Tabs, and a row of units below the names."""
-    m = motion(6, 0.01)
-    body = (
-        table({"time": m.t * 1e3, "pos#1": np.rad2deg(m.q), "trq#1": m.tau * 1e3}, "\t")
-        .decode()
-        .split("\n")
-    )
-    body.insert(1, "\t".join(["ms", *["deg"] * 6, *["mNm"] * 6]))
-    return Layout(ARM | {"run.tsv": "\n".join(body).encode()}, m.t, m.q, m.tau, recording="run.tsv")
 
 
 @layout
@@ -733,19 +488,6 @@ def layout_headerless_two_references() -> Layout:
 
 
 @layout
-def layout_header_stamp() -> Layout:
-    """header.stamp.sec and nanosec beside a time of writing."""
-    m = motion(6, 0.01)
-    columns: Columns = {
-        "header.stamp.sec": 1.6e9 + np.floor(m.t),
-        "header.stamp.nanosec": np.round((m.t % 1.0) * 1e9),
-        "position[#]": m.q,
-        "effort[#]": m.tau,
-    }
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
 def layout_time_sec_nsec() -> Layout:
     """time_sec and time_nsec, torques called effort, references beside."""
     m = motion(6, 0.01)
@@ -846,27 +588,6 @@ def layout_names_without_robot() -> Layout:
         m.q,
         m.tau,
         answers,
-    )
-
-
-@layout
-def layout_beckhoff_per_mille() -> Layout:
-    """Torques in per mille of the rated torque, whole numbers; positions in degrees."""
-    m = motion(6, 0.01)
-    rated = 40.0
-    raw = np.round(m.tau / rated * 1e3)
-    columns: Columns = {
-        "TimeMs": np.round(m.t * 1e3),
-        "Axis#1.ActPos": np.rad2deg(m.q),
-        "Axis#1.SetPos": np.rad2deg(m.q) + 0.01,
-        "Axis#1.ActTorque": raw,
-    }
-    return Layout(
-        ARM | {"run.csv": table(columns)},
-        m.t,
-        m.q,
-        raw * rated / 1e3,
-        {"signals.tau.unit": "N m", "signals.tau.scale": rated / 1e3},
     )
 
 

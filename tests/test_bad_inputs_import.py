@@ -184,7 +184,7 @@ def test_s04_assume_units_takes_si_and_says_so(folder: Path) -> None:
 def test_s05_newton_metres_that_are_newton_millimetres(folder: Path) -> None:
     """S05: the remedy stands in the recipe, for there is no log yet; with it the import is in order."""
     columns = good()
-    write(folder, text(columns | {f"tau_{j}": 300.0 * columns[f"tau_{j}"] for j in (1, 2, 3)}))
+    write(folder, text(columns | {f"tau_{j}": 200.0 * columns[f"tau_{j}"] for j in (1, 2, 3)}))
     with pytest.raises(InputRejected, match=r'RRID-S05.*looks like N mm.*Declare the unit of tau .* unit = "N mm"'):
         run(folder)
     assert run(folder, RECIPE.replace('"N m"', '"N mm"')).result.logs

@@ -273,7 +273,7 @@ def test_c04_the_folder_of_the_recordings_is_asked_for(tmp_path: Path) -> None:
 def test_s07_motor_positions_are_named_with_the_ratio_they_need(folder: Path) -> None:
     """Motors at 32 quarter turns at rest: degrees are one reading, [drive] the other; both stand in the remedy."""
     columns = good()
-    write(folder, text(columns | {f"q_{j}": 16.0 * np.pi + 60.0 * columns[f"q_{j}"] for j in (1, 2, 3)}))
+    write(folder, text(columns | {f"q_{j}": 16.0 * np.pi + 40.0 * columns[f"q_{j}"] for j in (1, 2, 3)}))
     joint = '[[robot.joint]]\nname = "j"\ntype = "revolute"\na = 0.0\nalpha = 0.0\nd = 0.0\noffset = 0.0\nposition = [-2.0, 2.0]\n'
     recipe = RECIPE.replace('use = "rrr"',
                             'name = "r"\ngravity = [0.0, 0.0, -9.81]\n[robot.kinematics]\nconvention = "dh"\n' + 3 * joint)
@@ -286,7 +286,7 @@ def test_s07_motor_positions_are_named_with_the_ratio_they_need(folder: Path) ->
 def test_s07_radians_of_motors_declared_as_degrees_are_noticed(folder: Path) -> None:
     """32 quarter turns in radians, called degrees: a log that nothing else contradicts, with torques 30 times too small."""
     columns = good()
-    write(folder, text(columns | {f"q_{j}": 16.0 * np.pi + 60.0 * columns[f"q_{j}"] for j in (1, 2, 3)}))
+    write(folder, text(columns | {f"q_{j}": 16.0 * np.pi + 40.0 * columns[f"q_{j}"] for j in (1, 2, 3)}))
     outcome = run(folder, RECIPE.replace('"rad"', '"deg"'))
     (found,) = [c for c in outcome.checks if c.code == "RRID-S07"]
     assert "start at 32, 32, 32 times pi/2" in found.message

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import ast
+import io
 import math
+import struct
 import warnings
+import zipfile
+import zlib
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import InputRejected
+from pipelines.errors import InputRejected, UsageError
 
-__all__ = ["read_npy"]
+__all__ = ["read_npy", "read_npz"]
 
 _LONGEST_HEADER = 65_536
 _BUDGET = 4 << 30  # [B]
+_MOST_PACKED = 1100  # to 1, what deflate reaches at most
 
 
 def read_npy(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]:
@@ -41,6 +46,31 @@ def read_npy(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]:
     if array.ndim != 1:
         raise InputRejected("S11", f"a structured array of shape {shape}", where=source, remedy="save one record a sample")
     return {name: array[name] for name in kind.names}
+
+
+def read_npz(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]:
+    """The arrays of a NumPy archive by name. Nothing is written to disk; it runs in the guarded child.
+
+    Raises:
+        UsageError: X12, it holds anything but arrays.
+        InputRejected: F08 damaged, X05 larger than a recording, and what `read_npy` raises.
+    """
+    found: dict[str, npt.NDArray[np.generic]] = {}
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = archive.infolist()
+            if any(not member.filename.endswith(".npy") for member in members):
+                raise UsageError("X12", "an archive of other files than arrays, not a recording", where=source, remedy="unpack it")
+            declared = sum(member.file_size for member in members)
+            if declared > min(_BUDGET, _MOST_PACKED * len(data) + (64 << 20)):
+                raise InputRejected("X05", f"declares {declared} bytes", where=source, remedy="split the recording")
+            for member in members:
+                name = member.filename.removesuffix(".npy")
+                arrays = read_npy(archive.read(member), f"{source}, array {name}")
+                found |= {name if field == "column" else f"{name}.{field}": array for field, array in arrays.items()}
+    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError, ValueError, struct.error):
+        raise InputRejected("F08", "truncated or damaged NPZ archive", where=source, remedy="save or copy it again") from None
+    return found
 
 
 def _header(data: bytes, source: str) -> tuple[np.dtype[np.generic], bool, tuple[int, ...], int]:

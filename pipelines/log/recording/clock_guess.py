@@ -17,14 +17,17 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.log.recording.column_names import read_name, words_of
 from pipelines.log.recording.column_roles import Group, unit_of_group
-from pipelines.log.recording.evidence import ANGULAR_RATIOS, Guess, Slope
+from pipelines.log.recording.evidence import Guess, Slope, units_of_ratio
 from pipelines.log.recording.raw import RawTable
 
 __all__ = ["Clock", "find_clock", "unit_of_clock"]
 
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 _RATES = (1.0, 2e4)  # [Hz] of recordings whose time has no unit
-_PACE = (0.02, 50.0)  # [1/s] fastest speed over range of motion; the unit of length or angle cancels
+_PACE = (
+    0.02,
+    50.0,
+)  # [1/s] fastest speed over range of motion; the unit of length or angle cancels
 _EPOCH = (1e9, 4e9)  # [s] since 1970: the years 2001 to 2096
 _RISING = 0.9  # of all steps of a clock; some stamps come twice, some clocks are set back
 _EVEN = 0.3  # standard deviation over mean of the steps of a clock without a name
@@ -179,7 +182,9 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
             why.append("the pace of the motion leaves " + (" or ".join(paced) or "none"))
         fits = paced
     if slope is not None:
-        agreeing = [unit for unit in fits if _ratio_of(slope.factor / SECONDS[unit])]
+        agreeing = [
+            unit for unit in fits if units_of_ratio(slope.factor / SECONDS[unit], _RATIO_TOLERANCE)
+        ]
         if len(agreeing) == 1:
             return agreeing[0], Guess(
                 agreeing[0], "likely", f"{'; '.join(why)}; the recorded velocity agrees"
@@ -192,13 +197,6 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
         else []
     )
     return "", Guess("", "unsure", "; ".join(why))
-
-
-def _ratio_of(factor: float) -> bool:
-    """Tell whether slope over velocity is a ratio of the units people use."""
-    return factor > 0 and any(
-        abs(factor / ratio - 1.0) < _RATIO_TOLERANCE for ratio in ANGULAR_RATIOS
-    )
 
 
 def _pace(t: Array, q: Array) -> float:

@@ -72,7 +72,7 @@ _MEASURED = _set(
 # A part of a torque, or what a controller computed: not the torque that moved the joint.
 _PARTIAL = _set(
     "ext external gravity grav friction residual inertia coriolis ff feedforward dist disturbance contact "
-    "collision model modelled est estimate estimated calc calculated computed predicted sim simulated "
+    "collision model modelled est estimate estimated calc calculated computed predicted sim simulated disturb "
     "rnea bias observer expected compensation ripple"
 )
 _VARIANT = _set("filtered filt filter lp smooth smoothed lowpass hat")
@@ -92,65 +92,30 @@ _COMPOUND = sorted(
     key=len,
     reverse=True,
 )
-_SUFFIX_UNITS = {
-    "s": "s",
-    "sec": "s",
-    "secs": "s",
-    "second": "s",
-    "seconds": "s",
-    "ms": "ms",
-    "msec": "ms",
-    "millis": "ms",
-    "millisec": "ms",
-    "milliseconds": "ms",
-    "us": "us",
-    "usec": "us",
-    "usecs": "us",
-    "micros": "us",
-    "microsec": "us",
-    "microseconds": "us",
-    "ns": "ns",
-    "nsec": "ns",
-    "nsecs": "ns",
-    "nanosec": "ns",
-    "nanosecs": "ns",
-    "nanos": "ns",
-    "nanosecond": "ns",
-    "nanoseconds": "ns",
-    "rad": "rad",
-    "radian": "rad",
-    "radians": "rad",
+_UNIT_WORDS = {
+    "s": "s sec secs second seconds",
+    "ms": "ms msec millis millisec milliseconds",
+    "us": "us usec usecs micros microsec microseconds",
+    "ns": "ns nsec nsecs nanosec nanosecs nanos nanosecond nanoseconds",
+    "rad": "rad radian radians",
     "mrad": "mrad",
-    "deg": "deg",
-    "degree": "deg",
-    "degrees": "deg",
-    "grad": "deg",
+    "deg": "deg degree degrees grad",
     "rev": "rev",
-    "turns": "turn",
-    "counts": "counts",
-    "cnt": "counts",
-    "cnts": "counts",
-    "ticks": "counts",
-    "inc": "counts",
-    "incs": "counts",
-    "a": "A",
-    "ma": "mA",
-    "amps": "A",
-    "nm": "N m",
-    "mnm": "mN m",
+    "turn": "turns",
+    "counts": "counts cnt cnts ticks inc incs",
+    "A": "a amps",
+    "mA": "ma",
+    "N m": "nm",
+    "mN m": "mnm",
     "rpm": "rpm",
-    "rads": "rad/s",
-    "radps": "rad/s",
-    "degs": "deg/s",
-    "degps": "deg/s",
-    "dps": "deg/s",
+    "rad/s": "rads radps",
+    "deg/s": "degs degps dps",
     "mm": "mm",
-    "pct": "%",
-    "percent": "%",
-    "permille": "‰",
-    "promille": "‰",
-    "lsb": "LSB",
+    "%": "pct percent",
+    "‰": "permille promille",
+    "LSB": "lsb",
 }
+_SUFFIX_UNITS = {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
 
 
 _OTHERS = (_COMMANDED, _MEASURED, _PARTIAL, _VARIANT, _MOTOR, _JOINT, _NOISE)
@@ -201,7 +166,7 @@ def _whole_words(name: str) -> str:
     """Return the name in which "NanoSec" and "nano_sec" are a single word."""
     return re.sub(
         r"(?i)(nano|micro|milli)[\s_]*(s(?:ec(?:ond)?s?)?)(?![a-z])",
-        lambda m: (m[1] + m[2]).lower(),
+        lambda m: (m[1] + m[2]).capitalize(),
         name,
     )
 
@@ -253,6 +218,9 @@ def read_name(column: str, unit: str = "") -> ColumnName:
         if word in known and not (word in ("a", "j") and len(words) > 2)
     ]
     at, quantity = _head(nouns)
+    path, _, last = column.rpartition(".")
+    if quantity not in ("temperature", "other") and path and read_name(last).quantity == "time":
+        quantity = "time"  # "q_meas.time" is the clock beside a position
     if not quantity:
         quantity = _without_noun(held)
     named, unit_words = _unit_in_name(column, quantity)

@@ -108,7 +108,7 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     if delimiter == "":
         return [line.strip().strip('"')]
     if delimiter == " ":
-        return line.split()
+        return [cell.strip('"') for cell in re.findall(r'"[^"]*"|[^\s"]+', line)] if '"' in line else line.split()
     if '"' in line:
         import csv
 

@@ -13,8 +13,8 @@ from pipelines.log.experiment import Array
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 
-__all__ = ["ANGULAR_RATIOS", "Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
-           "slide_unit", "slope_of", "torque_unit", "unknown_unit", "velocity_unit"]
+__all__ = ["Guess", "Slope", "held", "motion_of", "normalised", "position_unit", "quarter_turns", "rollover", "sign_of",
+           "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
@@ -27,6 +27,9 @@ class Guess:
     value: str
     confidence: Confidence
     why: str
+
+
+_RAD_OR_TURNS = Guess("", "unsure", "within half a turn in rad and in revolutions: rad, or rev as servo drives count?")
 
 
 def rollover(values: Array) -> float | None:
@@ -43,12 +46,13 @@ def rollover(values: Array) -> float | None:
 
 
 # Slope of the position over recorded velocity, by their units: q in the first, dq in the second.
-ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
+_ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
                   6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
 _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
+_CLEAR = 4.0  # standard errors of a jump of friction
 
 
 @dataclass(frozen=True)
@@ -59,17 +63,19 @@ class Slope:
     correlation: float  # the lowest of the joints that move
 
 
-def slope_of(q: Array, dq: Array, t: Array | None) -> Slope | None:
+def slope_of(q: Array, dq: Array, t: Array | None, every: bool = False) -> Slope | None:
     """Return the relation of `dq` to `q` (samples, joints); None where it is not its slope.
 
     Both are compared over stretches of the recording, short ones first: the integral form does not
-    amplify the steps of an encoder as a difference of neighbours does.
+    amplify the steps of an encoder as a difference of neighbours does. With `every`, columns that
+    hardly move beside the others must agree as well: they may be something else.
     """
     clock = np.arange(len(q), dtype=np.float64) if t is None else t
     if q.shape != dq.shape or len(q) < 50:
         return None
     summed = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(0.5 * (dq[1:] + dq[:-1]) * np.diff(clock)[:, None], axis=0)])
-    moving = (np.ptp(q, axis=0) > 1e-3 * np.ptp(q)) & (np.ptp(dq, axis=0) > 1e-3 * np.ptp(dq))
+    least = 0.0 if every else 1e-3
+    moving = (np.ptp(q, axis=0) > least * np.ptp(q)) & (np.ptp(dq, axis=0) > least * np.ptp(dq))
     if not moving.any():
         return None
     widths = sorted({max(2, len(q) // share) for share in _STRETCHES})
@@ -108,6 +114,8 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
                      f"named so; the largest range is {span:.4g} {named}"), further
     if named is not None:
         return unknown_unit(named), further
+    if wrap in (360.0, 2.0 * math.pi):
+        return Guess("deg" if wrap == 360.0 else "rad", "likely", f"it starts again after {wrap:.4g}, one turn"), further
     if slope is not None and (found := _by_velocity(slope)) is not None:
         return found, further
     if turns := quarter_turns(q):
@@ -123,6 +131,13 @@ def unknown_unit(named: str) -> Guess:
     return Guess("", "unsure", f"its name or header says '{named}', which is no unit that import knows here")
 
 
+def _inside(q: Array, joint: Joint) -> bool:
+    """Tell whether positions keep the limits of a joint, but for a twentieth of its range."""
+    low, high = joint.position
+    slack = 0.05 * (high - low)
+    return bool(q.min() >= low - slack and q.max() <= high + slack)
+
+
 def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | None:
     """The unit under which the motion keeps the robot's limits."""
     limited = [(j, joint) for j, joint in enumerate(joints) if all(map(math.isfinite, joint.position))]
@@ -130,13 +145,10 @@ def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | No
         return None
 
     def inside(factor: float) -> bool:
-        for j, joint in limited:
-            low, high = joint.position
-            slack = 0.05 * (high - low)
-            if factor * q[:, j].min() < low - slack or factor * q[:, j].max() > high + slack:
-                return False
-        return True
+        return all(_inside(factor * q[:, j], joint) for j, joint in limited)
 
+    if inside(1.0) and inside(2.0 * math.pi):
+        return _RAD_OR_TURNS
     if inside(1.0):
         return Guess("rad", "likely", f"inside the robot's limits in rad; the largest range is {np.ptp(q, axis=0).max():.3g}")
     if inside(math.pi / 180.0):
@@ -147,6 +159,8 @@ def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | No
 def _by_size(q: Array, t: Array | None, span: float) -> Guess:
     """The unit by what a joint can do, where no limits are known."""
     far = float(np.abs(q).max())
+    if far <= 0.5:
+        return _RAD_OR_TURNS
     if far <= 2.05 * math.pi:
         speed = (float(np.abs(np.diff(q, axis=0) / np.diff(t)[:, None]).max())
                  if t is not None and (np.diff(t) > 0).all() else math.nan)
@@ -157,18 +171,21 @@ def _by_size(q: Array, t: Array | None, span: float) -> Guess:
     return Guess("", "unsure", f"up to {far:.5g}: neither an arm's in rad nor in deg; motor side, or counts?")
 
 
+def normalised(q: Array) -> bool:
+    """Tell whether positions may be scaled to their range: within -1..1, or beyond that within -100..100."""
+    far = float(np.abs(q).max())
+    return far <= 1.0 or 2.0 * math.pi < far <= 100.0
+
+
 def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
     """The unit of the position of one sliding joint, "" where it stays open."""
     if named in ("m", "mm", "um"):
         return Guess(named, "sure", "named so")
     if named is not None:
         return unknown_unit(named)
-    low, high = joint.position
-    if math.isfinite(low) and math.isfinite(high):
-        slack = 0.05 * (high - low)
-        for unit, factor in (("m", 1.0), ("mm", 1e-3)):
-            if factor * q.min() >= low - slack and factor * q.max() <= high + slack:
-                return Guess(unit, "likely", f"inside the limits of sliding joint '{joint.name}' in {unit}")
+    for unit, factor in (("m", 1.0), ("mm", 1e-3)):
+        if all(map(math.isfinite, joint.position)) and _inside(factor * q, joint):
+            return Guess(unit, "likely", f"inside the limits of sliding joint '{joint.name}' in {unit}")
     return Guess("", "unsure", f"'{joint.name}' slides: m or mm?")
 
 
@@ -210,21 +227,26 @@ def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tup
             f', counts_per_rev = "{BLANK}"')
 
 
+def units_of_ratio(factor: float, tolerance: float = 0.1) -> tuple[str, str] | None:
+    """The units of position and velocity that are a factor apart, ("", "") where both have one unit of angle, else None."""
+    nearest = min(_ANGULAR_RATIOS, key=lambda ratio: abs(factor / ratio - 1.0))
+    return _ANGULAR_RATIOS[nearest] if abs(factor / nearest - 1.0) <= tolerance else None
+
+
 def _by_velocity(slope: Slope) -> Guess | None:
     """The unit that the recorded velocity decides: where both have one unit of angle it decides nothing."""
-    near = min(ANGULAR_RATIOS, key=lambda ratio: abs(math.log(slope.factor / ratio)) if slope.factor > 0 else math.inf)
-    unit, speed = ANGULAR_RATIOS[near]
-    if slope.factor <= 0 or abs(slope.factor / near - 1.0) > 0.1 or not unit:
+    unit, speed = units_of_ratio(slope.factor) or ("", "")
+    if not unit:
         return None
     return Guess(unit, "likely", f"its slope is {slope.factor:.4g} times the recorded velocity, as with {unit} and {speed}")
 
 
 def velocity_unit(slope: Slope, position: str) -> str:
     """The unit of a velocity by that of the position whose slope it is, "" where their ratio fits none."""
-    near = min(ANGULAR_RATIOS, key=lambda ratio: abs(math.log(slope.factor / ratio)) if slope.factor > 0 else math.inf)
-    if slope.factor <= 0 or abs(slope.factor / near - 1.0) > 0.1:
+    units = units_of_ratio(slope.factor)
+    if units is None:
         return ""
-    unit, speed = ANGULAR_RATIOS[near]
+    unit, speed = units
     same = {"rad": "rad/s", "deg": "deg/s", "m": "m/s", "mm": "mm/s", "rev": "rev/s", "turn": "rev/s"}
     return same.get(position, "") if not unit else speed if unit == position else ""
 
@@ -257,23 +279,31 @@ def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[f
 
 
 def sign_of(q: Array, tau: Array) -> Guess:
-    """Friction takes power out: beside inertia, springs and a constant, torque must grow with speed on every joint."""
-    width = max(5, len(q) // 300)
-    smooth = np.ones(width) / width
-    share = np.zeros(q.shape[1])
+    """Dry friction turns with the speed: where a joint reverses, its torque jumps the same way, and all else is smooth.
+
+    About each reversal, tau = a + b k + c k² + d k³ + F sign(dq); F is positive (Coulomb's law; Armstrong-Hélouvry 1991).
+    """
+    half = max(6, len(q) // 200)
+    k = np.linspace(-1.0, 1.0, 2 * half + 1)
+    smooth = np.ones(max(3, half // 2)) / max(3, half // 2)
+    strength = np.zeros(q.shape[1])  # mean jump over its standard error
     for j in range(q.shape[1]):
-        position, torque = (np.convolve(x[:, j], smooth, mode="valid") for x in (q, tau))
-        speed = np.gradient(position)
-        columns = np.column_stack([speed, np.gradient(speed), position, np.ones(position.size)])
-        columns /= np.maximum(np.abs(columns).max(axis=0), 1e-300)
-        share[j] = np.linalg.lstsq(columns, torque, rcond=1e-9)[0][0] * np.std(columns[:, 0]) / max(float(np.std(torque)), 1e-300)
-    wrong = [str(j + 1) for j in np.flatnonzero(share < -0.02)]
+        speed = np.gradient(np.convolve(q[:, j], smooth, mode="same"))
+        jumps = []
+        for at in np.flatnonzero(speed[half + 1 : -half - 1] * speed[half : -half - 2] < 0) + half + 1:
+            turn = np.sign(speed[at - half : at + half + 1])
+            if (turn[: half - 1] == turn[0]).all() and (turn[half + 2 :] == -turn[0]).all() and turn[0] != 0:
+                columns = np.column_stack([turn, k**0, k, k**2, k**3])
+                jumps.append(np.linalg.lstsq(columns, tau[at - half : at + half + 1, j], rcond=None)[0][0])
+        if len(jumps) > 2:
+            strength[j] = np.mean(jumps) / max(float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps)), 1e-300)
+    wrong = [str(j + 1) for j in np.flatnonzero(strength < -_CLEAR)]
     if wrong:
         return Guess("sign = -1?", "likely",
-                     f"torque of joint {', '.join(wrong)} takes energy out of the motion where friction should: "
+                     f"torque of joint {', '.join(wrong)} jumps against the speed where it reverses, unlike friction: "
                      "add sign = -1 there, unless its transmission is negative")
-    if (share > 0.02).all():
-        return Guess("as recorded", "likely", "sign: torque grows with speed on every joint, as friction asks for")
+    if (strength > _CLEAR).all():
+        return Guess("as recorded", "likely", "sign: torque jumps with the speed where a joint reverses, as friction does")
     return Guess("as recorded", "unsure", "sign: torque and motion do not tell")
 
 

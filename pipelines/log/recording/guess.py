@@ -26,6 +26,7 @@ from pipelines.log.recording.evidence import (
     Slope,
     held,
     motion_of,
+    normalised,
     position_unit,
     quarter_turns,
     sign_of,
@@ -93,9 +94,6 @@ def guess_recipe(path: Path, robot: str | None = None) -> Draft:
     if len(table.columns) > _MOST_COLUMNS:
         raise InputRejected("F16", f"{len(table.columns)} columns: too many to guess what each is", where=path,
                             remedy="export the joints' signals alone, or write the recipe")
-    for column, period in table.cycles.items():
-        raise InputRejected("S11", f"column '{clean(column, 40)}' goes through {period} texts, again and again: one line a joint?",
-                            where=path, remedy="put the joints beside each other, one line a sample (a pivot of the table)")
     table = _sound(table)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
     companion = companion_for(reading)
@@ -274,6 +272,8 @@ class _Drafting:
                 slope = None
             joints = [self.joints[j] for j in turning] if self.joints else ()
             guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints)
+            if not named[turning[0]] and {"observation", "action"} & set(group.words.split()) and normalised(self.q[:, turning]):
+                guess = Guess("", "unsure", "data sets of robot learning also scale positions to -1..1 or -100..100")
             for j in turning:
                 said = named[j] or ""
                 units[j] = said if said in UNITS or said == "counts" else guess.value
@@ -364,30 +364,26 @@ class _Drafting:
                          for g in found[:8])]
 
     def _drive(self) -> list[str]:
-        ratios = [str(abs(self.ratios[j])) + ".0" if j in self.ratios else f'"{BLANK}"' for j in range(self.n)]
-        if self.ratios:
-            if len(self.ratios) < self.n:
-                self.blanks.append("drive.transmission")
-            unknown = f"; those marked {BLANK} were near zero: from the data sheet" if len(self.ratios) < self.n else ""
-            lines = ["[drive]                  # check: likely, positions start at these numbers of quarter turns: motor side",
-                     f"transmission = [{', '.join(ratios)}]   # check: sign, + where motor and joint turn alike{unknown}"]
-            if self.current:
-                self.blanks.append("drive.torque_constant")
-                lines.append(f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet')
-            return [*lines, ""]
+        """Return [drive]: ratios that the positions show, a blank where they are named the motor's, else a comment."""
         group = self.reading.q.group
-        if group and group.motor and "theta" not in group.words and not self.joints_side():
-            self.blanks.append("drive.transmission")
+        if self.ratios:
+            ratios = ", ".join(f"{abs(self.ratios[j])}.0" if j in self.ratios else f'"{BLANK}"' for j in range(self.n))
+            unknown = ""
+            if len(self.ratios) < self.n:
+                unknown = f"; those marked {self.blank('drive.transmission')} were near zero: from the data sheet"
+            lines = ["[drive]                  # check: likely, positions start at these numbers of quarter turns: motor side",
+                     f"transmission = [{ratios}]   # check: sign, + where motor and joint turn alike{unknown}"]
+        elif group and group.motor and "theta" not in group.words and not self.joints_side():
             lines = ["[drive]                  # positions are named the motor's: q_motor = N q_joint, tau_joint = N^T tau_motor",
-                     f'transmission = "{BLANK}"   # gear ratio of each joint; remove [drive] where they are the joints\'']
-            return [*lines, *([f'torque_constant = "{self.blank("drive.torque_constant")}"'] if self.current else []), ""]
-        lines = ["# [drive]                # where numbers are motor side: q_motor = N q_joint, tau_joint = N^T tau_motor",
-                 f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
-        if not self.current:
-            return [*lines, ""]
-        self.blanks.append("drive.torque_constant")
-        return ["[drive]", f'torque_constant = "{BLANK}"             # N m/A, motor side: from the data sheet',
-                f"# transmission = [{', '.join(['100.0'] * self.n)}]   # where numbers are motor side: q_motor = N q_joint", ""]
+                     f'transmission = "{self.blank("drive.transmission")}"   # gear ratio of each joint; '
+                     "remove [drive] where they are the joints'"]
+        else:
+            lines = [f"{'' if self.current else '# '}[drive]                # where numbers are motor side: q_motor = N q_joint, "
+                     "tau_joint = N^T tau_motor", f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
+        if self.current:
+            blank = self.blank("drive.torque_constant")
+            lines.append(f'torque_constant = "{blank}"             # N m/A, motor side: from the data sheet')
+        return [*lines, ""]
 
     def joints_side(self) -> bool:
         """Tell whether positions that are named the motor's are inside the limits of the robot's joints, in some unit."""

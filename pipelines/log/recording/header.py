@@ -11,13 +11,16 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+
+import numpy as np
 
 from pipelines.errors import InputRejected
+from pipelines.log.experiment import Array
 from pipelines.log.recording.dialect import MISSING, Dialect, cells_of, is_number
 from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["Header", "find_header", "names_and_units", "split_unit"]
+__all__ = ["Header", "find_header", "names_and_units", "split_unit", "without_repeats"]
 
 Line = tuple[int, str]
 
@@ -37,6 +40,10 @@ class Header:
     units: dict[str, str]
     first: int  # index of the first line of data among the lines that are not comments
     skipped: int  # lines above it that are neither names nor units
+    again: dict[str, str] = field(
+        default_factory=dict
+    )  # name given to a column -> the same name before
+    line: int = 0  # of the names
 
 
 def find_header(
@@ -49,7 +56,7 @@ def find_header(
         has_header: False where the recipe declares that the first line is data already.
 
     Raises:
-        InputRejected: F16, one name more or less than columns; S03, two columns of one name.
+        InputRejected: F16, one name more or less than columns.
     """
     width = dialect.width
     table = [
@@ -75,11 +82,13 @@ def find_header(
     if names is None:
         return _numbered(width, first, skipped=first)
     plain = {n for n, _ in lines[:first]}
-    named, found = names_and_units(names, source, min(used))
+    if len(set(names)) < width:
+        names = _with_spans(names, [(n, line) for n, line, _ in above if n < min(used)], dialect)
+    named, found, again = names_and_units(names)
     found |= {
         name: unit for name, unit in zip(named, units, strict=True) if unit.lower() not in _NO_UNIT
     }
-    return Header(named, found, first, len(plain - used))
+    return Header(named, found, first, len(plain - used), again, min(used))
 
 
 def _numbered(width: int, first: int, skipped: int = 0) -> Header:
@@ -138,7 +147,8 @@ def _names_above(
             if _are_units(fitted) and best is not None:
                 units, unit_line = tuple(cell.strip("[]() ") for cell in fitted), number
             elif _words([fitted[j] for j in numeric]) or _counted(fitted, numeric):
-                key = (int(not comment), -rank, number)
+                filled = [cell for cell in fitted if cell]
+                key = (int(not comment), -rank, len(filled), len(set(filled)), number)
                 if best is None or key > best[0]:
                     best, units, unit_line = (key, tuple(fitted), number), ("",) * width, 0
             break
@@ -152,6 +162,24 @@ def _names_above(
             )
         return None, units, set()
     return best[1], units, {best[2], unit_line} - {0}
+
+
+def _with_spans(names: tuple[str, ...], above: Sequence[Line], dialect: Dialect) -> tuple[str, ...]:
+    """Return names that come several times with what the line above says of several columns.
+
+    "waist", "", "", "elbow", "", "" above Angle, Torque, Speed, …: "waist Angle", "waist Torque", …
+    """
+    for _, line in reversed(above):
+        cells = cells_of(line, dialect.delimiter)
+        if len(cells) != len(names) or "" not in cells or not _words(cells):
+            continue
+        span = ""
+        spanned = []
+        for cell, name in zip(cells, names, strict=True):
+            span = cell or span
+            spanned.append(f"{span} {name}".strip())
+        return tuple(spanned)
+    return names
 
 
 def _fitted(cells: list[str], width: int, rows: Sequence[Sequence[str]]) -> list[str] | None:
@@ -215,34 +243,49 @@ def split_unit(name: str) -> tuple[str, str]:
 
 
 def names_and_units(
-    cells: Sequence[str], source: str, line: int
-) -> tuple[tuple[str, ...], dict[str, str]]:
-    """Return the names and the units in brackets behind them.
+    cells: Sequence[str],
+) -> tuple[tuple[str, ...], dict[str, str], dict[str, str]]:
+    """Return the names, the units in brackets behind them, and which names come again.
 
     Names that differ only in their brackets keep them: "q[elbow]", "axis 1 (deg)", "axis 1 (Nm)".
-
-    Raises:
-        InputRejected: S03, two columns of one name.
     """
     pairs = [split_unit(cell) for cell in cells]
     times = Counter(name for name, _ in pairs)
-    names = tuple(
-        (cell.strip() if times[name] > 1 else name) or f"column_{j + 1}"
-        for j, (cell, (name, _)) in enumerate(zip(cells, pairs, strict=True))
-    )
-    first: dict[str, int] = {}
-    for j, name in enumerate(names):
-        if first.setdefault(name, j) != j:
-            raise InputRejected(
-                "S03",
-                f"columns {first[name] + 1} and {j + 1} are both named '{name[:80]}'",
-                where=f"{source}, line {line}",
-                remedy="rename one of them in the file",
-            )
+    names: dict[str, None] = {}
+    again: dict[str, str] = {}
+    for j, (cell, (short, _)) in enumerate(zip(cells, pairs, strict=True)):
+        name = (cell.strip() if times[short] > 1 else short) or f"column_{j + 1}"
+        if name in names:
+            again[f"{name}, column {j + 1}"] = name
+            name = f"{name}, column {j + 1}"
+        names[name] = None
     # Where brackets alone distinguish columns, only a known unit in them is one: not a joint's name.
     units = {
         name: unit
         for name, (short, unit) in zip(names, pairs, strict=True)
         if unit and (times[short] == 1 or canonical_unit(unit) in UNITS)
     }
-    return names, units
+    return tuple(names), units, again
+
+
+def without_repeats(columns: dict[str, Array], header: Header, source: str) -> dict[str, Array]:
+    """Return the columns without those that repeat one of the same name: a clock beside each channel.
+
+    Raises:
+        InputRejected: S03, two columns of one name hold different numbers.
+    """
+    for name, first in header.again.items():
+        if (
+            name in columns
+            and first in columns
+            and np.array_equal(columns[name], columns[first], equal_nan=True)
+        ):
+            continue
+        at = header.names.index(first) + 1, header.names.index(name) + 1
+        raise InputRejected(
+            "S03",
+            f"columns {at[0]} and {at[1]} are both named '{first[:80]}'",
+            where=f"{source}, line {header.line}",
+            remedy="rename one of them in the file",
+        )
+    return {name: values for name, values in columns.items() if name not in header.again}

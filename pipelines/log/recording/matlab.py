@@ -1,6 +1,6 @@
 """Read the numeric arrays of a MAT file, v5 (scipy) or v7.3 (HDF5); objects and functions are never built.
 
-Structures are opened one level: field q of structure data is the column "data.q". Both run in a guarded child.
+Structures are opened: field q of structure data is the column "data.q". Both run in a guarded child.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ Arrays = dict[str, npt.NDArray[np.generic]]
 
 BUDGET = 4 << 30  # [B] of samples in one file; a ten-minute log of seven joints at 5 kHz has 0.5 GB
 _MOST_MEMBERS = 2000
+_DEEPEST = 4  # levels of structures; Simulink stores q.signals.values
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical")
 _HARMLESS = (*_NUMERIC, "char", "cell", "struct", "sparse")
 _DAMAGE = (ValueError, TypeError, IndexError, KeyError, OSError, OverflowError, EOFError, AttributeError, NotImplementedError,
@@ -61,7 +62,7 @@ def read_mat5(data: bytes, source: str) -> Arrays:
     for name in names:
         if name not in loaded:
             raise damaged(source)
-        found |= _opened(name, loaded[name])
+        found |= _opened(name, loaded[name], _DEEPEST)
     return found
 
 
@@ -80,17 +81,18 @@ def _wanted(listed: list[tuple[str, tuple[int, ...], str]], source: str) -> list
     return names
 
 
-def _opened(name: str, value: Any) -> Arrays:
-    """A variable, or the fields of a 1x1 structure; cells and deeper structures stay closed."""
+def _opened(name: str, value: Any, depth: int) -> Arrays:
+    """A variable, or the numeric fields of a 1x1 structure and of those within it; cells stay closed."""
     if not isinstance(value, np.ndarray):
         return {}
     if value.dtype.names is None:
-        return {name: value}
-    if value.size != 1:
+        return {name: value} if depth == _DEEPEST or value.dtype.kind in "fiubc" else {}
+    if value.size != 1 or depth == 0:
         return {}
-    fields = {field: value[field].reshape(-1)[0] for field in value.dtype.names}
-    return {f"{name}.{field}": inner for field, inner in fields.items()
-            if isinstance(inner, np.ndarray) and inner.dtype.names is None and inner.dtype.kind in "fiubc"}
+    found: Arrays = {}
+    for field in value.dtype.names[:_MOST_MEMBERS]:
+        found |= _opened(f"{name}.{field}", value[field].reshape(-1)[0], depth - 1)
+    return found
 
 
 def read_mat73(path: Path, source: str) -> Arrays:
@@ -128,7 +130,7 @@ def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:
         if name in ("#refs#", "#subsystem#") or not isinstance(link, h5py.HardLink):
             continue
         kind = group.get(name, getclass=True)
-        if kind is h5py.Group and prefix.count(".") < 1:
+        if kind is h5py.Group and prefix.count(".") < _DEEPEST:
             found |= _scan(group[name], f"{prefix}{name}.", source)
         elif kind is h5py.Dataset and (dataset := _usable(group[name], f"{prefix}{name}", source)) is not None:
             found[f"{prefix}{name}"] = dataset

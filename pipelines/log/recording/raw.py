@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+import itertools
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
+from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
 from pipelines.log.experiment import Array
 
-__all__ = ["RawTable", "columns_of_arrays", "expand"]
+__all__ = ["RawTable", "columns_of_arrays", "expand", "unstacked"]
 
+_MOST_KEYS = 32  # joints, servos or environments in turn
+_SEPARATE = 0.5  # mean step from key to key over that from row to row: 1 for noise, more for one motion
 _WIDEST_MATRIX = 64  # more joints than any arm: what is wider is not "one column a joint"
 
 
@@ -28,7 +31,7 @@ class RawTable:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # matrix -> its columns
     text: Mapping[str, str] = field(default_factory=dict)  # columns that are not numbers -> an example
     labels: Mapping[str, str] = field(default_factory=dict)  # those of them that hold one text throughout -> that text
-    cycles: Mapping[str, int] = field(default_factory=dict)  # columns of text that repeat -> after how many samples
+    cycles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # columns of text that repeat -> their texts
     lines: npt.NDArray[np.int64] | None = None  # (samples,) line numbers, in a text file
     breaks: tuple[int, ...] = ()  # index of the first sample after damage: the clock of a fixed rate is lost there
     checks: tuple[Check, ...] = ()
@@ -118,16 +121,31 @@ def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str
     columns: dict[str, Array] = {}
     groups: dict[str, tuple[str, ...]] = {}
     text: dict[str, str] = {}
+    open_arrays: list[str] = []
+
+    def add(name: str, matrix: npt.NDArray[np.generic]) -> None:
+        names = (name,) if matrix.shape[1] == 1 else tuple(f"{name}_{j + 1}" for j in range(matrix.shape[1]))
+        groups[name] = names
+        columns.update((key, np.ascontiguousarray(matrix[:, j], dtype=np.float64)) for j, key in enumerate(names))
+
     for name, array in arrays.items():
         if (problem := _not_real(array)) is not None:
             text[name] = problem
-            continue
-        matrix = _upright(name, array, source, checks)
-        if matrix is None:
-            continue
-        names = (name,) if matrix.shape[1] == 1 else tuple(f"{name}_{j + 1}" for j in range(matrix.shape[1]))
-        groups[name] = names
-        columns |= {key: np.ascontiguousarray(matrix[:, j], dtype=np.float64) for j, key in enumerate(names)}
+        elif _either_way(array):
+            open_arrays.append(name)
+        elif (matrix := _upright(name, array, source, checks)) is not None:
+            add(name, matrix)
+    if open_arrays and not columns:
+        first = open_arrays[0]
+        raise InputRejected("S11", f"'{first}' has shape {arrays[first].shape}: which side is time cannot be told", where=source,
+                            remedy="store one row a sample, with many more samples than columns")
+    samples = max(map(len, columns.values()), default=0)
+    for name in open_arrays:  # the others have said how many samples there are
+        array = arrays[name]
+        if samples in array.shape:
+            add(name, array if array.shape[0] == samples else array.T)
+        else:
+            text[name] = f"an array of shape {array.shape}, not of {samples} samples"
     if not columns:
         found = ", ".join(f"{name} ({what})" for name, what in text.items()) or "nothing"
         raise InputRejected("S12", f"no array of real numbers; there is {found}", where=source,
@@ -149,21 +167,75 @@ def _not_real(array: npt.NDArray[np.generic]) -> str | None:
     return None
 
 
+def _either_way(array: npt.NDArray[np.generic]) -> bool:
+    """Tell whether neither side of a matrix is clearly longer."""
+    if array.ndim < 2 or array.size <= 1 or 1 in array.shape:
+        return False
+    rows, wide = array.shape
+    return not (rows >= 4 * wide or (rows > wide and wide <= 3) or wide >= 4 * rows)
+
+
 def _upright(name: str, array: npt.NDArray[np.generic], source: str, checks: list[Check]) -> npt.NDArray[np.generic] | None:
     """S11: (samples, columns), or None for a scalar or something too wide to be a signal."""
     matrix = array[:, None] if array.ndim == 1 else array
     rows, wide = matrix.shape
     if matrix.size <= 1:
         return None
-    if rows >= 4 * wide or wide == 1 or (rows > wide and wide <= 3):
+    if rows > wide:
         return matrix if wide <= _WIDEST_MATRIX else None
-    if wide >= 4 * rows:
-        if rows > _WIDEST_MATRIX:
-            return None
-        if rows > 1:
-            checks.append(Check.of("S11", "warn",
-                                   f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}: time along the long side",
-                                   where=source, remedy="store one row a sample"))
-        return matrix.T
-    raise InputRejected("S11", f"'{name}' has shape {matrix.shape}: which side is time cannot be told", where=source,
-                        remedy="store one row a sample, with many more samples than columns")
+    if rows > _WIDEST_MATRIX:
+        return None
+    if rows > 1:
+        checks.append(Check.of("S11", "warn",
+                               f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}: time along the long side",
+                               where=source, remedy="store one row a sample"))
+    return matrix.T
+
+
+def unstacked(table: RawTable) -> RawTable:
+    """Return a table of one row a joint with the rows of one sample beside each other; any other table as it is.
+
+    A key is a column of names or numbers that goes through the same k, all different, again and again. Rows of one key
+    continue each other and neighbouring rows do not: what merely counts modulo k in one motion is no key. Of key "joint",
+    "position" becomes "position[elbow]", …; what the k rows of every sample share stays one column.
+    """
+    for key, words in (*table.cycles.items(), *itertools.islice(_numbers_in_turn(table), _MOST_KEYS)):
+        k = len(words)
+        if len(set(words)) < k or not any(_interleaved(values, k) for values in table.columns.values()):
+            continue
+        samples = table.rows.size // k
+        columns: dict[str, Array] = {}
+        groups = {}
+        for name, values in table.columns.items():
+            rows = values[: samples * k].reshape(samples, k)
+            if np.array_equal(rows, np.broadcast_to(rows[:, :1], rows.shape), equal_nan=True):
+                columns[name] = rows[:, 0].copy()
+            elif not np.array_equal(rows[1:], rows[:-1]):  # the numbers of the keys themselves
+                groups[name] = tuple(f"{name}[{word}]" for word in words)
+                columns |= zip(groups[name], map(np.ascontiguousarray, rows.T), strict=True)
+        check = Check.of("S11", "warn", f"{k} rows a sample, one for each '{clean(key, 40)}': put beside each other",
+                         where=table.source, remedy="export one row a sample")
+        units = {name: unit for name, unit in table.units.items() if name in columns} | {
+            column: table.units[name] for name, found in groups.items() if name in table.units for column in found}
+        first = slice(0, samples * k, k)
+        return replace(table, columns=columns, rows=table.rows[first] // k, units=units, groups=groups, cycles={},
+                       lines=None if table.lines is None else table.lines[first], checks=(*table.checks, check),
+                       breaks=tuple(sorted({at // k for at in table.breaks})))
+    return table
+
+
+def _numbers_in_turn(table: RawTable) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield columns of whole numbers that repeat, and the numbers they go through."""
+    for name, values in table.columns.items():
+        again = np.flatnonzero(values[1 : _MOST_KEYS + 1] == values[0]) + 1
+        if again.size and (k := int(again[0])) > 1 and values.size >= 2 * k and np.array_equal(values[k:], values[:-k]) and (
+                values[:k] == np.round(values[:k])).all():
+            yield name, tuple(f"{value:.0f}" for value in values[:k])
+
+
+def _interleaved(values: Array, k: int) -> bool:
+    """Tell whether every k-th number of a column goes on where its neighbours jump."""
+    from_key, from_row = values[k:] - values[:-k], np.diff(values)
+    known = np.isfinite(from_key)
+    return bool(known.any() and from_key[known].any() and
+                np.abs(from_key[known]).mean() < _SEPARATE * np.abs(from_row[np.isfinite(from_row)]).mean())

@@ -1,4 +1,4 @@
-"""Read a recorded file by what it is, not by what it is called: text, JSON, NPY, MAT v5 or v7.3."""
+"""Read a recorded file by what it is, not by what it is called: text, JSON, NPY, NPZ, MAT v5 or v7.3."""
 
 from __future__ import annotations
 
@@ -14,19 +14,21 @@ from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
 from pipelines.log.atomic import fault_of
 from pipelines.log.files import regular_file
 from pipelines.log.guard import Answer, guarded
-from pipelines.log.recording.arrays import read_npy
+from pipelines.log.recording.arrays import read_npy, read_npz
 from pipelines.log.recording.dialect import TextFormat
 from pipelines.log.recording.json_table import is_json, read_json
 from pipelines.log.recording.matlab import damaged, read_mat5, read_mat73
-from pipelines.log.recording.raw import RawTable, columns_of_arrays
+from pipelines.log.recording.raw import RawTable, columns_of_arrays, unstacked
 from pipelines.log.recording.tabular import read_text
 
 __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
-_ENDINGS = {"npy": (".npy",), "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5"), "json": (".json", ".jsonl"), "text": ()}
-_REFUSED = ((b"PAR1", "F06", "a Parquet file", "rrrid convert and inspect read logs; import reads CSV, JSON, MAT and NPY"),
-            (b"PK\x03\x04", "X12", "an archive (zip, xlsx or npz)", "unpack it, or export the sheet as CSV"),
+_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "json": (".json", ".jsonl"), "text": (), "mat5": (".mat",),
+            "mat73": (".mat", ".h5", ".hdf5")}
+_REFUSED = ((b"PAR1", "F06", "a Parquet file",
+             "rrrid convert and inspect read logs; import reads CSV, JSON, MAT, NPY and NPZ"),
+            (b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
             (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
             (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"))
 
@@ -53,7 +55,7 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
         raise fault_of(problem, path) from None
     source = name or path.name
     kind = _kind(data, source)
-    table = _read(kind, data, path, source, text)
+    table = unstacked(_read(kind, data, path, source, text))
     checks = table.checks
     named = {ending: what for what, endings in _ENDINGS.items() for ending in endings}.get(path.suffix.lower(), "text")
     if path.suffix.lower() not in _ENDINGS[kind] and named != kind:
@@ -77,6 +79,8 @@ def _refuse_locked(handle: int, path: Path) -> None:
 
 def _kind(data: bytes, source: str) -> str:
     """F06: what the first bytes say."""
+    if data.startswith(b"PK\x03\x04") and source.lower().endswith(".npz"):
+        return "npz"
     for magic, code, what, remedy in _REFUSED:
         if data.startswith(magic):
             raise (UsageError if code == "X12" else InputRejected)(code, f"{what}, not a recording", where=source, remedy=remedy)
@@ -102,6 +106,8 @@ def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | No
         return read_json(data, source)
     if kind == "npy":
         return columns_of_arrays(read_npy(data, source), source)
+    if kind == "npz":
+        return _in_child(lambda: columns_of_arrays(read_npz(data, source), source), path, source)
     if kind == "mat5":
         import scipy.io  # noqa: F401  imported before the fork, so that every child has it
 

@@ -17,7 +17,7 @@ from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
-from pipelines.log.recording.header import find_header, names_and_units
+from pipelines.log.recording.header import Header, find_header, names_and_units, without_repeats
 from pipelines.log.recording.raw import RawTable
 
 __all__ = ["TextFormat", "read_text"]
@@ -62,6 +62,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     if not body:
         raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
     kept, columns, words, labels = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
+    columns = without_repeats(columns, header, source)
     lines_kept = np.array([number for number, _ in kept], dtype=np.int64)
     # Counted over the lines of data alone: an empty line or a comment between them loses no sample.
     rows = np.searchsorted(np.array([number for number, _ in body], dtype=np.int64), lines_kept)
@@ -71,7 +72,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     clocks = {name: "s" for name in columns if name in labels and labels[name] is None}
     return RawTable(source, columns, rows, units=units | clocks, text=words, lines=lines_kept, breaks=breaks, checks=tuple(checks),
                     groups=_numbered(names), labels={name: label for name, label in labels.items() if isinstance(label, str)},
-                    cycles={name: label for name, label in labels.items() if isinstance(label, int)})
+                    cycles={name: label for name, label in labels.items() if isinstance(label, tuple)})
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
@@ -97,12 +98,13 @@ def _transposed(lines: list[Line], dialect: Dialect, source: str, checks: list[C
         if abs(len(row) - dialect.width) > 1:
             raise InputRejected("F09", f"{len(row)} cells, not {dialect.width}", where=f"{source}, line {number}",
                                 remedy="export the file again, one line a sample")
-    names, units = names_and_units([row[0] if begin else f"line_{i}" for i, row in enumerate(rows, start=1)], source, lines[0][0])
+    names, units, again = names_and_units([row[0] if begin else f"line_{i}" for i, row in enumerate(rows, start=1)])
     if begin > 1:
         units |= {name: row[1].strip("[]() ") for name, row in zip(names, rows, strict=True) if row[1].strip("[]() -")}
     length = min(len(row) - (not row[-1]) for row in rows)
     body = [(k + 1, "\t".join(row[k].replace(",", ".") for row in rows)) for k in range(begin, length)]
     columns, words, _, _ = _parse(body, Dialect("\t", ".", len(rows)), names, source)
+    columns = without_repeats(columns, Header(names, units, 0, 0, again, lines[0][0]), source)
     samples = length - begin
     checks.append(Check.of("S11", "warn", f"{len(rows)} lines of {samples} numbers, read with time along the line", where=source,
                            remedy="store one line a sample"))
@@ -117,7 +119,7 @@ class _Damage:
 
 
 def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, ...], source: str,
-             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str], dict[str, str | int | None]]:
+             checks: list[Check]) -> tuple[list[Line], dict[str, Array], dict[str, str], _Labels]:
     widths = [line.count(dialect.delimiter) + 1 if dialect.delimiter not in ("", " ") and '"' not in line
               else len(cells_of(line, dialect.delimiter)) for _, line in body]
     damage = [_Damage(i, body[i][0], f"{width} cells, not {dialect.width}") for i,
@@ -141,12 +143,13 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
             {name: np.ascontiguousarray(values[keep]) for name, values in columns.items()}, words, labels)
 
 
-_Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], dict[str, str | int | None]]
+_Labels = dict[str, str | tuple[str, ...] | None]
+_Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], _Labels]
 
 
 def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Columns of numbers, columns of text with an example, the lines (by index) with a cell that is no number, and labels:
-    the text of a column that never changes, the period of one that repeats, None of a column of clock times."""
+    the text of a column that never changes, the texts that one goes through, None of a column of clock times."""
     # numpy rounds every number correctly; pandas does so only where asked, and newer ones refuse to be asked.
     text = "\n".join(line for _, line in lines)
     try:
@@ -162,7 +165,7 @@ def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: 
 def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Cell by cell, to find out which cell is no number."""
     cells = [cells_of(line, dialect.delimiter) for _, line in lines]
-    labels: dict[str, str | int | None] = {}
+    labels: _Labels = {}
     columns: dict[str, Array] = {}
     words: dict[str, str] = {}
     wrong: dict[int, str] = {}
@@ -183,7 +186,7 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
                 continue
             words[name] = cells[bad[0]][j][:40]
             if (period := _period([row[j] for row in cells])) is not None:
-                labels[name] = cells[0][j] if period == 1 else period
+                labels[name] = cells[0][j] if period == 1 else tuple(row[j] for row in cells[:period])
         else:
             columns[name] = values
             wrong |= {i: f"'{cells[i][j][:30]}' in column '{name}' is no number" for i in bad}

@@ -42,7 +42,7 @@ def good() -> dict[str, Array]:
     t = np.arange(SAMPLES) * STEP
     joint = np.arange(1, JOINTS + 1)
     phase = 2.0 * np.pi * (1.3 + 0.2 * joint) * t[:, None]
-    q = 0.4 * np.sin(phase) / joint
+    q = 0.6 * np.sin(phase) / joint
     dq = np.gradient(q, t, axis=0)
     tau = 2.0 * np.gradient(dq, t, axis=0) + 1.5 * np.tanh(20.0 * dq) + 0.3 * dq
     return {"t": t} | {f"q_{j}": q[:, j - 1] for j in joint} | {f"tau_{j}": tau[:, j - 1] for j in joint}

@@ -120,8 +120,8 @@ def test_degrees_are_told_by_a_recorded_velocity(tmp_path: Path) -> None:
 def test_a_flipped_torque_is_noticed(tmp_path: Path) -> None:
     columns = good()
     draft = drafted(tmp_path, text(columns | {"tau_2": -columns["tau_2"]}))
-    assert "torque of joint 2 takes energy out of the motion" in draft
-    assert "as friction asks for" in drafted(tmp_path, text(columns))
+    assert "torque of joint 2 jumps against the speed" in draft
+    assert "as friction does" in drafted(tmp_path, text(columns))
 
 
 @pytest.mark.parametrize(("size", "found"), [(8192.0, 8192.0), (360.0, 360.0), (2 * np.pi, 2 * np.pi)])

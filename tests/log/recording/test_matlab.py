@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import pickle
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 import pytest
 import scipy.io
 
-from pipelines.errors import InputRejected
+from pipelines.errors import InputRejected, UsageError
 from pipelines.log.recording.arrays import read_npy
 from pipelines.log.recording.raw import columns_of_arrays
 from pipelines.log.recording.sources import read_table
@@ -107,6 +108,28 @@ def test_s11_a_matrix_that_lies_on_its_side_is_turned() -> None:
     table = columns_of_arrays({"q": signals()["q"].T}, "run.npy")
     assert np.array_equal(table.columns["q_3"], good()["q_3"])
     assert [(c.code, c.level) for c in table.checks] == [("RRID-S11", "warn")]
+
+
+def test_s11_a_matrix_of_gains_beside_signals_is_no_signal() -> None:
+    table = columns_of_arrays({"q": signals()["q"], "gains": np.eye(3)}, "run.npy")
+    assert list(table.columns) == ["q_1", "q_2", "q_3"]
+
+
+def test_x12_an_npz_archive_is_read_and_one_of_other_files_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "run.npz"
+    np.savez_compressed(path, **signals())
+    assert np.array_equal(read_table(path).columns["q_3"], good()["q_3"])
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(InputRejected, match="RRID-F08 run.npz: truncated"):
+        read_table(path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("../q.txt", "0")
+    with pytest.raises(UsageError, match="RRID-X12"):
+        read_table(path)
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("q.npy", bytes(150_000_000))
+    with pytest.raises(InputRejected, match=r"RRID-(X05|F08|F02)"):
+        read_table(path)
 
 
 def test_s11_a_square_matrix_is_refused() -> None:

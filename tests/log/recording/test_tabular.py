@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected
-from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.raw import RawTable, unstacked
 from pipelines.log.recording.tabular import read_text
 from tests.log.recording.good import good, lines, text
 
@@ -25,6 +25,19 @@ def levels(table: RawTable) -> dict[str, str]:
 
 def equal(table: RawTable, rows: slice = slice(None)) -> bool:
     return all(np.array_equal(table.columns[name], values[rows]) for name, values in good().items())
+
+
+def test_a_table_of_one_row_a_joint_becomes_one_of_one_row_a_sample() -> None:
+    columns = good()
+    rows = [(t, name, columns[f"q_{j}"][k]) for k, t in enumerate(columns["t"]) for j, name in enumerate("cab", start=1)]
+    table = unstacked(parse("t,joint,q\n" + "".join(f"{t:.17g},{name},{q:.17g}\n" for t, name, q in rows)))
+    assert np.array_equal(table.columns["t"], columns["t"])
+    assert np.array_equal(table.columns["q[a]"], columns["q_2"])
+
+
+def test_a_counter_that_starts_again_in_one_motion_is_no_joint() -> None:
+    columns = good() | {"frame": np.arange(1200.0) % 4, "bit": np.arange(1200.0) % 2}
+    assert list(unstacked(parse(text(columns))).columns) == list(columns)
 
 
 def test_every_digit_of_a_plain_file_is_read() -> None:
