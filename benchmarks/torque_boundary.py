@@ -128,7 +128,7 @@ def _dh(
             (0, h, 0, "revolute"),
             (0, 0, 0.12 * s, "revolute"),
         ], [0, 0.6, 0, -1.2, 0, 0.8, 0]
-    n = int(rng.integers(3, 8))
+    n = int(rng.integers(2, 8))
     rows = []
     for k in range(n):
         kind = "prismatic" if rng.random() < 0.12 and k else "revolute"
@@ -341,8 +341,10 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
         gravity = 9.81 * np.array([np.sin(0.087), 0, -np.cos(0.087)])
     load = _inverse_dynamics(arm, q, machine.dq, machine.ddq, gravity)
     tau = load + machine.rotor * machine.ddq * (kind != "no friction" or rng.random() < 0.5)
-    if kind != "no friction":
-        tau = tau + _friction(machine, load)
+    dissipated = _friction(machine, load) * (kind != "no friction")
+    tau = tau + dissipated
+    power = np.mean(dissipated * machine.dq, axis=0)
+    power = power / np.sqrt(np.mean(tau**2, axis=0) * np.mean(machine.dq**2, axis=0))
     tau, q = _faulty(tau, q, machine, fault, rng)
     tau = tau + machine.noise * rng.normal(size=tau.shape)
     q = machine.step * np.round((q + 0.5 * machine.step * rng.normal(size=q.shape)) / machine.step)
@@ -359,6 +361,7 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
         "sign": kind != "magnitude",
         "direction": turned.tolist(),
         "order": np.argsort(order).tolist(),
+        "dissipated": power.tolist(),
         "family": machine.family,
         "n": n,
     }
@@ -486,6 +489,16 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
         return out
     out["gravity"] = _told(found.gravity.present, truth["gravity"], blind)
     out["share"], out["std"] = found.gravity.share, found.gravity.std
+    out["joint_share"] = list(zip(found.gravity.joint_share, found.gravity.joint_std, strict=True))
+    out["friction_share"] = [
+        (share, std, true)
+        for share, std, true in zip(
+            found.friction.joint_share, found.friction.joint_std, truth["dissipated"], strict=True
+        )
+    ]
+    out["why"] = [found.gravity.reason, found.friction.reason, found.direction.reason, found.order.reason]
+    out["vectors"] = [found.direction.best, truth["direction"]]
+    out["orders"] = [found.order.columns, truth["order"]]
     out["friction"] = _told(found.friction.present, truth["friction"], False)
     vector = found.direction.vector
     near = (
