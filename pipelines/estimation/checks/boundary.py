@@ -18,14 +18,13 @@ import numpy as np
 from pipelines.estimation.checks.channel_order import ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import GravityFit, GravityModel
-from pipelines.estimation.checks.spread import effective_moments, friction_spread, gravity_spread
+from pipelines.estimation.checks.spread import effective_moments, gravity_spread, jackknife
 from pipelines.estimation.checks.torque_rows import (
-    FRICTION,
+    CLUSTERS,
     Array,
     GenericArm,
     Order,
     TorqueRows,
-    described_torque,
     generic_arm,
     torque_rows,
 )
@@ -104,6 +103,7 @@ class Unit:
 
     units: tuple[str, ...]  # of each joint's torque
     scale: float | None  # torque over that of the described links; null: not identifiable
+    std: float | None  # standard deviation of `scale`
     reason: str = ""  # why a value is not identifiable; else empty
 
 
@@ -263,7 +263,7 @@ def _angle(one: Array, other: Array) -> float:
 
 def _possible(model: GravityModel, fit: GravityFit) -> bool:
     """Return whether the links alone have no negative inertia about any joint."""
-    return bool((model.rows.unit @ fit.parameters >= 0.0).all())
+    return bool((model.rows.own_inertia @ fit.parameters >= 0.0).all())
 
 
 def _whole(n: int) -> Array:
@@ -280,7 +280,7 @@ def _estimated(
     config: BoundaryConfig,
 ) -> Boundary:
     described = np.array(robot.gravity)
-    rows = _thinned(motions, config.rows)
+    rows = motions
     fits = _fits(arm, rows, described, config)
     signed = [str(j + 1) for j, count in enumerate(touches) if count is None]
     evidence = [f"the torque of joint {', '.join(signed)} changes its sign"]
@@ -336,7 +336,7 @@ def _ordered(
         config.model_error,
         (config.orders, config.order_rows_many, fits.rms > config.lost),
     )
-    part = _thinned(motions, config.order_rows)
+    part = motions
     gains = [
         _gain(fits, *_under(torque_rows(arm, part, *_applied(c)), described, config), c)
         for c in tried
@@ -387,19 +387,17 @@ def _gravity(
     from the described one.
     """
     model, best = fits.model, fits.best
-    vector = best.gravity[0]
-    size = float(np.linalg.norm(vector))
-    along = vector / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
-    covariance = gravity_spread(model, best, _whole(len(best.gravity)))
+    top, none = fits.turned[0], fits.none
+    covariance, _, _ = gravity_spread(model, best, _whole(len(best.gravity)))
+    along = _unit_vector(described if _absent(fits, config) and np.any(described) else top.gravity[0])
     # along the vector, and as the size of a vector that is uncertain across it
     std = float(np.sqrt(max(along @ covariance @ along, 0.0))) / STANDARD_GRAVITY
     across = (
         float(np.sqrt(max(np.trace(covariance) - along @ covariance @ along, 0.0)))
         / STANDARD_GRAVITY
     )
-    share = size / STANDARD_GRAVITY
+    share = float(best.gravity[0] @ along) / STANDARD_GRAVITY
     known = std < config.undetermined and across < config.wide
-    top, none = fits.turned[0], fits.none
     present = _present(top, none, (share, std) if known else None, config)
     known = known and present is not None
     removed = (
@@ -459,6 +457,15 @@ def _gravity(
     )
 
 
+def _absent(fits: _Fits, config: BoundaryConfig) -> bool:
+    """Return whether no gravity fits better than all of it, in any direction."""
+    return fits.none.score > fits.turned[0].score
+
+
+def _unit_vector(vector: Array) -> Array:
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
 def _present(
     top: GravityFit, none: GravityFit, share: tuple[float, float] | None, config: BoundaryConfig
 ) -> bool | None:
@@ -503,8 +510,8 @@ def _each_joint(
     n = len(best.gravity)
     groups = np.einsum("jk,jx->kjx", np.eye(n), best.gravity)
     apart = model.search(best.gravity, groups)
-    std = np.sqrt(np.maximum(np.diag(gravity_spread(model, apart, groups)), 0.0))
-    share = np.linalg.norm(apart.gravity, axis=1) / STANDARD_GRAVITY
+    std = np.sqrt(np.maximum(np.diag(gravity_spread(model, apart, groups)[0]), 0.0))
+    share = apart.gravity @ _unit_vector(best.gravity[0]) / STANDARD_GRAVITY
     p = model.rows.inertial.shape[2]
     m = len(model.rows.heavy)
     pulled = np.einsum(
@@ -554,15 +561,12 @@ def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
     """
     model = fits.model
     rows = model.rows
-    coefficients, covariance = friction_spread(model, fits.best)
+    _, coefficients, covariance = gravity_spread(model, fits.best, _whole(rows.n_joints))
     n, c = coefficients.shape
-    speed = rows.own[:, :, 2]
-    size = np.sqrt(np.mean(speed**2, axis=1) * np.mean(rows.tau**2, axis=1))
     weights = np.zeros((n, n * c))
-    moves = size > 0.0  # a joint that is held, or without torque, has no friction to tell
-    for j in np.flatnonzero(moves).tolist():
-        power = rows.own[j, :, FRICTION] * speed[j][:, None]
-        weights[j, j * c + FRICTION.start : j * c + FRICTION.stop] = power.mean(axis=0) / size[j]
+    moves = np.any(rows.dissipated != 0.0, axis=1)  # a joint that is held has none to tell
+    for j in range(n):
+        weights[j, j * c : (j + 1) * c] = rows.dissipated[j]
     each = weights @ coefficients.ravel()
     std = np.sqrt(np.maximum(np.einsum("jk,kl,jl->j", weights, covariance, weights), 0.0))
     sure = moves / (
@@ -627,20 +631,24 @@ def _unit(
     units = _units(robot)
     links = [joint.link for joint in robot.joints if joint.link is not None]
     if len(links) < robot.n_joints:
-        return Unit(units, None, "the description has no masses and inertias to compare with")
-    gravity = fits.best.gravity[0]
-    described = described_torque(arm, motions, standard_parameters(links), gravity).T
-    rows = fits.model.rows
-    expected, measured = described / fits.model.size[:, None], rows.tau / fits.model.size[:, None]
-    slopes = []
+        return Unit(units, None, None, "the description has no masses and inertias to compare with")
+    rows, size = fits.model.rows, fits.model.size
+    standard = standard_parameters(links)
+    phi = arm.combine @ np.ravel(standard)
+    pulled = np.einsum("jnkm,k,m->jn", rows.gravity, fits.best.gravity[0], phi[rows.heavy])
+    expected = (rows.inertial @ phi + pulled) / size[:, None]
+    xx, xy = np.zeros(CLUSTERS), np.zeros(CLUSTERS)
+    yy = 0.0
     for j in range(robot.n_joints):
         basis, _ = np.linalg.qr(rows.own[j])
-        x, y = (v - basis @ (basis.T @ v) for v in (expected[j], measured[j]))
-        slopes.append((float(x @ y), float(x @ x), float(y @ y)))
-    xy, xx, yy = np.sum(slopes, axis=0)
-    if xx <= 0.0 or xy**2 < 0.8 * xx * yy:
-        return Unit(units, None, "the described links do not explain the torque")
-    return Unit(units, float(xy / xx))
+        x, y = (v - basis @ (basis.T @ v) for v in (expected[j], rows.tau[j] / size[j]))
+        xx += np.bincount(rows.cluster, x * x, CLUSTERS)
+        xy += np.bincount(rows.cluster, x * y, CLUSTERS)
+        yy += float(y @ y)
+    if xx.sum() <= 0.0 or xy.sum() ** 2 < 0.8 * xx.sum() * yy:
+        return Unit(units, None, None, "the described links do not explain the torque")
+    scale, covariance = jackknife(xx[:, None, None], xy[:, None])
+    return Unit(units, float(scale[0]), float(np.sqrt(covariance[0, 0])))
 
 
 def _units(robot: RobotDescription) -> tuple[str, ...]:
@@ -677,7 +685,7 @@ def _unread(
         nothing,
         Direction(None, None, robot.gravity, None, reason=why),
         JointOrder(None, "", reason=why),
-        Unit(_units(robot), None, why),
+        Unit(_units(robot), None, None, why),
         _never(robot),
         evidence,
         names,
