@@ -24,8 +24,10 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.estimation.checks.boundary import torque_boundary
+from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.robot import Joint, LinkParameters, RobotDescription, format_robot
+from pipelines.model.row_fit import sample_motion
 
 __all__ = ["KINDS", "Machine", "case", "draw", "main"]
 
@@ -341,10 +343,8 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
         gravity = 9.81 * np.array([np.sin(0.087), 0, -np.cos(0.087)])
     load = _inverse_dynamics(arm, q, machine.dq, machine.ddq, gravity)
     tau = load + machine.rotor * machine.ddq * (kind != "no friction" or rng.random() < 0.5)
-    dissipated = _friction(machine, load) * (kind != "no friction")
-    tau = tau + dissipated
-    power = np.mean(dissipated * machine.dq, axis=0)
-    power = power / np.sqrt(np.mean(tau**2, axis=0) * np.mean(machine.dq**2, axis=0))
+    friction = _friction(machine, load) * (kind != "no friction")
+    rigid, tau = tau, tau + friction
     tau, q = _faulty(tau, q, machine, fault, rng)
     tau = tau + machine.noise * rng.normal(size=tau.shape)
     q = machine.step * np.round((q + 0.5 * machine.step * rng.normal(size=q.shape)) / machine.step)
@@ -355,17 +355,18 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
     if kind == "permuted":
         while (order == np.arange(n)).all():
             order = rng.permutation(n) if rng.random() < 0.5 else _swapped(n, rng)
+    log = _log(machine, q[:, order], tau[:, order])
     truth = {
         "gravity": kind != "no gravity",
         "friction": kind != "no friction",
         "sign": kind != "magnitude",
         "direction": turned.tolist(),
         "order": np.argsort(order).tolist(),
-        "dissipated": power.tolist(),
+        "dissipated": _dissipated(machine, log, rigid, friction),
         "family": machine.family,
         "n": n,
     }
-    return _log(machine, q[:, order], tau[:, order]), truth
+    return log, truth
 
 
 def _swapped(n: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
@@ -442,17 +443,96 @@ def _log(machine: Machine, q: Array, tau: Array) -> ExperimentLog:
     )
 
 
-def _vertical(machine: Machine, gravity: Array) -> bool:
-    """Whether this gravity puts nothing but constants on all joints: no log of this motion can tell
-    it.
+@dataclass(frozen=True, eq=False)
+class Identifiable:
+    """What the best estimator could tell of gravity, by Pinocchio's regressor and the true noise.
+
+    It knows the form of every column, the friction law's too, and sees white noise of known power;
+    the links are free. What even that leaves open, no log of this motion tells.
     """
-    some = slice(None, None, max(1, len(machine.t) // 200))
-    still = 0 * machine.q[some]
-    pulled = _inverse_dynamics(machine.robot, machine.q[some], still, still, gravity)
-    whole = _inverse_dynamics(
-        machine.robot, machine.q[some], machine.dq[some], machine.ddq[some], gravity
-    )
-    return bool((pulled.std(axis=0) < 0.02 * whole.std(axis=0).max()).all())
+
+    free: Array  # (4, n N, 10 n) columns over noise: without gravity, and 1 m/s^2 along x, y, z
+    links: Array  # (10 n,) as they are
+
+    @classmethod
+    def of(cls, machine: Machine) -> Identifiable:
+        import pinocchio as pin
+
+        model = _pinocchio(machine.robot)
+        data = model.createData()
+        some = slice(None, None, max(1, len(machine.t) // 300))
+        q, dq, ddq = machine.q[some], machine.dq[some], machine.ddq[some]
+        parts = []
+        for gravity in (np.zeros(3), *np.eye(3)):
+            model.gravity.linear = gravity
+            moving = (dq, ddq) if not gravity.any() else (0 * dq, 0 * ddq)
+            columns = [
+                pin.computeJointTorqueRegressor(model, data, *one).copy()
+                for one in zip(q, *moving, strict=True)
+            ]
+            parts.append(np.transpose(columns, (1, 0, 2)))
+        free = np.array(parts)
+        for j in range(q.shape[1]):
+            speed = dq[:, j]
+            own = np.stack(
+                [ddq[:, j], np.tanh(speed / machine.friction["width"][j]), speed, 1 + 0 * speed],
+                axis=-1,
+            )
+            basis = np.linalg.qr(own)[0]
+            free[:, j] -= basis @ (basis.T @ free[:, j])
+            free[:, j] *= np.sqrt(len(machine.t) / len(q)) / machine.noise[j]
+        links = np.concatenate([one.toDynamicParameters() for one in list(model.inertias)[1:]])
+        return cls(free.reshape(4, -1, free.shape[-1]), links)
+
+    def columns(self, gravity: Array) -> Array:
+        return np.asarray(self.free[0] + np.tensordot(gravity, self.free[1:], 1))
+
+    def explained(self, true: Array, other: Array) -> bool:
+        """Whether other links under `other` explain the torque under `true` to within the noise."""
+        target = self.columns(true) @ self.links
+        columns = self.columns(other)
+        scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        left = target - columns @ (np.linalg.lstsq(columns / scale, target, 1e-9)[0] / scale)
+        return float(left @ left) < 4.0
+
+    def direction(self, true: Array) -> bool:
+        """Whether the direction is determined: rank of the torque's change with it, and no other
+        direction of gravity explains the torque.
+        """
+        along = true / np.linalg.norm(true)
+        across = np.linalg.svd(along[None])[2][1:]
+        columns = self.columns(true)
+        change = np.tensordot(9.81 * across, self.free[1:], 1) @ self.links
+        scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        fit = np.linalg.lstsq(columns / scale, change.T, 1e-9)[0]
+        left = change.T - columns / scale @ fit
+        if np.linalg.svd(left)[1][-1] < 1e-6 * np.linalg.norm(columns @ self.links):
+            return False
+        rng = np.random.default_rng(0)
+        others = [
+            -along,
+            *across,
+            *-across,
+            *(v / np.linalg.norm(v) for v in rng.normal(size=(30, 3))),
+        ]
+        ring = np.radians(5.0)
+        for turn in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+            side = np.cos(turn) * across[0] + np.sin(turn) * across[1]
+            others.append(np.cos(ring) * along + np.sin(ring) * side)
+        return not any(
+            self.explained(true, 9.81 * v) for v in others if v @ along < np.cos(0.99 * ring)
+        )
+
+
+def _dissipated(machine: Machine, log: ExperimentLog, rigid: Array, friction: Array) -> list[float]:
+    """<friction · speed> / (rms torque · rms speed) of each joint, at the moments that are fitted."""
+    motion = sample_motion(Subject(log).good)
+    if motion is None:
+        return [float("nan")] * rigid.shape[1]
+    at = np.searchsorted(machine.t, motion.t - 1e-9)
+    tau, speed = (rigid + friction)[at], machine.dq[at]
+    scale = np.sqrt(np.mean(tau**2, axis=0) * np.mean(speed**2, axis=0))
+    return np.asarray(np.mean(friction[at] * speed, axis=0) / scale).tolist()
 
 
 def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
@@ -473,7 +553,10 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     }
     if found is None:
         return out | {"none": True}
-    blind = _vertical(draw(seed), np.array(truth["direction"]))
+    could = Identifiable.of(draw(seed))
+    pointing = np.array(truth["direction"])
+    blind = not could.direction(pointing)
+    mute = could.explained(*((pointing, 0 * DOWN) if truth["gravity"] else (0 * DOWN, DOWN)))
     out["sign"] = _field(found.sign, "signed" if truth["sign"] else "magnitude")
     claims = {
         "order": bool(found.order.signal),
@@ -487,7 +570,7 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     ]
     if kind == "magnitude":
         return out
-    out["gravity"] = _told(found.gravity.present, truth["gravity"], blind)
+    out["gravity"] = _told(found.gravity.present, truth["gravity"], mute)
     out["share"], out["std"] = found.gravity.share, found.gravity.std
     out["joint_share"] = list(zip(found.gravity.joint_share, found.gravity.joint_std, strict=True))
     out["friction_share"] = [
@@ -496,7 +579,12 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
             found.friction.joint_share, found.friction.joint_std, truth["dissipated"], strict=True
         )
     ]
-    out["why"] = [found.gravity.reason, found.friction.reason, found.direction.reason, found.order.reason]
+    out["why"] = [
+        found.gravity.reason,
+        found.friction.reason,
+        found.direction.reason,
+        found.order.reason,
+    ]
     out["vectors"] = [found.direction.best, truth["direction"]]
     out["orders"] = [found.order.columns, truth["order"]]
     out["friction"] = _told(found.friction.present, truth["friction"], False)
@@ -514,8 +602,9 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     )
     columns = None if found.order.columns is None else [k - 1 for k in found.order.columns]
     out["order"] = _told(columns, truth["order"], False)
+    out["blind"], out["mute"] = blind, mute
     out["gate"] = claims.get(CLAIM.get(kind, ""), True) or (
-        blind and kind in ("no gravity", "ceiling")
+        (mute and kind == "no gravity") or (blind and kind != "permuted")
     )
     return out
 

@@ -10,6 +10,7 @@ a costs less than a millisecond.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,15 +83,6 @@ class GravityModel:
             )
         return out
 
-    def _parts(self, each: Array, weights: Array) -> list[tuple[Array, Array]]:
-        """Joints of one gravity together: their T, and their weighted Gram matrix."""
-        if (each == each[0]).all():
-            return [(self._transform(each[0]), np.tensordot(weights, self.gram, 1))]
-        return [
-            (self._transform(a), w * gram)
-            for a, w, gram in zip(each, weights, self.gram, strict=True)
-        ]
-
     def fit(self, gravity: Array, variance: Array | None = None) -> GravityFit:
         """Fit the parameters under `gravity`, (3,) or of each joint (n, 3), from the `variance`
         (n,) of a fit nearby.
@@ -102,11 +94,9 @@ class GravityModel:
             normal = sum((t.T @ g[:-1, :-1] @ t for t, g in parts), np.zeros(()))
             right = sum((t.T @ g[:-1, -1] for t, g in parts), np.zeros(()))
             phi = np.linalg.solve(normal + _ridge(normal), right)
-            model = np.broadcast_to(
-                np.stack([np.append(t @ phi, -1.0) for t, _ in parts]),
-                (len(each), len(self.gram[0])),
-            )
-            left = np.einsum("jp,jp->j", model, np.matmul(self.gram, model[:, :, None])[:, :, 0])
+            model = np.stack([np.append(t @ phi, -1.0) for t, _ in parts])
+            model = np.broadcast_to(model, (len(each), model.shape[1]))
+            left = np.einsum("jp,jpq,jq->j", model, self.gram, model, optimize=True)
             before, variance = variance, np.maximum(left, 0.0) + self.model_error**2
             if np.abs(np.log(variance / before)).max() < _SETTLED:
                 break
@@ -114,6 +104,15 @@ class GravityModel:
             len(each) * LOOSE**2
         )
         return GravityFit(each, phi / self.scale, variance, np.sqrt(np.maximum(left, 0.0)), score)
+
+    def _parts(
+        self, each: Array, weights: Array, together: bool = True
+    ) -> list[tuple[Array, Array]]:
+        """Return each joint's T and weighted Gram matrix; joints of one gravity may be summed."""
+        if together and (each == each[0]).all():
+            return [(self._transform(each[0]), np.tensordot(weights, self.gram, 1))]
+        transforms = map(self._transform, each)
+        return list(zip(transforms, weights[:, None, None] * self.gram, strict=True))
 
     def _equilibrated(self, fit: GravityFit) -> Array:
         """The parameters (p,) of columns at unit length."""
@@ -136,16 +135,9 @@ class GravityModel:
             np.zeros(len(groups)),
             np.zeros(p),
         )
-        alike = bool((groups == groups[:, :1]).all() and (fit.gravity == fit.gravity[0]).all())
         weights, theta = self.effective / fit.variance, self._equilibrated(fit)
-        parts = (
-            self._parts(fit.gravity, weights)
-            if alike
-            else [
-                (self._transform(a), w * gram)
-                for a, w, gram in zip(fit.gravity, weights, self.gram, strict=True)
-            ]
-        )
+        together = bool((groups == groups[:, :1]).all())
+        parts = self._parts(fit.gravity, weights, together)
         for j, (transform, gram) in enumerate(parts):
             change = np.zeros((p + 3 * m, len(groups)))
             for k in range(3):
@@ -169,37 +161,40 @@ class GravityModel:
         )
 
     def search(self, start: Array, groups: Array) -> GravityFit:
-        """Fit the gravity as well, from `start` (n, 3), along `groups` (k, n, 3), by Levenberg-
-        Marquardt steps.
-        """
-        best, damping = self.fit(start), 1e-3
-        for _ in range(_STEPS):
-            slope, hessian = self.curvature(best, groups)
-            diagonal = np.diag(np.diag(hessian) + 1e-12 * np.trace(hessian) + 1e-300)
-            step = np.linalg.solve(hessian + damping * diagonal, slope)
-            tried = self.fit(best.gravity + np.einsum("k,kjx->jx", step, groups), best.variance)
-            if tried.score > best.score:
-                gained, best, damping = tried.score - best.score, tried, 0.1 * damping
-                if gained < _ENOUGH:
-                    break
-            else:
-                damping *= 10.0
-                if damping > 1e6:
-                    break
-        return best
+        """Fit the gravity as well, from `start` (n, 3), along `groups` (k, n, 3)."""
+
+        def stepped(fit: GravityFit, step: Array, along: Array) -> Array:
+            return np.asarray(fit.gravity + np.einsum("k,kjx->jx", step, along))
+
+        return self._climb(start, lambda _: groups, stepped)
 
     def search_direction(self, start: Array, size: float) -> GravityFit:
         """Fit the direction of a gravity of `size` [m/s^2], alike at all joints, from `start` (3,)."""
         n = self.rows.n_joints
-        best, damping = self.fit(size * start / np.linalg.norm(start)), 1e-3
+
+        def across(fit: GravityFit) -> Array:
+            return np.repeat(size * np.linalg.svd(fit.gravity[:1])[2][1:, None], n, axis=1)
+
+        def stepped(fit: GravityFit, step: Array, along: Array) -> Array:
+            turned = fit.gravity[0] + np.clip(step, -0.5, 0.5) @ along[:, 0]
+            return np.asarray(size * turned / np.linalg.norm(turned))
+
+        return self._climb(size * start / np.linalg.norm(start), across, stepped)
+
+    def _climb(
+        self,
+        start: Array,
+        groups_at: Callable[[GravityFit], Array],
+        stepped: Callable[[GravityFit, Array, Array], Array],
+    ) -> GravityFit:
+        """Climb the log likelihood by Levenberg-Marquardt steps."""
+        best, damping = self.fit(start), 1e-3
         for _ in range(_STEPS):
-            along = best.gravity[0] / size
-            groups = np.repeat(size * np.linalg.svd(along[None])[2][1:, None], n, axis=1)
+            groups = groups_at(best)
             slope, hessian = self.curvature(best, groups)
             diagonal = np.diag(np.diag(hessian) + 1e-12 * np.trace(hessian) + 1e-300)
             step = np.linalg.solve(hessian + damping * diagonal, slope)
-            turned = along + np.clip(step, -0.5, 0.5) @ groups[:, 0] / size
-            tried = self.fit(size * turned / np.linalg.norm(turned), best.variance)
+            tried = self.fit(stepped(best, step, groups), best.variance)
             if tried.score > best.score:
                 gained, best, damping = tried.score - best.score, tried, 0.1 * damping
                 if gained < _ENOUGH:
@@ -210,17 +205,21 @@ class GravityModel:
                     break
         return best
 
-    def rigid(self, joint: int, fit: GravityFit) -> Array:
-        """(N, p) equilibrated columns of the rigid body under the gravity of `fit`, own columns
-        projected out.
+    def pulls(self, fit: GravityFit) -> Array:
+        """Return the torque (n, N, 3) over its size of 1 m/s^2 along each axis, beyond what the
+        joints' own columns explain.
         """
-        return np.asarray(self.projected[joint, :, :-1] @ self._transform(fit.gravity[joint]))
+        n, m = self.rows.n_joints, len(self.rows.heavy)
+        p = self.rows.inertial.shape[2]
+        part = self.projected[:, :, p : p + 3 * m].reshape(n, -1, 3, m)
+        return np.asarray(part @ fit.parameters[self.rows.heavy])
 
     def residuals(self, fit: GravityFit) -> Array:
         """(n, N) the residual over the RMS of each joint's torque."""
         theta = self._equilibrated(fit)
-        return np.stack(
-            [self.projected[j, :, -1] - self.rigid(j, fit) @ theta for j in range(len(fit.gravity))]
+        models = np.stack([self._transform(gravity) @ theta for gravity in fit.gravity])
+        return np.asarray(
+            self.projected[:, :, -1] - (self.projected[:, :, :-1] @ models[:, :, None])[:, :, 0]
         )
 
 

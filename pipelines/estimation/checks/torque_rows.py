@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +28,18 @@ from pipelines.model.rigid.chain import regressor
 from pipelines.model.rigid.geometry import SerialChain, serial_chain
 from pipelines.model.row_fit import Sampled
 
-__all__ = ["CLUSTERS", "Array", "GenericArm", "Order", "TorqueRows", "generic_arm", "torque_rows"]
+__all__ = [
+    "CLUSTERS",
+    "Array",
+    "GenericArm",
+    "Order",
+    "RowFilter",
+    "TorqueRows",
+    "generic_arm",
+    "own_columns",
+    "thinned",
+    "torque_rows",
+]
 
 Array = npt.NDArray[np.float64]
 Order = tuple[int, ...]
@@ -102,18 +114,15 @@ def torque_rows(
     masses = [arm.columns[k] for k in heavy]
     pulled = [regressor(replace(arm.chain, gravity=a), q, still, still, masses) for a in np.eye(3)]
     rigid = np.concatenate([inertial, *pulled], axis=2).transpose(1, 0, 2)
-    smooth = _Filter(motions)
-    size = np.sqrt(np.mean(dq**2, axis=0))
-    width = np.where(size > 0.0, size, 1.0)
-    laws = [coulomb, *(np.tanh(dq / (w * width)) for w in _WIDTHS), dq, dq * np.abs(dq)]
-    own = np.stack([ddq, *laws, np.ones_like(q)], axis=-1).transpose(1, 0, 2)
+    smooth = RowFilter(motions)
+    own = own_columns(dq, ddq, coulomb)
     torque = smooth(tau.T[:, :, None])[:, :, 0]
     slow = smooth(rigid)
     load = _load(slow, smooth(own), torque, rigid)
     friction = np.abs(load) * coulomb.T  # of gears, in proportion to the load
     own = np.concatenate([own[:, :, :-1], friction[:, :, None], own[:, :, -1:]], axis=2)
     dissipated = np.einsum("jnc,nj->jc", own, dq) / len(dq)
-    scale = size * np.sqrt(np.mean(tau**2, axis=0))
+    scale = np.sqrt(np.mean(dq**2, axis=0) * np.mean(tau**2, axis=0))
     dissipated = dissipated / np.where(scale > 0.0, scale, np.inf)[:, None]
     dissipated[:, [0, -1]] = 0.0
     some = slice(None, None, max(1, len(q) // 100))
@@ -140,6 +149,24 @@ def torque_rows(
     )
 
 
+def own_columns(dq: Array, ddq: Array, coulomb: Array) -> Array:
+    """Return the columns (n, N, c) of rotor inertia, friction in speed, and offset."""
+    size = np.sqrt(np.mean(dq**2, axis=0))
+    size = np.where(size > 0.0, size, 1.0)
+    laws = [coulomb, *(np.tanh(dq / (width * size)) for width in _WIDTHS), dq, dq * np.abs(dq)]
+    return np.stack([ddq, *laws, np.ones_like(dq)], axis=-1).transpose(1, 0, 2)
+
+
+def thinned(motions: Sequence[Sampled], moments: int) -> list[Sampled]:
+    """Return `motions` at every k-th moment, about `moments` of all together."""
+    step = max(1, sum(len(motion.t) for motion in motions) // moments)
+    names = ("t", "q", "dq", "ddq", "coulomb", "at")
+    return [
+        replace(motion, **{name: getattr(motion, name)[::step] for name in names})
+        for motion in motions
+    ]
+
+
 def _load(slow: Array, own: Array, torque: Array, rigid: Array) -> Array:
     """Return the torque (n, N) of the rigid body as each joint's own row has it, without friction.
 
@@ -154,7 +181,7 @@ def _load(slow: Array, own: Array, torque: Array, rigid: Array) -> Array:
     return np.asarray((rigid @ weight[:, : rigid.shape[2]])[:, :, 0])
 
 
-class _Filter:
+class RowFilter:
     """A Hann window over a part of the motion's period, stretch by stretch."""
 
     def __init__(self, motions: Sequence[Sampled]) -> None:
@@ -164,7 +191,7 @@ class _Filter:
             step = float(np.median(np.diff(motion.t)))
             cuts = 1 + np.flatnonzero(np.abs(np.diff(motion.t) - step) > 0.5 * step)
             bounds = [done, *(done + cuts).tolist(), done + len(motion.t)]
-            self.edges += list(zip(bounds[:-1], bounds[1:], strict=True))
+            self.edges += list(pairwise(bounds))
             spacing.append(step)
             done += len(motion.t)
         self.spacing = float(np.median(spacing))
@@ -173,7 +200,6 @@ class _Filter:
             for motion in motions
         ]
         period = 2.0 * np.pi / max(float(np.max(rates)), 1e-12)
-        longest = max(b - a for a, b in self.edges)
         wanted = min(_PERIODS * period / self.spacing, 0.1 * max(b - a for a, b in self.edges))
         self.step = max(1, int(wanted / _OVERLAP))
         self.length = max(1, int(min(wanted, self.step * _OVERLAP))) // self.step * self.step + 1

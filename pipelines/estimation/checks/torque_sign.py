@@ -46,9 +46,7 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
         # median deviation).
 
         noise = (
-            1.4826 * _finite_median(np.abs(np.diff(tau, 2))) / np.sqrt(6.0)
-            if tau.size > 2
-            else 0.0
+            1.4826 * _finite_median(np.abs(np.diff(tau, 2))) / np.sqrt(6.0) if tau.size > 2 else 0.0
         )
         if np.nansum(tau < -max(config.no_negative * noise, 1e-6 * size)) > max(
             2.0, 1e-3 * tau.size
