@@ -165,28 +165,29 @@ def torque_boundary(
     robot = usable[0].log.robot
     names = tuple(one.log.name for one in usable)
     touches = touches_of_zero(usable, config)
-    if all(count is not None for count in touches):
-        counts = [count or 0 for count in touches]
-        if max(counts) < config.touches:
-            return _unread(robot, None, names, "not identifiable: no torque changes its sign")
+    counts = [count for count in touches if count is not None]
+    sign: str | None = "signed"
+    if len(counts) < len(touches):
+        signed = ", ".join(str(j) for j, count in enumerate(touches, 1) if count is None)
+        evidence = f"the torque of joint {signed} changes its sign"
+    elif max(counts) >= config.touches:
         evidence = (
             "no torque is ever negative, though they come down to zero "
             f"{', '.join(map(str, counts))} times while the joints move"
         )
         return _unread(robot, "magnitude", names, "not identifiable from magnitudes", evidence)
-    signed = ", ".join(str(j + 1) for j, count in enumerate(touches) if count is None)
-    evidence = f"the torque of joint {signed} changes its sign"
+    else:  # a load on one side: the same as its magnitude
+        sign = None if any(counts) else "signed"
+        evidence = "no torque changes its sign" + (", or comes near zero" if sign else "")
     motions = [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
     arm = generic_arm(robot)
     if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
         return None
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _Estimate(robot, arm, motions, config).boundary(names, evidence)
+            return _Estimate(robot, arm, motions, config).boundary(names, sign, evidence)
     except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
-        return _unread(
-            robot, "signed", names, f"not identifiable: the fit failed: {error}", evidence
-        )
+        return _unread(robot, sign, names, f"not identifiable: the fit failed: {error}", evidence)
 
 
 def _informative(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
@@ -226,7 +227,7 @@ class _Estimate:
         self.robot, self.arm, self.motions, self.config = robot, arm, motions, config
         self.described = np.array(robot.gravity)
 
-    def boundary(self, names: tuple[str, ...], evidence: str) -> Boundary:
+    def boundary(self, names: tuple[str, ...], sign: str | None, evidence: str) -> Boundary:
         order, fits = self.ordered(self.fits())
         gravity, direction, removed, turned = self.gravity(fits)
         friction = self.friction(fits)
@@ -236,7 +237,7 @@ class _Estimate:
             removed = turned = False  # the order first: it is what the rest rests on
         return Boundary(
             sides[friction.present],
-            "signed",
+            sign,
             gravity,
             friction,
             direction,

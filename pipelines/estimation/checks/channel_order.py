@@ -29,8 +29,8 @@ __all__ = ["ColumnOrder", "search_orders"]
 _SIGNALS = ("q and tau", "tau", "q")
 _ALL_UP_TO = {"q and tau": 5, "q": 4, "tau": 4}  # joints; of more, orders are reached by exchanges
 _BEAM = 12  # orders that are kept at each exchange
-_RIDGE = 1e-8
-_ROUNDS = 3
+_RIDGE = 1e-9  # of equilibrated columns
+_ROUNDS = 4  # of reweighting, from what each joint by itself leaves
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class _Scorer:
         )
         own = self.filter(own_columns(self.dq, self.ddq, coulomb))
         torque = self.filter(tau.T[:, :, None])[:, :, 0].T
-        torque = torque / np.maximum(np.std(torque, axis=0), 1e-12)
+        self.size = np.maximum(np.std(torque, axis=0), 1e-12)
         self.basis, self.tau = [], []  # of each column of the positions
         for columns in own:
             basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
@@ -141,12 +141,16 @@ class _Scorer:
         if q_order not in self.known:
             self.known[q_order] = self._normal(q_order)
         gram, cross, power = self.known[q_order]
-        right = cross[np.arange(len(order)), :, list(tau_order)]
-        total = power[np.arange(len(order)), list(tau_order)]
+        size = self.size[list(tau_order)]
+        gram = gram / size[:, None, None] ** 2
+        right = cross[np.arange(len(order)), :, list(tau_order)] / size[:, None] ** 2
+        total = power[np.arange(len(order)), list(tau_order)] / size**2
         scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
         scale[scale < 1e-10 * scale.max()] = np.inf
         gram, right = gram / np.outer(scale, scale), right / scale
-        variance = np.ones(len(order))
+        ridge = 1e-6 * np.eye(len(scale)) * np.einsum("jpp->j", gram)[:, None, None] / len(scale)
+        alone = np.linalg.solve(gram + ridge, right[:, :, None])[:, :, 0]  # each joint by itself
+        variance = np.maximum(total - np.sum(right * alone, axis=1), 0.0) + self.model_error**2
         for _ in range(_ROUNDS):
             normal = np.einsum("jpq,j->pq", gram, 1.0 / variance)
             ridge = _RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))

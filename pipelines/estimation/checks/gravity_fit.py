@@ -64,6 +64,7 @@ class GravityModel:
         full -= basis @ (basis.transpose(0, 2, 1) @ full)
         self.projected = full  # (n, N, p + 3 m + 1)
         self.gram = full.transpose(0, 2, 1) @ full / moments
+        self.alone = self._alone()
         power = np.einsum("jpp->p", self.gram)
         scale = power[:p].copy()
         scale[rows.heavy] += 96.0 * power[p:-1].reshape(3, -1).sum(axis=0)  # at 9.8 m/s^2
@@ -71,6 +72,17 @@ class GravityModel:
         self.scale = np.where(
             scale > 1e-10 * scale.max(initial=1e-300), scale, np.inf
         )  # a parameter without any effect
+
+    def _alone(self) -> Array:
+        """Return the variance (n,) of each joint fitted by itself under any gravity: the least that
+        a fit of all can leave, from which its weights begin.
+        """
+        scale = np.sqrt(np.maximum(np.einsum("jpp->jp", self.gram), 1e-300))[:, :-1]
+        columns = self.gram[:, :-1, :-1] / (scale[:, :, None] * scale[:, None, :])
+        right = self.gram[:, :-1, -1] / scale
+        solved = np.linalg.solve(columns + 1e-6 * np.eye(len(scale[0])), right[:, :, None])
+        left = self.gram[:, -1, -1] - np.sum(right * solved[:, :, 0], axis=1)
+        return np.asarray(np.maximum(left, 0.0) + self.model_error**2)
 
     def _transform(self, gravity: Array) -> Array:
         """T (P, p) of one gravity (3,): columns of the model = [Y_0 Y_x Y_y Y_z] T."""
@@ -88,7 +100,7 @@ class GravityModel:
         (n,) of a fit nearby.
         """
         each = np.broadcast_to(gravity, (self.rows.n_joints, 3))
-        variance = np.ones(len(each)) if variance is None else variance
+        variance = self.alone if variance is None else variance
         for _ in range(_ROUNDS):
             parts = self._parts(each, 1.0 / variance)
             normal = sum((t.T @ g[:-1, :-1] @ t for t, g in parts), np.zeros(()))
