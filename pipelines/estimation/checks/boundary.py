@@ -474,7 +474,7 @@ class _Estimate:
             yy += float(y @ y)
         if xx.sum() <= 0.0 or xy.sum() ** 2 < 0.8 * xx.sum() * yy:
             return Unit(units, None, None, "the described links do not explain the torque")
-        scale, covariance = jackknife(xx[:, None, None], xy[:, None])
+        scale, covariance = jackknife(xx[:, None, None], xy[:, None], np.zeros((1, 1)))
         return Unit(units, float(scale[0]), float(np.sqrt(covariance[0, 0])))
 
 

@@ -80,7 +80,7 @@ def gravity_spread(
 
 
 def jackknife(
-    gram: Array, right: Array, prior: Array | float = 0.0, naive: Array | None = None
+    gram: Array, right: Array, prior: Array, naive: Array | None = None
 ) -> tuple[Array, Array]:
     """Return the weighted least squares fit (w,) and its covariance (w, w).
 
@@ -99,9 +99,9 @@ def jackknife(
     change = np.linalg.solve(without, (gram @ theta - right)[:, :, None])[:, :, 0]
     count = len(gram)
     covariance = (count - 1.0) / count * change.T @ change
-    if naive is None:
-        return theta, covariance
     inverse = np.linalg.inv(normal + ridge)
-    plain = inverse @ naive @ inverse
-    ratio = np.sqrt(np.maximum(np.diag(plain) / np.maximum(np.diag(covariance), 1e-300), 1.0))
-    return theta, covariance * np.outer(ratio, ratio)
+    if naive is not None:
+        plain = inverse @ naive @ inverse
+        ratio = np.sqrt(np.maximum(np.diag(plain) / np.maximum(np.diag(covariance), 1e-300), 1.0))
+        covariance = covariance * np.outer(ratio, ratio)
+    return theta, covariance + inverse @ (prior @ inverse)
