@@ -447,8 +447,8 @@ def _log(machine: Machine, q: Array, tau: Array) -> ExperimentLog:
 class Identifiable:
     """What the best estimator could tell of gravity, by Pinocchio's regressor and the true noise.
 
-    It knows the form of every column, the friction law's too, and sees white noise of known power;
-    the links are free. What even that leaves open, no log of this motion tells.
+    It sees white noise of known power; the links are free, and friction is a smooth function of
+    speed. What that leaves open, no log of this motion tells.
     """
 
     free: Array  # (4, n N, 10 n) columns over noise: without gravity, and 1 m/s^2 along x, y, z
@@ -474,10 +474,10 @@ class Identifiable:
         free = np.array(parts)
         for j in range(q.shape[1]):
             speed = dq[:, j]
-            own = np.stack(
-                [ddq[:, j], np.tanh(speed / machine.friction["width"][j]), speed, 1 + 0 * speed],
-                axis=-1,
-            )
+            size = np.abs(speed) / np.sqrt(np.mean(speed**2))
+            sign = np.tanh(speed / machine.friction["width"][j])
+            laws = [sign * size**power for power in (0.0, 0.5, 1.0, 1.5, 2.0)]
+            own = np.stack([ddq[:, j], *laws, 1 + 0 * speed], axis=-1)
             basis = np.linalg.qr(own)[0]
             free[:, j] -= basis @ (basis.T @ free[:, j])
             free[:, j] *= np.sqrt(len(machine.t) / len(q)) / machine.noise[j]

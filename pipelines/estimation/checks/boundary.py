@@ -266,7 +266,6 @@ class _Estimate:
             apart = (_angle(fit.gravity[0], other.gravity[0]) for other in turned)
             if all(angle > self.config.tilt for angle in apart):
                 turned.append(fit)
-        turned.sort(key=lambda fit: (-fit.score, not _possible(model, fit)))
         none = model.fit(np.zeros(3))
         groups = _whole(rows.n_joints)
         free = [model.search(fit.gravity, groups) for fit in (none, *turned[:2])]
@@ -332,6 +331,9 @@ class _Estimate:
         share = float(best.gravity[0] @ along) / STANDARD_GRAVITY
         variance = max(float(along @ covariance @ along), 0.0)
         std = float(np.sqrt(variance)) / STANDARD_GRAVITY
+        # no smaller than by the fit of gravity of its whole size
+        drop = max(2.0 * (best.score - top.score), 1e-6)
+        std = max(std, abs(share - 1.0) / np.sqrt(drop))
         across = np.sqrt(max(float(np.trace(covariance)) - variance, 0.0)) / STANDARD_GRAVITY
         known = std < config.undetermined and across < config.wide
         present = _present(top, none, (share, std) if known else None, config)
@@ -355,10 +357,8 @@ class _Estimate:
                 False,
             )
         half = _power(top) < config.explained * _power(fits.described)
-        # a gravity upside down is hardly seen where links of negative inertia take its place
-        impossible = _possible(model, top) and not _possible(model, fits.described)
         turned = (
-            (half or impossible)
+            half
             and _angle(top.gravity[0], described) > config.tilt
             and top.score > self.tilted(fits) + config.decisive
         )
@@ -386,21 +386,19 @@ class _Estimate:
         free vector and C its covariance; half the angle to the farthest is the deviation.
         """
         top, model = fits.turned[0], fits.model
-        possible = _possible(model, top)
-        for fit in fits.turned[1:]:
-            if fit.score > top.score - self.config.decisive and (
-                _possible(model, fit) or not possible
-            ):
-                return (
-                    None,
-                    "not identifiable: gravity in another direction explains the torque as well",
-                )
+        if any(fit.score > top.score - self.config.decisive for fit in fits.turned[1:]):
+            return (
+                None,
+                "not identifiable: gravity in another direction explains the torque as well",
+            )
         along = top.gravity[0] / STANDARD_GRAVITY
         covariance = gravity_spread(model, top, _whole(len(top.gravity)))[0]
         values, vectors = np.linalg.eigh(covariance)
         inverse = vectors / np.maximum(values, 1e-12 * LOOSE**2) @ vectors.T
-        angles = np.repeat(_ANGLES, 24)
-        away = np.concatenate([_cone(along, angle, 24) for angle in _ANGLES]) - along
+        across = np.linalg.svd(along[None])[2][1:]
+        across = np.linalg.eigh(across @ covariance @ across.T)[1].T @ across  # along its valleys
+        angles = np.repeat(_ANGLES, 8)
+        away = np.concatenate([_cone(along, angle, 8, across) for angle in _ANGLES]) - along
         apart = STANDARD_GRAVITY**2 * np.einsum("ij,jk,ik->i", away, inverse, away)
         spread = 0.5 * float(angles[apart < _FOUR].max(initial=_ANGLES[0]))
         if spread < self.config.direction_std:
@@ -425,16 +423,20 @@ class _Estimate:
         moves = np.any(dissipated != 0.0, axis=1)  # a joint that is held has none to tell
         each = weights @ coefficients.ravel()
         std = np.sqrt(np.maximum(np.einsum("jk,kl,jl->j", weights, covariance, weights), 0.0))
+        # by the balance of energy a cycle dissipates no more than the torque's power
+        told = moves & (std < config.undetermined) & (np.abs(each - 0.5) < 0.5 + 2.0 * std)
         floor = 0.1 * config.friction_absent
-        sure = moves / (std**2 + floor**2)  # a joint whose friction no motion tells has no say
+        sure = told / (std**2 + floor**2)  # a joint whose friction no motion tells has no say
         mean = sure @ weights / max(float(sure.sum()), 1e-300)
         share = float(mean @ coefficients.ravel())
         own = float(np.sqrt(max(mean @ covariance @ mean, 0.0)))
         upper = share + 2.0 * own
-        read = moves & (std < config.friction_absent)
+        read = told & (std < config.friction_absent)
         present: bool | None = None
         reason = "not identifiable: the motion does not tell friction from none"
-        if (each - 3.0 * std > config.friction_absent).any() or share > 3.0 * np.hypot(own, floor):
+        if (each - 3.0 * std > config.friction_absent)[told].any() or share > 3.0 * np.hypot(
+            own, floor
+        ):
             present, reason = True, ""
             if upper < config.friction_absent:
                 reason = "so little that it may be a direct drive, or what compensation leaves"
@@ -449,9 +451,11 @@ class _Estimate:
                 "they differ by the rotor inertia alone"
             )
         joints = [
-            tuple(float(v) if m else None for v, m in zip(values, moves, strict=True))
+            tuple(float(v) if k else None for v, k in zip(values, told, strict=True))
             for values in (each, std)
         ]
+        if not told.any():
+            return Share(None, None, joints[0], joints[1], reason=reason)
         return Share(share, own, joints[0], joints[1], present, upper, reason)
 
     def unit(self, fits: _Fits) -> Unit:
@@ -484,17 +488,14 @@ def _angle(one: Array, other: Array) -> float:
     return float(np.arccos(np.clip(one @ other / size, -1.0, 1.0))) if size > 0.0 else 0.5 * np.pi
 
 
-def _cone(along: Array, angle: float, count: int) -> Array:
-    """Return (count, 3) unit vectors at `angle` from the unit vector `along`."""
-    across = np.linalg.svd(along[None])[2][1:]
+def _cone(along: Array, angle: float, count: int, across: Array | None = None) -> Array:
+    """Return (count, 3) unit vectors at `angle` from the unit vector `along`, the first towards
+    the first of `across` (2, 3).
+    """
+    across = np.linalg.svd(along[None])[2][1:] if across is None else across
     turns = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
     side = np.stack([np.cos(turns), np.sin(turns)], axis=1) @ across
     return np.asarray(np.cos(angle) * along + np.sin(angle) * side)
-
-
-def _possible(model: GravityModel, fit: GravityFit) -> bool:
-    """Return whether the links alone have no negative inertia about any joint."""
-    return bool((model.rows.own_inertia @ fit.parameters >= 0.0).all())
 
 
 def _power(fit: GravityFit) -> float:

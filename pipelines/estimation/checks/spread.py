@@ -60,6 +60,9 @@ def gravity_spread(
     flat = groups.reshape(k, -1)
     prior = np.zeros((width, width))
     prior[:k, :k] = flat @ flat.T / (n * LOOSE**2)
+    own = slice(k + p, width)  # before any data no law of friction exceeds a joint's torque
+    laws = rows.own_rms * (rows.dissipated != 0.0) / model.size[:, None]
+    prior[own, own] = np.diag(laws.ravel() ** 2)
     pulls = rows.gravity @ fit.parameters[rows.heavy]  # (n, N, 3)
     for j in range(n):
         rigid = rows.inertial[j].copy()
@@ -75,7 +78,6 @@ def gravity_spread(
         power = fit.residual[j] ** 2 / fit.variance[j]
         naive[np.ix_(at, at)] += design.T @ design * power * moments / model.effective[j]
     theta, covariance = jackknife(gram, right, prior, naive)
-    own = slice(k + p, width)
     return covariance[:k, :k], theta[own].reshape(n, c), covariance[own, own]
 
 

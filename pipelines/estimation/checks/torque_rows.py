@@ -63,7 +63,7 @@ class TorqueRows:
     heavy: npt.NDArray[np.intp]  # (m,) indices of the parameters on which gravity acts
     own: Array  # F (n, N, c): rotor inertia, friction, offset
     dissipated: Array  # (n, c) <F v> / (rms τ · rms v): power of each friction column; else 0
-    own_inertia: Array  # (n, p) mean torque of each joint for its own unit acceleration, no gravity
+    own_rms: Array  # (n, c) RMS of the own columns before the filter
     tau: Array  # (n, N) [N m]
     start: npt.NDArray[np.intp]  # first moment of each stretch of even samples
     cluster: npt.NDArray[np.intp]  # (N,) moments of one cluster share the model's error
@@ -122,18 +122,10 @@ def torque_rows(
     friction = np.abs(load) * coulomb.T  # of gears, in proportion to the load
     own = np.concatenate([own[:, :, :-1], friction[:, :, None], own[:, :, -1:]], axis=2)
     dissipated = np.einsum("jnc,nj->jc", own, dq) / len(dq)
+    own_rms = np.sqrt(np.mean(own**2, axis=1))
     scale = np.sqrt(np.mean(dq**2, axis=0) * np.mean(tau**2, axis=0))
     dissipated = dissipated / np.where(scale > 0.0, scale, np.inf)[:, None]
     dissipated[:, [0, -1]] = 0.0
-    some = slice(None, None, max(1, len(q) // 100))
-    unit = np.stack(
-        [
-            regressor(arm.chain, q[some], still[some], still[some] + axis, arm.columns)[:, j].mean(
-                axis=0
-            )
-            for j, axis in enumerate(np.eye(n))
-        ]
-    )
     p = len(arm.columns)
     moments = torque.shape[1]
     return TorqueRows(
@@ -142,7 +134,7 @@ def torque_rows(
         heavy,
         smooth(own),
         dissipated,
-        unit,
+        own_rms,
         torque,
         smooth.start,
         smooth.clusters(q),
