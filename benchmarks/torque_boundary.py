@@ -24,6 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.estimation.checks.boundary import torque_boundary
+from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.robot import Joint, LinkParameters, RobotDescription, format_robot
@@ -488,12 +489,14 @@ class Identifiable:
         return np.asarray(self.free[0] + np.tensordot(gravity, self.free[1:], 1))
 
     def explained(self, true: Array, other: Array) -> bool:
-        """Whether other links under `other` explain the torque under `true` to within the noise."""
+        """Whether other links under `other` explain the torque under `true` so well that its noise
+        leaves odds below those that decide.
+        """
         target = self.columns(true) @ self.links
         columns = self.columns(other)
         scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
         left = target - columns @ (np.linalg.lstsq(columns / scale, target, 1e-9)[0] / scale)
-        return float(left @ left) < 4.0
+        return float(left @ left) < 2.0 * BoundaryConfig().decisive
 
     def direction(self, true: Array) -> bool:
         """Whether the direction is determined: rank of the torque's change with it, and no other

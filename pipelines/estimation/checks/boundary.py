@@ -23,6 +23,7 @@ from pipelines.estimation.checks.torque_rows import (
     CLUSTERS,
     Array,
     GenericArm,
+    Order,
     generic_arm,
     torque_rows,
 )
@@ -211,7 +212,7 @@ class _Fits:
 
     @property
     def rms(self) -> float:
-        return float(np.sqrt(np.mean(self.best.residual**2)))
+        return _rms(self.best)
 
 
 class _Estimate:
@@ -276,8 +277,11 @@ class _Estimate:
         """Return the order of the columns, and the fits under it."""
         config, n = self.config, fits.model.rows.n_joints
         same = JointOrder(tuple(range(1, n + 1)), "")
-        if n == 1 or fits.best.residual.max() < config.suspect:
+        mistaken = fits.best.score > fits.described.score + config.decisive
+        explained = fits.best.residual.max() < config.suspect
+        if n == 1 or (explained and not mistaken):
             return same, fits
+        every = True if fits.rms > config.lost else False if explained else None
         travel = np.ptp(np.concatenate([motion.q for motion in self.motions]), axis=0)
         tried = search_orders(
             self.arm,
@@ -285,26 +289,29 @@ class _Estimate:
             self.described,
             np.flatnonzero(travel > _HELD * travel.max()).tolist(),
             config.model_error,
-            (config.order_rows, config.orders, fits.rms > config.lost),
+            (config.order_rows, config.orders),
+            every,
+            -0.5 * float(np.sum(np.log(fits.best.variance))) - n,  # hopeless below
         )
-        gains = [self.gain(fits, order) for order in tried]
-        if not tried or max(gains) < config.decisive:
+        gains = np.array([self.gain(fits, order) for order in tried])
+        if not tried or gains.max() < -config.decisive:
             return same, fits
         top = int(np.argmax(gains))
-        alike = [
-            order
-            for order, gain in zip(tried, gains, strict=True)
-            if gain > gains[top] - config.decisive
-        ]
         chosen, other = tried[top], self.fits(tried[top])
-        if other.rms**2 > config.explained * fits.rms**2:
-            return same, fits
-        found = JointOrder(tuple(k + 1 for k in chosen.order), chosen.signal, fits.rms, other.rms)
-        if len(alike) > 1:
-            names = (f"{one.signal} {','.join(str(k + 1) for k in one.order)}" for one in alike)
-            reason = f"several orders fit alike: {'; '.join(names)}"
-            found = replace(found, columns=None, reason=reason)
-        return found, other
+        columns = tuple(k + 1 for k in chosen.order)
+        better = gains[top] > config.decisive
+        if better and _power(other.best) < config.explained * _power(fits.best):
+            found = JointOrder(columns, chosen.signal, fits.rms, other.rms)
+            alike = [tried[k] for k in np.flatnonzero(gains > gains[top] - config.decisive)]
+            if len(alike) > 1:
+                orders = "; ".join(f"{one.signal} {_listed(one.order)}" for one in alike)
+                found = replace(found, columns=None, reason=f"several orders fit alike: {orders}")
+            return found, other
+        if mistaken and _power(other.described) < config.explained * _power(fits.described):
+            reason = f"either gravity is not as described, or {chosen.signal} are in the order "
+            reason += f"{_listed(chosen.order)}: both explain the torque"
+            return JointOrder(None, chosen.signal, _rms(fits.described), other.rms, reason), fits
+        return same, fits
 
     def gain(self, logged: _Fits, order: ColumnOrder) -> float:
         """Return the log likelihood of `order` beyond that of the logged one, by each torque's
@@ -331,9 +338,8 @@ class _Estimate:
         share = float(best.gravity[0] @ along) / STANDARD_GRAVITY
         variance = max(float(along @ covariance @ along), 0.0)
         std = float(np.sqrt(variance)) / STANDARD_GRAVITY
-        # no smaller than by the fit of gravity of its whole size
-        drop = max(2.0 * (best.score - top.score), 1e-6)
-        std = max(std, abs(share - 1.0) / np.sqrt(drop))
+        if best.score < top.score + config.decisive:  # the whole size explains the torque as well
+            std = max(std, abs(share - 1.0))
         across = np.sqrt(max(float(np.trace(covariance)) - variance, 0.0)) / STANDARD_GRAVITY
         known = std < config.undetermined and across < config.wide
         present = _present(top, none, (share, std) if known else None, config)
@@ -502,6 +508,14 @@ def _power(fit: GravityFit) -> float:
     return float(np.sum(fit.residual**2))
 
 
+def _rms(fit: GravityFit) -> float:
+    return float(np.sqrt(np.mean(fit.residual**2)))
+
+
+def _listed(order: Order) -> str:
+    return ",".join(str(k + 1) for k in order)
+
+
 def _whole(n: int) -> Array:
     """Return (3, n, 3): changes of the gravity that all joints share."""
     return np.stack([np.tile(axis, (n, 1)) for axis in np.eye(3)])
@@ -543,9 +557,7 @@ def _each_joint(
 
 
 def _in_words(fits: _Fits, order: JointOrder) -> list[str]:
-    described, none = (
-        np.sqrt(_power(fit) / len(fit.residual)) for fit in (fits.described, fits.none)
-    )
+    described, none = _rms(fits.described), _rms(fits.none)
     said = [
         f"the model leaves {_percent(described)} of the torque with gravity as described, "
         f"{_percent(none)} without gravity, {_percent(fits.rms)} with the gravity vector that fits best"

@@ -57,20 +57,21 @@ def search_orders(
     gravity: Array,
     moving: Sequence[int],
     model_error: float,
-    size: tuple[int, int, bool],
+    size: tuple[int, int],
+    every: bool | None = None,
+    least: float = -np.inf,
 ) -> tuple[ColumnOrder, ...]:
     """Return the best orders that score better than the logged one, best first.
-
-    Exchanges of two columns come first; only where one of them fits better than the log, or
-    `every` is asked for, all others.
 
     Args:
         gravity: (3,) [m/s^2] under which orders are compared.
         moving: joints that move; the others keep their place.
-        size: moments that orders are compared with; how many orders are returned at most; whether
-            to try every order.
+        size: moments that orders are compared with; how many orders are returned at most.
+        every: whether to try every order, or exchanges of two columns only; None: every order
+            where an exchange fits better than the log.
+        least: log likelihood a moment, below which an order is not returned.
     """
-    moments, most, every = size
+    moments, most = size
     scorer = _Scorer(arm, thinned(motions, moments), gravity, model_error)
     same: Order = tuple(range(len(arm.chain.revolute)))
     logged = scorer("q and tau", same)
@@ -78,9 +79,9 @@ def search_orders(
     scores: dict[tuple[str, Order], float] = {}
     for signal in _SIGNALS:
         scores |= {(signal, order): scorer(signal, order) for order in swaps}
-    if not scores or (not every and max(scores.values()) <= logged):
-        return ()
-    for signal in _SIGNALS:
+    if every is None:
+        every = max(scores.values(), default=logged) > logged
+    for signal in _SIGNALS if every else ():
         if len(moving) <= _ALL_UP_TO[signal]:
             orders = {_placed(same, moving, moved) for moved in permutations(moving)} - {same}
             scores |= {(signal, order): scorer(signal, order) for order in orders}
@@ -96,7 +97,7 @@ def search_orders(
             own |= {order: scorer(signal, order) for order in near - own.keys()}
         scores |= {(signal, order): score for order, score in own.items() if order != same}
     ranked = sorted(scores.items(), key=lambda item: -item[1])[:most]
-    return tuple(ColumnOrder(*key) for key, score in ranked if score > logged)
+    return tuple(ColumnOrder(*key) for key, score in ranked if score > max(logged, least))
 
 
 class _Scorer:
