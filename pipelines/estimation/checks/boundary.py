@@ -93,7 +93,7 @@ class JointOrder:
     # signals whose columns are out of order: "q and tau", "q" or "tau"; empty where none is
     signal: str
     before: float | None = None  # residual over the torque with the columns as logged
-    after: float | None = None  # residual over the torque with the columns in order
+    after: float | None = None  # residual over the torque in the best other order that was tried
     reason: str = ""  # why a value is not identifiable; else empty
 
 
@@ -180,15 +180,15 @@ def torque_boundary(
     else:  # a load on one side: the same as its magnitude
         sign = None if any(counts) else "signed"
         evidence = "no torque changes its sign" + (", or comes near zero" if sign else "")
-    motions = [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
     arm = generic_arm(robot)
-    if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
-        return None
     try:
-        with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _Estimate(robot, arm, motions, config).boundary(names, sign, evidence)
+        motions = [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
+        if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
+            return None
+        return _Estimate(robot, arm, motions, config).boundary(names, sign, evidence)
     except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
-        return _unread(robot, sign, names, f"not identifiable: the fit failed: {error}", evidence)
+        reason = f"not identifiable: the fit failed: {error}"
+        return _unread(robot, sign, names, reason, evidence)
 
 
 def _informative(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
@@ -311,7 +311,7 @@ class _Estimate:
             reason = f"either gravity is not as described, or {chosen.signal} are in the order "
             reason += f"{_listed(chosen.order)}: both explain the torque"
             return JointOrder(None, chosen.signal, _rms(fits.described), other.rms, reason), fits
-        return same, fits
+        return replace(same, before=fits.rms, after=other.rms), fits
 
     def gain(self, logged: _Fits, order: ColumnOrder) -> float:
         """Return the log likelihood of `order` beyond that of the logged one, by each torque's

@@ -206,7 +206,7 @@ class GravityModel:
             slope, hessian = self.curvature(best, groups)
             diagonal = np.diag(np.diag(hessian) + 1e-12 * np.trace(hessian) + 1e-300)
             step = np.linalg.solve(hessian + damping * diagonal, slope)
-            tried = self.fit(stepped(best, step, groups), best.variance)
+            tried = self.fit(stepped(best, np.asarray(step), groups), best.variance)
             if tried.score > best.score:
                 gained, best, damping = tried.score - best.score, tried, 0.1 * damping
                 if gained < _ENOUGH:

@@ -19,6 +19,7 @@ from pipelines.log.order_statistics import median
 __all__ = ["touches_of_zero"]
 
 _NEAR, _FAR = 0.03, 0.3  # of the RMS: at zero, and away from it again
+_SHORT = 8  # samples: a shorter run tells neither noise nor motion
 _BELOW = 0.1  # of the samples at zero: a magnitude has none below it
 _STANDING = 0.05  # of its RMS: a joint that is slower may stand, held by its brake
 
@@ -41,6 +42,8 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
     size = np.sqrt(np.nanmean(np.concatenate([tau for tau, _ in parts]) ** 2)) if parts else 0.0
     count = 0
     for tau, q in parts:
+        if tau.size < _SHORT:
+            continue
         speed = np.abs(np.gradient(q))
         moving = speed > _STANDING * np.sqrt(np.nanmean(speed**2))
         # of white noise the second difference has six times the variance
