@@ -338,7 +338,7 @@ class _Estimate:
         share = float(best.gravity[0] @ along) / STANDARD_GRAVITY
         variance = max(float(along @ covariance @ along), 0.0)
         std = float(np.sqrt(variance)) / STANDARD_GRAVITY
-        if best.score < top.score + config.decisive:  # the whole size explains the torque as well
+        if best.score < top.score + config.alike:  # the whole size explains the torque as well
             std = max(std, abs(share - 1.0))
         across = np.sqrt(max(float(np.trace(covariance)) - variance, 0.0)) / STANDARD_GRAVITY
         known = std < config.undetermined and across < config.wide
@@ -392,7 +392,7 @@ class _Estimate:
         free vector and C its covariance; half the angle to the farthest is the deviation.
         """
         top, model = fits.turned[0], fits.model
-        if any(fit.score > top.score - self.config.decisive for fit in fits.turned[1:]):
+        if any(fit.score > top.score - self.config.alike for fit in fits.turned[1:]):
             return (
                 None,
                 "not identifiable: gravity in another direction explains the torque as well",
@@ -529,10 +529,10 @@ def _present(
     """
     if share is None:
         half = _power(top) < config.explained * _power(none)
-        return True if half and top.score > none.score + config.decisive else None
+        return True if half and top.score > none.score + config.alike else None
     low, high = share[0] - 2.0 * share[1], share[0] + 2.0 * share[1]
     if high < config.absent:  # balanced links have no gravity either
-        return False if none.score > top.score + config.decisive else None
+        return False if none.score > top.score + config.alike else None
     return True if low > config.absent else None
 
 

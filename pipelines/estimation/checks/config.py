@@ -18,6 +18,7 @@ class BoundaryConfig:
             are no evidence for one model against another.
         decisive: gain in log likelihood that decides between two models, after the residual's
             correlation is counted: odds of 20,000.
+        alike: difference in log likelihood, below which two answers are not told apart: odds of 150.
         explained: share of the residual power of the rejected model that the accepted one may
             leave.
         lost: of the torques' RMS: where all joints together leave more, every order is tried, and
@@ -43,6 +44,7 @@ class BoundaryConfig:
     orders: int = 12
     model_error: float = 0.003
     decisive: float = 10.0
+    alike: float = 5.0
     explained: float = 0.5
     lost: float = 0.2
     suspect: float = 0.01
