@@ -230,8 +230,9 @@ class _Estimate:
 
     def boundary(self, names: tuple[str, ...], sign: str | None, evidence: str) -> Boundary:
         order, fits = self.ordered(self.fits())
-        gravity, direction, removed, turned = self.gravity(fits)
-        friction = self.friction(fits)
+        covariance, coefficients, spread = gravity_spread(fits.model, fits.best, fits.model.whole)
+        gravity, direction, removed, turned = self.gravity(fits, covariance)
+        friction = self.friction(fits.model.rows.dissipated, coefficients, spread)
         little = friction.upper is not None and friction.upper < self.config.friction_absent
         sides = {True: None if little else "motor", False: "joint", None: None}
         if order.signal:
@@ -259,7 +260,7 @@ class _Estimate:
         here = [self.described] if np.any(self.described) else []
         starts = [*here, *(STANDARD_GRAVITY * _AXES)]
         first = max(map(model.fit, (np.zeros(3), *starts)), key=lambda fit: fit.score)
-        residuals = model.residuals(model.search(first.gravity, _whole(rows.n_joints)))
+        residuals = model.residuals(model.search(first.gravity, model.whole))
         model.effective = effective_moments(residuals, rows.start)
         turned: list[GravityFit] = []
         tried = [model.search_direction(start, STANDARD_GRAVITY) for start in starts]
@@ -268,8 +269,7 @@ class _Estimate:
             if all(angle > self.config.tilt for angle in apart):
                 turned.append(fit)
         none = model.fit(np.zeros(3))
-        groups = _whole(rows.n_joints)
-        free = [model.search(fit.gravity, groups) for fit in (none, *turned[:2])]
+        free = [model.search(fit.gravity, model.whole) for fit in (none, *turned[:2])]
         best = max([*free, none, *turned], key=lambda fit: fit.score)
         return _Fits(model, model.fit(self.described), none, best, tuple(turned))
 
@@ -302,7 +302,7 @@ class _Estimate:
         better = gains[top] > config.decisive
         if better and _power(other.best) < config.explained * _power(fits.best):
             found = JointOrder(columns, chosen.signal, fits.rms, other.rms)
-            alike = [tried[k] for k in np.flatnonzero(gains > gains[top] - config.decisive)]
+            alike = [tried[k] for k in np.flatnonzero(gains > gains[top] - config.alike)]
             if len(alike) > 1:
                 orders = "; ".join(f"{one.signal} {_listed(one.order)}" for one in alike)
                 found = replace(found, columns=None, reason=f"several orders fit alike: {orders}")
@@ -319,27 +319,27 @@ class _Estimate:
         """
         rows = torque_rows(self.arm, self.motions, order.q, order.tau)
         model = GravityModel(rows, self.config.model_error)
-        other = model.search(np.tile(self.described, (rows.n_joints, 1)), _whole(rows.n_joints))
+        other = model.search(np.tile(self.described, (rows.n_joints, 1)), model.whole)
         taken = list(order.tau or range(rows.n_joints))
         effective = effective_moments(model.residuals(other), rows.start)
         moments = np.minimum(logged.model.effective[taken], effective)
         return 0.5 * float(moments @ np.log(logged.best.variance[taken] / other.variance))
 
-    def gravity(self, fits: _Fits) -> tuple[Share, Direction, bool, bool]:
+    def gravity(self, fits: _Fits, covariance: Array) -> tuple[Share, Direction, bool, bool]:
         """Return share and direction of the gravity, whether it is absent, and whether it is
         turned from the described one.
         """
         config, described = self.config, self.described
         model, best, none, top = fits.model, fits.best, fits.none, fits.turned[0]
-        covariance = gravity_spread(model, best, _whole(len(best.gravity)))[0]
         absent = none.score > top.score and bool(np.any(described))
         along = described if absent else top.gravity[0]
         along = along / np.linalg.norm(along)
         share = float(best.gravity[0] @ along) / STANDARD_GRAVITY
         variance = max(float(along @ covariance @ along), 0.0)
         std = float(np.sqrt(variance)) / STANDARD_GRAVITY
-        if best.score < top.score + config.alike:  # the whole size explains the torque as well
-            std = max(std, abs(share - 1.0))
+        drop = 2.0 * max(best.score - top.score, 1e-3)
+        if abs(share - 1.0) > 3.0 * std and drop < 2.0 * config.alike:
+            std = abs(share - 1.0) / float(np.sqrt(drop))  # the whole size explains the torque too
         across = np.sqrt(max(float(np.trace(covariance)) - variance, 0.0)) / STANDARD_GRAVITY
         known = std < config.undetermined and across < config.wide
         present = _present(top, none, (share, std) if known else None, config)
@@ -398,7 +398,7 @@ class _Estimate:
                 "not identifiable: gravity in another direction explains the torque as well",
             )
         along = top.gravity[0] / STANDARD_GRAVITY
-        covariance = gravity_spread(model, top, _whole(len(top.gravity)))[0]
+        covariance = gravity_spread(model, top, model.whole)[0]
         values, vectors = np.linalg.eigh(covariance)
         inverse = vectors / np.maximum(values, 1e-12 * LOOSE**2) @ vectors.T
         across = np.linalg.svd(along[None])[2][1:]
@@ -413,15 +413,13 @@ class _Estimate:
             return None, f"not identifiable to better than {np.degrees(2 * spread):.0f} degrees"
         return None, "not identifiable: turned gravity explains the torque as well"
 
-    def friction(self, fits: _Fits) -> Share:
+    def friction(self, dissipated: Array, coefficients: Array, covariance: Array) -> Share:
         """Return the share of friction: of each joint the power that it takes, over the RMS of
         torque and speed.
 
         s_j = <τ_f v> / (rms τ · rms v)        linear, signed, for any friction law
         """
-        config, model = self.config, fits.model
-        dissipated = model.rows.dissipated
-        _, coefficients, covariance = gravity_spread(model, fits.best, _whole(len(dissipated)))
+        config = self.config
         n, c = coefficients.shape
         weights = np.zeros((n, n * c))
         for j in range(n):
@@ -514,11 +512,6 @@ def _rms(fit: GravityFit) -> float:
 
 def _listed(order: Order) -> str:
     return ",".join(str(k + 1) for k in order)
-
-
-def _whole(n: int) -> Array:
-    """Return (3, n, 3): changes of the gravity that all joints share."""
-    return np.stack([np.tile(axis, (n, 1)) for axis in np.eye(3)])
 
 
 def _present(

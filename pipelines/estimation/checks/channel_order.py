@@ -28,7 +28,7 @@ __all__ = ["ColumnOrder", "search_orders"]
 
 _SIGNALS = ("q and tau", "tau", "q")
 _ALL_UP_TO = {"q and tau": 5, "q": 4, "tau": 4}  # joints; of more, orders are reached by exchanges
-_BEAM = 12  # orders that are kept at each exchange
+_BEAM = 8  # orders that are kept at each exchange
 _RIDGE = 1e-9  # of equilibrated columns
 _ROUNDS = 4  # of reweighting, from what each joint by itself leaves
 

@@ -52,6 +52,9 @@ class GravityModel:
         self.rows = rows
         self.model_error = model_error
         n, moments, p = rows.inertial.shape
+        self.whole = np.repeat(
+            np.eye(3)[:, None], n, axis=1
+        )  # (3, n, 3): one gravity of all joints
         self.effective = np.full(n, float(moments)) if effective is None else effective
         self.size = np.maximum(np.std(rows.tau, axis=1), 1e-12)
         basis, _ = np.linalg.qr(

@@ -20,7 +20,6 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import upfirdn
 
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.base import base_set
@@ -194,21 +193,24 @@ class RowFilter:
         period = 2.0 * np.pi / max(float(np.max(rates)), 1e-12)
         wanted = min(_PERIODS * period / self.spacing, 0.1 * max(b - a for a, b in self.edges))
         self.step = max(1, int(wanted / _OVERLAP))
-        self.length = max(1, int(min(wanted, self.step * _OVERLAP))) // self.step * self.step + 1
-        self.edges = [edge for edge in self.edges if edge[1] - edge[0] >= self.length]
-        window = np.sin(np.pi * (np.arange(self.length) + 1.0) / (self.length + 1.0)) ** 2
-        self.window = window / window.sum()
-        self.count = [(b - a - self.length) // self.step + 1 for a, b in self.edges]
+        self.steps = max(1, min(int(wanted), _OVERLAP))  # within the length of the window
+        length = self.step * self.steps
+        self.edges = [edge for edge in self.edges if edge[1] - edge[0] >= length]
+        window = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
+        self.window = (window / window.sum()).reshape(self.steps, self.step)
+        self.count = [(b - a - length) // self.step + 1 for a, b in self.edges]
         self.start = np.cumsum([0, *self.count])[:-1]
 
     def __call__(self, columns: Array) -> Array:
         """Return `columns` (n, N_all, k) filtered and thinned: (n, N, k)."""
-        first = (self.length - 1) // self.step
-        parts = [
-            upfirdn(self.window, columns[:, a:b], 1, self.step, axis=1)[:, first : first + count]
-            for (a, b), count in zip(self.edges, self.count, strict=True)
-        ]
-        return np.concatenate(parts, axis=1)
+        outputs = []
+        for (a, _), count in zip(self.edges, self.count, strict=True):
+            blocks = count + self.steps - 1
+            part = columns[:, a : a + blocks * self.step]
+            shape = (len(columns), blocks, self.step, columns.shape[2])
+            sums = self.window @ part.reshape(shape)
+            outputs.append(sum(sums[:, k : k + count, k] for k in range(self.steps)))
+        return np.concatenate(outputs, axis=1)
 
     def clusters(self, q: Array) -> npt.NDArray[np.intp]:
         """Return the cluster (N,) of each moment: of equal stretches of time, or of the phase.
