@@ -16,6 +16,7 @@ import json
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -33,6 +34,7 @@ from pipelines.model.row_fit import sample_motion
 __all__ = ["KINDS", "Machine", "case", "draw", "main"]
 
 Array = npt.NDArray[np.float64]
+ODDS = 2.0 * BoundaryConfig().decisive  # power over noise, below which the odds do not decide
 DOWN = np.array([0.0, 0.0, -9.81])
 KINDS = ("whole", "no gravity", "no friction", "magnitude", "wall", "ceiling", "y-up", "permuted")
 FAULTS = (
@@ -492,11 +494,14 @@ class Identifiable:
         """Whether other links under `other` explain the torque under `true` so well that its noise
         leaves odds below those that decide.
         """
-        target = self.columns(true) @ self.links
-        columns = self.columns(other)
+        return self.leaves(other, self.columns(true) @ self.links) < ODDS
+
+    def leaves(self, gravity: Array, target: Array) -> float:
+        """Power of the torque `target` over the noise that no links under `gravity` explain."""
+        columns = self.columns(gravity)
         scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
         left = target - columns @ (np.linalg.lstsq(columns / scale, target, 1e-9)[0] / scale)
-        return float(left @ left) < 2.0 * BoundaryConfig().decisive
+        return float(left @ left)
 
     def direction(self, true: Array) -> bool:
         """Whether the direction is determined: rank of the torque's change with it, and no other
@@ -525,6 +530,27 @@ class Identifiable:
         return not any(
             self.explained(true, 9.81 * v) for v in others if v @ along < np.cos(0.99 * ring)
         )
+
+
+def _exchangeable(machine: Machine, gravity: Array) -> bool:
+    """Return whether the torque is explained as well if two joints are taken for each other."""
+    could = Identifiable.of(machine)
+    n = len(machine.noise)
+    torque = (could.columns(gravity) @ could.links).reshape(n, -1)
+    for a, b in combinations(range(n), 2):
+        order = np.arange(n)
+        order[[a, b]] = b, a
+        changed = replace(
+            machine,
+            q=machine.q[:, order],
+            dq=machine.dq[:, order],
+            ddq=machine.ddq[:, order],
+            noise=machine.noise[order],
+            friction={name: value[order] for name, value in machine.friction.items()},
+        )
+        if Identifiable.of(changed).leaves(gravity, torque[order].ravel()) < ODDS:
+            return True
+    return False
 
 
 def _dissipated(machine: Machine, log: ExperimentLog, rigid: Array, friction: Array) -> list[float]:
@@ -604,7 +630,8 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
         _told(near, True, blind) if truth["gravity"] else "right" if vector is None else "wrong"
     )
     columns = None if found.order.columns is None else [k - 1 for k in found.order.columns]
-    out["order"] = _told(columns, truth["order"], False)
+    free = columns is None and _exchangeable(draw(seed), pointing if truth["gravity"] else 0 * DOWN)
+    out["order"], out["exchangeable"] = _told(columns, truth["order"], free), free
     out["blind"], out["mute"] = blind, mute
     out["gate"] = claims.get(CLAIM.get(kind, ""), True) or (
         (mute and kind == "no gravity") or (blind and kind != "permuted")

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.estimation.checks.channel_order import ColumnOrder, search_orders
+from pipelines.estimation.checks.channel_order import SIGNALS, ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
 from pipelines.estimation.checks.spread import effective_moments, gravity_spread, jackknife
@@ -279,9 +279,8 @@ class _Estimate:
         same = JointOrder(tuple(range(1, n + 1)), "")
         mistaken = fits.best.score > fits.described.score + config.decisive
         explained = fits.best.residual.max() < config.suspect
-        if n == 1 or (explained and not mistaken):
+        if n == 1:
             return same, fits
-        every = True if fits.rms > config.lost else False if explained else None
         travel = np.ptp(np.concatenate([motion.q for motion in self.motions]), axis=0)
         tried = search_orders(
             self.arm,
@@ -290,40 +289,47 @@ class _Estimate:
             np.flatnonzero(travel > _HELD * travel.max()).tolist(),
             config.model_error,
             (config.order_rows, config.orders),
-            every,
+            True if fits.rms > config.lost else False if explained else None,
             -0.5 * float(np.sum(np.log(fits.best.variance))) - n,  # hopeless below
+            SIGNALS[:1] if explained else SIGNALS,
         )
-        gains = np.array([self.gain(fits, order) for order in tried])
-        if not tried or gains.max() < -config.decisive:
+        if not tried:
             return same, fits
-        top = int(np.argmax(gains))
+        # all orders by one number of independent moments, that of the order that leaves the least
+        variances, moments = map(np.stack, zip(*map(self.by_column, tried), strict=True))
+        gains = np.log(fits.best.variance / variances)
+        likelihoods = 0.5 * gains @ moments[np.argmin(np.log(variances).sum(axis=1))]
+        top = int(np.argmax(likelihoods))
+        gain = 0.5 * float(gains[top] @ np.minimum(fits.model.effective, moments[top]))
+        if gain < -(config.decisive if mistaken else config.alike):
+            return same, fits
         chosen, other = tried[top], self.fits(tried[top])
-        columns = tuple(k + 1 for k in chosen.order)
-        better = gains[top] > config.decisive
-        if better and _power(other.best) < config.explained * _power(fits.best):
-            found = JointOrder(columns, chosen.signal, fits.rms, other.rms)
-            alike = [tried[k] for k in np.flatnonzero(gains > gains[top] - config.alike)]
-            if len(alike) > 1:
-                orders = "; ".join(f"{one.signal} {_listed(one.order)}" for one in alike)
-                found = replace(found, columns=None, reason=f"several orders fit alike: {orders}")
-            return found, other
-        if mistaken and _power(other.described) < config.explained * _power(fits.described):
-            reason = f"either gravity is not as described, or {chosen.signal} are in the order "
-            reason += f"{_listed(chosen.order)}: both explain the torque"
+        if gain > config.decisive and _power(other.best) < config.explained * _power(fits.best):
+            columns = tuple(k + 1 for k in chosen.order)
+            order = JointOrder(columns, chosen.signal, fits.rms, other.rms)
+            near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
+            if len(near) > 1:
+                orders = "; ".join(f"{tried[k].signal} {_listed(tried[k].order)}" for k in near)
+                order = replace(order, columns=None, reason=f"several orders fit alike: {orders}")
+            return order, other
+        swapped = f"{chosen.signal} are in the order {_listed(chosen.order)}"
+        if not mistaken:
+            reason = f"not identifiable: the torque is explained as well if {swapped}"
+            return JointOrder(None, "", fits.rms, other.rms, reason), fits
+        if _power(other.described) < config.explained * _power(fits.described):
+            reason = f"either gravity is not as described, or {swapped}: both explain the torque"
             return JointOrder(None, chosen.signal, _rms(fits.described), other.rms, reason), fits
         return replace(same, before=fits.rms, after=other.rms), fits
 
-    def gain(self, logged: _Fits, order: ColumnOrder) -> float:
-        """Return the log likelihood of `order` beyond that of the logged one, by each torque's
-        number of independent moments.
+    def by_column(self, order: ColumnOrder) -> tuple[Array, Array]:
+        """Return the relative residual variance and the number of independent moments (n,) of each
+        column of the torque in another order.
         """
         rows = torque_rows(self.arm, self.motions, order.q, order.tau)
         model = GravityModel(rows, self.config.model_error)
-        other = model.search(np.tile(self.described, (rows.n_joints, 1)), model.whole)
-        taken = list(order.tau or range(rows.n_joints))
-        effective = effective_moments(model.residuals(other), rows.start)
-        moments = np.minimum(logged.model.effective[taken], effective)
-        return 0.5 * float(moments @ np.log(logged.best.variance[taken] / other.variance))
+        fit = model.search(np.tile(self.described, (rows.n_joints, 1)), model.whole)
+        joint = np.argsort(order.tau or range(rows.n_joints))
+        return fit.variance[joint], effective_moments(model.residuals(fit), rows.start)[joint]
 
     def gravity(self, fits: _Fits, covariance: Array) -> tuple[Share, Direction, bool, bool]:
         """Return share and direction of the gravity, whether it is absent, and whether it is

@@ -24,9 +24,9 @@ from pipelines.estimation.checks.torque_rows import (
 from pipelines.model.rigid.chain import regressor
 from pipelines.model.row_fit import Sampled
 
-__all__ = ["ColumnOrder", "search_orders"]
+__all__ = ["SIGNALS", "ColumnOrder", "search_orders"]
 
-_SIGNALS = ("q and tau", "tau", "q")
+SIGNALS = ("q and tau", "tau", "q")
 _ALL_UP_TO = {"q and tau": 5, "q": 4, "tau": 4}  # joints; of more, orders are reached by exchanges
 _BEAM = 8  # orders that are kept at each exchange
 _RIDGE = 1e-9  # of equilibrated columns
@@ -60,16 +60,18 @@ def search_orders(
     size: tuple[int, int],
     every: bool | None = None,
     least: float = -np.inf,
+    signals: Sequence[str] = SIGNALS,
 ) -> tuple[ColumnOrder, ...]:
-    """Return the best orders that score better than the logged one, best first.
+    """Return the best orders other than the logged one, best first.
 
     Args:
         gravity: (3,) [m/s^2] under which orders are compared.
         moving: joints that move; the others keep their place.
         size: moments that orders are compared with; how many orders are returned at most.
         every: whether to try every order, or exchanges of two columns only; None: every order
-            where an exchange fits better than the log.
+            where an exchange fits better than the log, or of few joints.
         least: log likelihood a moment, below which an order is not returned.
+        signals: whose columns are exchanged.
     """
     moments, most = size
     scorer = _Scorer(arm, thinned(motions, moments), gravity, model_error)
@@ -77,11 +79,12 @@ def search_orders(
     logged = scorer("q and tau", same)
     swaps = [_exchanged(same, a, b) for a, b in combinations(moving, 2)]
     scores: dict[tuple[str, Order], float] = {}
-    for signal in _SIGNALS:
+    for signal in signals:
         scores |= {(signal, order): scorer(signal, order) for order in swaps}
     if every is None:
-        every = max(scores.values(), default=logged) > logged
-    for signal in _SIGNALS if every else ():
+        few = len(moving) <= min(_ALL_UP_TO.values())
+        every = few or max(scores.values(), default=logged) > logged
+    for signal in signals if every else ():
         if len(moving) <= _ALL_UP_TO[signal]:
             orders = {_placed(same, moving, moved) for moved in permutations(moving)} - {same}
             scores |= {(signal, order): scorer(signal, order) for order in orders}
@@ -97,7 +100,7 @@ def search_orders(
             own |= {order: scorer(signal, order) for order in near - own.keys()}
         scores |= {(signal, order): score for order, score in own.items() if order != same}
     ranked = sorted(scores.items(), key=lambda item: -item[1])[:most]
-    return tuple(ColumnOrder(*key) for key, score in ranked if score > max(logged, least))
+    return tuple(ColumnOrder(*key) for key, score in ranked if score > least)
 
 
 class _Scorer:
