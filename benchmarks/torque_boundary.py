@@ -629,7 +629,8 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     out["direction"] = (
         _told(near, True, blind) if truth["gravity"] else "right" if vector is None else "wrong"
     )
-    columns = None if found.order.columns is None else [k - 1 for k in found.order.columns]
+    told = None if found.order.reason else found.order.columns
+    columns = None if told is None else [k - 1 for k in told]
     free = columns is None and _exchangeable(draw(seed), pointing if truth["gravity"] else 0 * DOWN)
     out["order"], out["exchangeable"] = _told(columns, truth["order"], free), free
     out["blind"], out["mute"] = blind, mute

@@ -315,7 +315,7 @@ class _Estimate:
         swapped = f"{chosen.signal} are in the order {_listed(chosen.order)}"
         if not mistaken:
             reason = f"not identifiable: the torque is explained as well if {swapped}"
-            return JointOrder(None, "", fits.rms, other.rms, reason), fits
+            return replace(same, before=fits.rms, after=other.rms, reason=reason), fits
         if _power(other.described) < config.explained * _power(fits.described):
             reason = f"either gravity is not as described, or {swapped}: both explain the torque"
             return JointOrder(None, chosen.signal, _rms(fits.described), other.rms, reason), fits
@@ -450,6 +450,8 @@ class _Estimate:
             present, reason = True, ""
             if upper < config.friction_absent:
                 reason = "so little that it may be a direct drive, or what compensation leaves"
+        elif 3.0 * own < share < config.friction_absent:
+            reason = "so little that it may be what compensation leaves"
         elif (
             read.any()
             and upper < config.friction_absent
