@@ -45,7 +45,7 @@ def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
     if boundary.evidence:
         text.append(f"Evidence: {'; '.join(boundary.evidence)}.")
     text.append(f"Not identifiable from any such log: {hidden}.")
-    return (Section(CARD, tuple(text), (table,)),)
+    return (Section(CARD, tuple(text), (table,), leads=True),)
 
 
 def _cells(row: Row) -> tuple[Cell, ...]:
@@ -65,9 +65,11 @@ def _verdict(boundary: Boundary) -> str:
     parts = {
         "its sign": boundary.sign,
         "gravity": boundary.gravity.present,
-        "gravity's direction": boundary.direction.vector or boundary.gravity.present is False,
+        "gravity's direction": ()
+        if boundary.gravity.present is False
+        else boundary.direction.vector,
         "friction": boundary.friction.present,
-        "the order of the joints": boundary.order.columns,
+        "the order of the joints": None if boundary.order.reason else boundary.order.columns,
     }
     unknown = [name for name, value in parts.items() if value is None]
     if not unknown:
@@ -122,7 +124,7 @@ def _direction(boundary: Boundary) -> Row:
     tone: Tone = "bad" if boundary.turned else "neutral"
     if direction.vector is None or direction.std is None or direction.angle is None:
         return "gravity vector [m/s²]", _UNKNOWN, _sentence(direction.reason), tone
-    vector = ", ".join(f"{x + 0.0:.2f}" for x in direction.vector)
+    vector = ", ".join(f"{round(x, 2) + 0.0:.2f}" for x in direction.vector)
     angle, std = math.degrees(direction.angle), math.degrees(direction.std)
     meaning = f"{angle:.1f}° from the description."
     return "gravity vector [m/s²]", f"[{vector}] ± {std:.1f}°", meaning, tone
@@ -148,18 +150,22 @@ def _order(boundary: Boundary) -> Row:
         return "order of the joints", _UNKNOWN, _sentence(order.reason), tone
     columns = ", ".join(map(str, order.columns))
     if not order.signal:
-        meaning = "The columns are in the order of the joints."
+        meaning = _sentence(order.reason) or "The columns are in the order of the joints."
         if order.before is not None and order.after is not None:
             meaning += (
-                f" The model leaves {order.before:.2g} of the torque, and in the best other order "
-                f"{order.after:.2g}."
+                f" The model leaves {_percent(order.before)} of the torque as logged, and "
+                f"{_percent(order.after)} in the best other order."
             )
-        return "order of the joints", columns, meaning, tone
+        return "order of the joints", f"{columns}, as logged", meaning, tone
     meaning = (
-        f"Joint 1, 2, … has these columns of {order.signal}: the model leaves {order.after:.2g} of "
-        f"the torque so, and {order.before:.2g} as logged."
+        f"These columns of {order.signal} belong to joint 1, 2, …: the model leaves "
+        f"{_percent(order.after)} of the torque so, and {_percent(order.before)} as logged."
     )
     return "order of the joints", columns, meaning, tone
+
+
+def _percent(share: float | None) -> str:
+    return "an unknown share" if share is None else f"{100.0 * share:.2g} %"
 
 
 def _unit(boundary: Boundary) -> Row:

@@ -560,7 +560,7 @@ def _each_joint(
 def _in_words(fits: _Fits, order: JointOrder) -> list[str]:
     described, none = _rms(fits.described), _rms(fits.none)
     said = [
-        f"the model leaves {_percent(described)} of the torque with gravity as described, "
+        f"the model leaves {_percent(described)} of a joint's torque with gravity as described, "
         f"{_percent(none)} without gravity, {_percent(fits.rms)} with the gravity vector that fits best"
     ]
     if order.signal and order.before is not None and order.after is not None:
