@@ -448,7 +448,7 @@ def _log(machine: Machine, q: Array, tau: Array) -> ExperimentLog:
 
 @dataclass(frozen=True, eq=False)
 class Identifiable:
-    """What the best estimator could tell of gravity, by Pinocchio's regressor and the true noise.
+    """Bound on what any estimator finds of gravity, by Pinocchio's regressor and the true noise.
 
     It sees white noise of known power; the links are free, and friction is a smooth function of
     speed. What that leaves open, no log of this motion tells.
@@ -491,7 +491,7 @@ class Identifiable:
         return np.asarray(self.free[0] + np.tensordot(gravity, self.free[1:], 1))
 
     def explained(self, true: Array, other: Array) -> bool:
-        """Whether other links under `other` explain the torque under `true` so well that its noise
+        """Return whether other links under `other` explain the torque under `true` so well that its noise
         leaves odds below those that decide.
         """
         return self.leaves(other, self.columns(true) @ self.links) < ODDS
@@ -504,7 +504,7 @@ class Identifiable:
         return float(left @ left)
 
     def direction(self, true: Array) -> bool:
-        """Whether the direction is determined: rank of the torque's change with it, and no other
+        """Return whether the direction is determined: rank of the torque's change with it, and no other
         direction of gravity explains the torque.
         """
         along = true / np.linalg.norm(true)

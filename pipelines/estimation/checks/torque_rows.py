@@ -215,7 +215,7 @@ class RowFilter:
     def clusters(self, q: Array) -> npt.NDArray[np.intp]:
         """Return the cluster (N,) of each moment: of equal stretches of time, or of the phase.
 
-        A model errs alike wherever the same motion is repeated, so that a period tells once.
+        A model errs alike each time that a motion is repeated: a period counts once.
         """
         slow = self(q.T[:, :, None])[:, :, 0]
         total = slow.shape[1]
