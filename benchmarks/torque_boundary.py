@@ -3,9 +3,9 @@ wrong about a whole torque.
 
     python -m benchmarks.torque_boundary --count 200 --first 5000 --out boundary.jsonl
 
-Machines have 3 to 7 joints of several families, links, drives, friction laws and motions at
+Machines have 2 to 7 joints of several families, links, drives, friction laws and motions at
 random; their torques are Pinocchio's. Each is logged whole, without gravity, without friction, as
-magnitudes, on a wall, under a ceiling, with y up, and with permuted joints; beside them healthy
+magnitudes, on a wall, under a ceiling, with y up, and with permuted joints; and healthy
 and faulty machines on which nothing may be claimed. A file of results is continued.
 """
 
@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.estimation.checks.boundary import torque_boundary
+from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.experiment import ExperimentLog, Signal
@@ -599,45 +599,45 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     ]
     if kind == "magnitude":
         return out
-    out["gravity"] = _told(found.gravity.present, truth["gravity"], mute)
-    out["share"], out["std"] = found.gravity.share, found.gravity.std
-    out["joint_share"] = list(zip(found.gravity.joint_share, found.gravity.joint_std, strict=True))
-    out["friction_share"] = [
-        (share, std, true)
-        for share, std, true in zip(
-            found.friction.joint_share, found.friction.joint_std, truth["dissipated"], strict=False
-        )
-    ]
-    out["why"] = [
-        found.gravity.reason,
-        found.friction.reason,
-        found.direction.reason,
-        found.order.reason,
-    ]
+    out |= _shares(found, truth) | {"blind": blind, "mute": mute}
     out["vectors"] = [found.direction.best, truth["direction"]]
     out["orders"] = [found.order.columns, truth["order"]]
+    out["gravity"] = _told(found.gravity.present, truth["gravity"], mute)
     out["friction"] = _told(found.friction.present, truth["friction"], False)
-    vector = found.direction.vector
-    near = (
-        None
-        if vector is None
-        else bool(
-            np.array(vector) @ truth["direction"]
-            > np.cos(np.radians(5)) * np.linalg.norm(vector) * np.linalg.norm(truth["direction"])
-        )
-    )
-    out["direction"] = (
-        _told(near, True, blind) if truth["gravity"] else "right" if vector is None else "wrong"
-    )
+    out["direction"] = _direction(found, truth, blind)
     told = None if found.order.reason else found.order.columns
     columns = None if told is None else [k - 1 for k in told]
     free = columns is None and _exchangeable(draw(seed), pointing if truth["gravity"] else 0 * DOWN)
     out["order"], out["exchangeable"] = _told(columns, truth["order"], free), free
-    out["blind"], out["mute"] = blind, mute
     out["gate"] = claims.get(CLAIM.get(kind, ""), True) or (
         (mute and kind == "no gravity") or (blind and kind != "permuted")
     )
     return out
+
+
+def _shares(found: Boundary, truth: dict[str, Any]) -> dict[str, Any]:
+    """Shares, their standard deviations and what is true, and why a field is null."""
+    gravity, friction = found.gravity, found.friction
+    return {
+        "share": gravity.share,
+        "std": gravity.std,
+        "joint_share": list(zip(gravity.joint_share, gravity.joint_std, strict=True)),
+        "friction_share": list(
+            zip(friction.joint_share, friction.joint_std, truth["dissipated"], strict=False)
+        ),
+        "why": [gravity.reason, friction.reason, found.direction.reason, found.order.reason],
+    }
+
+
+def _direction(found: Boundary, truth: dict[str, Any], blind: bool) -> str:
+    vector = found.direction.vector
+    if not truth["gravity"]:
+        return "right" if vector is None else "wrong"
+    if vector is None:
+        return _told(None, True, blind)
+    size = np.linalg.norm(vector) * np.linalg.norm(truth["direction"])
+    near = np.array(vector) @ truth["direction"] > np.cos(np.radians(5)) * size
+    return "right" if near else "wrong"
 
 
 def _field(told: object, true: object) -> str:
@@ -683,15 +683,18 @@ def table(results: Iterable[dict[str, Any]]) -> str:
         _rate(f"false claim on whole torque, {fault}", sum(bad), len(bad))
         for fault, bad in sorted(by_fault.items())
     ]
-    healthy = [
-        r
-        for r in rows
-        if r.get("share") is not None
-        and r["kind"] in ("whole", "no friction")
-        and r["fault"] == "healthy"
-    ]
-    inside = [abs(r["share"] - 1.0) < 2 * r["std"] for r in healthy]
-    lines.append(_rate("share within two standard deviations", sum(inside), len(inside)))
+    permuted = [r["order"] for r in rows if r["kind"] == "permuted" and "order" in r]
+    lines.append(_rate("order right of permuted logs", permuted.count("right"), len(permuted)))
+    healthy = [r for r in rows if "share" in r and r["fault"] == "healthy"]
+    with_gravity = [r for r in healthy if r["kind"] != "no gravity"]
+    shares = {
+        "gravity": [(r["share"], r["std"], r["kind"] != "no gravity") for r in healthy],
+        "each joint's gravity": [(*one, 1.0) for r in with_gravity for one in r["joint_share"]],
+        "each joint's friction": [one for r in healthy for one in r["friction_share"]],
+    }
+    for name, values in shares.items():
+        inside = [abs(x - true) < 2 * std for x, std, true in values if x is not None]
+        lines.append(_rate(f"{name} within two deviations", sum(inside), len(inside)))
     cpu = [r["cpu"] for r in rows]
     lines.append(f"CPU a log: median {np.median(cpu):.2f} s, largest {max(cpu):.2f} s")
     return "\n".join(lines)
