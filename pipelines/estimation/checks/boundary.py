@@ -180,8 +180,8 @@ def torque_boundary(
     else:  # a load on one side: the same as its magnitude
         sign = None if any(counts) else "signed"
         evidence = "no torque changes its sign" + (", or comes near zero" if sign else "")
-    arm = generic_arm(robot)
     try:
+        arm = generic_arm(robot)
         motions = [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
         if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
             return None
