@@ -3,9 +3,9 @@ wrong about a whole torque.
 
     python -m benchmarks.torque_boundary --count 200 --first 5000 --out boundary.jsonl
 
-Machines have 3 to 7 joints of several families, links, drives, friction laws and motions at
+Machines have 2 to 7 joints of several families, links, drives, friction laws and motions at
 random; their torques are Pinocchio's. Each is logged whole, without gravity, without friction, as
-magnitudes, on a wall, under a ceiling, with y up, and with permuted joints; beside them healthy
+magnitudes, on a wall, under a ceiling, with y up, and with permuted joints; and healthy
 and faulty machines on which nothing may be claimed. A file of results is continued.
 """
 
@@ -16,6 +16,7 @@ import json
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -23,13 +24,17 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.estimation.checks.boundary import torque_boundary
+from pipelines.estimation.checks.boundary import Boundary, torque_boundary
+from pipelines.estimation.checks.config import BoundaryConfig
+from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.robot import Joint, LinkParameters, RobotDescription, format_robot
+from pipelines.model.row_fit import sample_motion
 
 __all__ = ["KINDS", "Machine", "case", "draw", "main"]
 
 Array = npt.NDArray[np.float64]
+ODDS = 2.0 * BoundaryConfig().decisive  # power over noise, below which the odds do not decide
 DOWN = np.array([0.0, 0.0, -9.81])
 KINDS = ("whole", "no gravity", "no friction", "magnitude", "wall", "ceiling", "y-up", "permuted")
 FAULTS = (
@@ -128,7 +133,7 @@ def _dh(
             (0, h, 0, "revolute"),
             (0, 0, 0.12 * s, "revolute"),
         ], [0, 0.6, 0, -1.2, 0, 0.8, 0]
-    n = int(rng.integers(3, 8))
+    n = int(rng.integers(2, 8))
     rows = []
     for k in range(n):
         kind = "prismatic" if rng.random() < 0.12 and k else "revolute"
@@ -341,8 +346,8 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
         gravity = 9.81 * np.array([np.sin(0.087), 0, -np.cos(0.087)])
     load = _inverse_dynamics(arm, q, machine.dq, machine.ddq, gravity)
     tau = load + machine.rotor * machine.ddq * (kind != "no friction" or rng.random() < 0.5)
-    if kind != "no friction":
-        tau = tau + _friction(machine, load)
+    friction = _friction(machine, load) * (kind != "no friction")
+    rigid, tau = tau, tau + friction
     tau, q = _faulty(tau, q, machine, fault, rng)
     tau = tau + machine.noise * rng.normal(size=tau.shape)
     q = machine.step * np.round((q + 0.5 * machine.step * rng.normal(size=q.shape)) / machine.step)
@@ -353,16 +358,18 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
     if kind == "permuted":
         while (order == np.arange(n)).all():
             order = rng.permutation(n) if rng.random() < 0.5 else _swapped(n, rng)
+    log = _log(machine, q[:, order], tau[:, order])
     truth = {
         "gravity": kind != "no gravity",
         "friction": kind != "no friction",
         "sign": kind != "magnitude",
         "direction": turned.tolist(),
         "order": np.argsort(order).tolist(),
+        "dissipated": _dissipated(machine, log, rigid, friction),
         "family": machine.family,
         "n": n,
     }
-    return _log(machine, q[:, order], tau[:, order]), truth
+    return log, truth
 
 
 def _swapped(n: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
@@ -439,17 +446,122 @@ def _log(machine: Machine, q: Array, tau: Array) -> ExperimentLog:
     )
 
 
-def _vertical(machine: Machine, gravity: Array) -> bool:
-    """Whether this gravity puts nothing but constants on all joints: no log of this motion can tell
-    it.
+@dataclass(frozen=True, eq=False)
+class Identifiable:
+    """Bound on what any estimator finds of gravity, by Pinocchio's regressor and the true noise.
+
+    It sees white noise of known power; the links are free, and friction is a smooth function of
+    speed. What that leaves open, no log of this motion tells.
     """
-    some = slice(None, None, max(1, len(machine.t) // 200))
-    still = 0 * machine.q[some]
-    pulled = _inverse_dynamics(machine.robot, machine.q[some], still, still, gravity)
-    whole = _inverse_dynamics(
-        machine.robot, machine.q[some], machine.dq[some], machine.ddq[some], gravity
-    )
-    return bool((pulled.std(axis=0) < 0.02 * whole.std(axis=0).max()).all())
+
+    free: Array  # (4, n N, 10 n) columns over noise: without gravity, and 1 m/s^2 along x, y, z
+    links: Array  # (10 n,) as they are
+
+    @classmethod
+    def of(cls, machine: Machine) -> Identifiable:
+        import pinocchio as pin
+
+        model = _pinocchio(machine.robot)
+        data = model.createData()
+        some = slice(None, None, max(1, len(machine.t) // 300))
+        q, dq, ddq = machine.q[some], machine.dq[some], machine.ddq[some]
+        parts = []
+        for gravity in (np.zeros(3), *np.eye(3)):
+            model.gravity.linear = gravity
+            moving = (dq, ddq) if not gravity.any() else (0 * dq, 0 * ddq)
+            columns = [
+                pin.computeJointTorqueRegressor(model, data, *one).copy()
+                for one in zip(q, *moving, strict=True)
+            ]
+            parts.append(np.transpose(columns, (1, 0, 2)))
+        free = np.array(parts)
+        for j in range(q.shape[1]):
+            speed = dq[:, j]
+            size = np.abs(speed) / np.sqrt(np.mean(speed**2))
+            sign = np.tanh(speed / machine.friction["width"][j])
+            laws = [sign * size**power for power in (0.0, 0.5, 1.0, 1.5, 2.0)]
+            own = np.stack([ddq[:, j], *laws, 1 + 0 * speed], axis=-1)
+            basis = np.linalg.qr(own)[0]
+            free[:, j] -= basis @ (basis.T @ free[:, j])
+            free[:, j] *= np.sqrt(len(machine.t) / len(q)) / machine.noise[j]
+        links = np.concatenate([one.toDynamicParameters() for one in list(model.inertias)[1:]])
+        return cls(free.reshape(4, -1, free.shape[-1]), links)
+
+    def columns(self, gravity: Array) -> Array:
+        return np.asarray(self.free[0] + np.tensordot(gravity, self.free[1:], 1))
+
+    def explained(self, true: Array, other: Array) -> bool:
+        """Return whether other links under `other` explain the torque under `true` so well that its noise
+        leaves odds below those that decide.
+        """
+        return self.leaves(other, self.columns(true) @ self.links) < ODDS
+
+    def leaves(self, gravity: Array, target: Array) -> float:
+        """Power of the torque `target` over the noise that no links under `gravity` explain."""
+        columns = self.columns(gravity)
+        scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        left = target - columns @ (np.linalg.lstsq(columns / scale, target, 1e-9)[0] / scale)
+        return float(left @ left)
+
+    def direction(self, true: Array) -> bool:
+        """Return whether the direction is determined: rank of the torque's change with it, and no other
+        direction of gravity explains the torque.
+        """
+        along = true / np.linalg.norm(true)
+        across = np.linalg.svd(along[None])[2][1:]
+        columns = self.columns(true)
+        change = np.tensordot(9.81 * across, self.free[1:], 1) @ self.links
+        scale = np.maximum(np.linalg.norm(columns, axis=0), 1e-9)
+        fit = np.linalg.lstsq(columns / scale, change.T, 1e-9)[0]
+        left = change.T - columns / scale @ fit
+        if np.linalg.svd(left)[1][-1] < 1e-6 * np.linalg.norm(columns @ self.links):
+            return False
+        rng = np.random.default_rng(0)
+        others = [
+            -along,
+            *across,
+            *-across,
+            *(v / np.linalg.norm(v) for v in rng.normal(size=(30, 3))),
+        ]
+        ring = np.radians(5.0)
+        for turn in np.linspace(0, 2 * np.pi, 12, endpoint=False):
+            side = np.cos(turn) * across[0] + np.sin(turn) * across[1]
+            others.append(np.cos(ring) * along + np.sin(ring) * side)
+        return not any(
+            self.explained(true, 9.81 * v) for v in others if v @ along < np.cos(0.99 * ring)
+        )
+
+
+def _exchangeable(machine: Machine, gravity: Array) -> bool:
+    """Return whether the torque is explained as well if two joints are taken for each other."""
+    could = Identifiable.of(machine)
+    n = len(machine.noise)
+    torque = (could.columns(gravity) @ could.links).reshape(n, -1)
+    for a, b in combinations(range(n), 2):
+        order = np.arange(n)
+        order[[a, b]] = b, a
+        changed = replace(
+            machine,
+            q=machine.q[:, order],
+            dq=machine.dq[:, order],
+            ddq=machine.ddq[:, order],
+            noise=machine.noise[order],
+            friction={name: value[order] for name, value in machine.friction.items()},
+        )
+        if Identifiable.of(changed).leaves(gravity, torque[order].ravel()) < ODDS:
+            return True
+    return False
+
+
+def _dissipated(machine: Machine, log: ExperimentLog, rigid: Array, friction: Array) -> list[float]:
+    """<friction · speed> / (rms torque · rms speed) of each joint, at the moments that are fitted."""
+    motion = sample_motion(Subject(log).good)
+    if motion is None:
+        return [float("nan")] * rigid.shape[1]
+    at = np.searchsorted(machine.t, motion.t - 1e-9)
+    tau, speed = (rigid + friction)[at], machine.dq[at]
+    scale = np.sqrt(np.mean(tau**2, axis=0) * np.mean(speed**2, axis=0))
+    return np.asarray(np.mean(friction[at] * speed, axis=0) / scale).tolist()
 
 
 def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
@@ -470,7 +582,10 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     }
     if found is None:
         return out | {"none": True}
-    blind = _vertical(draw(seed), np.array(truth["direction"]))
+    could = Identifiable.of(draw(seed))
+    pointing = np.array(truth["direction"])
+    blind = not could.direction(pointing)
+    mute = could.explained(*((pointing, 0 * DOWN) if truth["gravity"] else (0 * DOWN, DOWN)))
     out["sign"] = _field(found.sign, "signed" if truth["sign"] else "magnitude")
     claims = {
         "order": bool(found.order.signal),
@@ -484,27 +599,45 @@ def judged(seed: int, kind: str, fault: str = "healthy") -> dict[str, Any]:
     ]
     if kind == "magnitude":
         return out
-    out["gravity"] = _told(found.gravity.present, truth["gravity"], blind)
-    out["share"], out["std"] = found.gravity.share, found.gravity.std
+    out |= _shares(found, truth) | {"blind": blind, "mute": mute}
+    out["vectors"] = [found.direction.best, truth["direction"]]
+    out["orders"] = [found.order.columns, truth["order"]]
+    out["gravity"] = _told(found.gravity.present, truth["gravity"], mute)
     out["friction"] = _told(found.friction.present, truth["friction"], False)
-    vector = found.direction.vector
-    near = (
-        None
-        if vector is None
-        else bool(
-            np.array(vector) @ truth["direction"]
-            > np.cos(np.radians(5)) * np.linalg.norm(vector) * np.linalg.norm(truth["direction"])
-        )
-    )
-    out["direction"] = (
-        _told(near, True, blind) if truth["gravity"] else "right" if vector is None else "wrong"
-    )
-    columns = None if found.order.columns is None else [k - 1 for k in found.order.columns]
-    out["order"] = _told(columns, truth["order"], False)
+    out["direction"] = _direction(found, truth, blind)
+    told = None if found.order.reason else found.order.columns
+    columns = None if told is None else [k - 1 for k in told]
+    free = columns is None and _exchangeable(draw(seed), pointing if truth["gravity"] else 0 * DOWN)
+    out["order"], out["exchangeable"] = _told(columns, truth["order"], free), free
     out["gate"] = claims.get(CLAIM.get(kind, ""), True) or (
-        blind and kind in ("no gravity", "ceiling")
+        (mute and kind == "no gravity") or (blind and kind != "permuted")
     )
     return out
+
+
+def _shares(found: Boundary, truth: dict[str, Any]) -> dict[str, Any]:
+    """Shares, their standard deviations and what is true, and why a field is null."""
+    gravity, friction = found.gravity, found.friction
+    return {
+        "share": gravity.share,
+        "std": gravity.std,
+        "joint_share": list(zip(gravity.joint_share, gravity.joint_std, strict=True)),
+        "friction_share": list(
+            zip(friction.joint_share, friction.joint_std, truth["dissipated"], strict=False)
+        ),
+        "why": [gravity.reason, friction.reason, found.direction.reason, found.order.reason],
+    }
+
+
+def _direction(found: Boundary, truth: dict[str, Any], blind: bool) -> str:
+    vector = found.direction.vector
+    if not truth["gravity"]:
+        return "right" if vector is None else "wrong"
+    if vector is None:
+        return _told(None, True, blind)
+    size = np.linalg.norm(vector) * np.linalg.norm(truth["direction"])
+    near = np.array(vector) @ truth["direction"] > np.cos(np.radians(5)) * size
+    return "right" if near else "wrong"
 
 
 def _field(told: object, true: object) -> str:
@@ -550,15 +683,18 @@ def table(results: Iterable[dict[str, Any]]) -> str:
         _rate(f"false claim on whole torque, {fault}", sum(bad), len(bad))
         for fault, bad in sorted(by_fault.items())
     ]
-    healthy = [
-        r
-        for r in rows
-        if r.get("share") is not None
-        and r["kind"] in ("whole", "no friction")
-        and r["fault"] == "healthy"
-    ]
-    inside = [abs(r["share"] - 1.0) < 2 * r["std"] for r in healthy]
-    lines.append(_rate("share within two standard deviations", sum(inside), len(inside)))
+    permuted = [r["order"] for r in rows if r["kind"] == "permuted" and "order" in r]
+    lines.append(_rate("order right of permuted logs", permuted.count("right"), len(permuted)))
+    healthy = [r for r in rows if "share" in r and r["fault"] == "healthy"]
+    with_gravity = [r for r in healthy if r["kind"] != "no gravity"]
+    shares = {
+        "gravity": [(r["share"], r["std"], r["kind"] != "no gravity") for r in healthy],
+        "each joint's gravity": [(*one, 1.0) for r in with_gravity for one in r["joint_share"]],
+        "each joint's friction": [one for r in healthy for one in r["friction_share"]],
+    }
+    for name, values in shares.items():
+        inside = [abs(x - true) < 2 * std for x, std, true in values if x is not None]
+        lines.append(_rate(f"{name} within two deviations", sum(inside), len(inside)))
     cpu = [r["cpu"] for r in rows]
     lines.append(f"CPU a log: median {np.median(cpu):.2f} s, largest {max(cpu):.2f} s")
     return "\n".join(lines)

@@ -52,7 +52,7 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
     """The files of a report by their names, "report.html" first; nothing is written."""
     pictures, names = _pictures(report), _Names()
     files: dict[str, bytes] = {}
-    sections, glyphs = [], set[str]()
+    sections, glyphs = list[dict[str, object]](), set[str]()
     for section in report.sections:
         figures = []
         for figure in section.figures:
@@ -61,7 +61,7 @@ def render_report(report: Report, footer: Mapping[str, str]) -> dict[str, bytes]
             files[f"figures/{name}.svg"] = svg.encode()
             figures.append({"caption": _prose(figure.caption),
                             "svg": _inline(svg, f"f{len(names.taken)}-", figure.alt or figure.caption, glyphs)})
-        sections.append(_section_words(section) | {"figures": figures})
+        sections.append(_section_words(section) | {"figures": figures, "n": len(sections) + 1, "leads": section.leads})
     page = _template().render(
         title=printable(report.title), verdict=_prose(report.verdict), advice=[_prose(line) for line in report.advice],
         tone=report.tone, words=_WORDS, key_figures=report.key_figures and _table_words(report.key_figures), sections=sections,

@@ -52,6 +52,7 @@ class Section:
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = ()
     warning: str = ""
+    leads: bool = False  # drawn before the key figures
 
 
 @dataclass(frozen=True)

@@ -16,10 +16,12 @@ from pipelines import diagnose, estimate_bps, import_log, inspect
 from pipelines.errors import InputRejected
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings
+from pipelines.estimation.checks.gravity_fit import GravityModel
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.files import find_logs, open_log
 from pipelines.log.robot import format_robot
 from pipelines.log.robot_files import load_robot
+from pipelines.report.boundary_card import boundary_card
 from pipelines.stage import Request, run_stage
 
 RECIPE = """
@@ -164,6 +166,45 @@ def test_unsigned_effort_is_told_as_magnitudes(motion: str, shared: Path) -> Non
     assert [check.code for check in boundary_findings(found, motion)] == ["RRID-S25"]
 
 
+def test_a_load_that_pushes_one_way_is_no_magnitude(shared: Path) -> None:
+    """A torque that a spring or a load holds above zero is the same as its magnitude, also where it
+    comes as near to zero as a lift whose friction balances its load on the way down.
+    """
+    log = unsigned(shared, "multisine")
+    loaded = replace(log, signals={**log.signals, "tau": Signal(log.tau + 3.0, "N m", "effort")})
+    t = log.t
+    lift = np.where(np.sin(2.0 * np.pi * t / 4.0) > 0.0, 2.0, 0.02) + 0.015 * np.sin(9.0 * t)
+    lowered = replace(
+        log,
+        signals={
+            "t": log.signals["t"],
+            "q": Signal(
+                np.outer(-np.cos(2.0 * np.pi * t / 4.0), np.ones(log.n_joints)), "rad", "q"
+            ),
+            "tau": Signal(np.outer(lift, np.ones(log.n_joints)), "N m", "torque"),
+        },
+    )
+    for one in (loaded, lowered):
+        found = torque_boundary([one])
+        assert found is None or found.sign != "magnitude"
+
+
+def test_a_fit_that_fails_costs_its_answers_and_not_the_run(
+    shared: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(GravityModel, "search", broken)
+    paths, _ = find_logs([shared / "real" / "kr300" / "logs"])
+    found = torque_boundary([open_log(path).log for path in paths])
+    assert found is not None
+    assert (found.sign, found.gravity.share, found.order.columns) == ("signed", None, None)
+    assert "the fit failed: Singular matrix" in found.gravity.reason
+    (card,) = boundary_card(found)
+    assert card.text[0].startswith("These logs do not determine gravity, ")
+
+
 @pytest.mark.parametrize("robot", ["panda", "kr300"])
 def test_a_recorded_arm_has_a_boundary_without_a_finding(robot: str, shared: Path) -> None:
     """Link-side sensors and uneven stamps; a base whose z axis points down and three short logs."""
@@ -171,6 +212,8 @@ def test_a_recorded_arm_has_a_boundary_without_a_finding(robot: str, shared: Pat
     assert boundary_findings(found, robot) == ()
     assert found.sign == "signed"
     assert found.order.columns == tuple(range(1, len(found.unit.units) + 1))
+    share, std = found.gravity.share, found.gravity.std
+    assert share is None or (std is not None and abs(share - 1.0) < 2.0 * std < 0.2)
 
 
 @pytest.mark.parametrize("number", range(1, 17))

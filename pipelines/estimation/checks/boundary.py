@@ -15,17 +15,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.estimation.checks.channel_order import ColumnOrder, search_orders
+from pipelines.estimation.checks.channel_order import SIGNALS, ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.estimation.checks.gravity_fit import GravityFit, GravityModel
-from pipelines.estimation.checks.spread import effective_moments, friction_spread, gravity_spread
+from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
+from pipelines.estimation.checks.spread import effective_moments, gravity_spread, jackknife
 from pipelines.estimation.checks.torque_rows import (
-    FRICTION,
+    CLUSTERS,
     Array,
     GenericArm,
     Order,
-    TorqueRows,
-    described_torque,
     generic_arm,
     torque_rows,
 )
@@ -38,6 +36,7 @@ from pipelines.model.rigid.chain import standard_parameters
 from pipelines.model.row_fit import Sampled, sample_motion
 
 __all__ = [
+    "STANDARD_GRAVITY",
     "Boundary",
     "Direction",
     "JointOrder",
@@ -50,8 +49,8 @@ __all__ = [
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 _MOVING = ("excitation", "free", "writing")
 _AXES = np.concatenate([np.eye(3), -np.eye(3)])
-_STEPS = np.radians([1.0, 2.0, 5.0, 10.0, 20.0, 40.0])
-_TWO = 2.0  # log likelihood that two standard deviations cost
+_ANGLES = np.radians(np.r_[0.1:2.0:0.1, 2.0:20.0:0.5, 20.0:92.0:2.0])
+_FOUR = 4.0  # two standard deviations, squared
 _HELD = 0.02  # of the travel of the joint that moves most: a joint that moves less is held
 
 
@@ -94,7 +93,7 @@ class JointOrder:
     # signals whose columns are out of order: "q and tau", "q" or "tau"; empty where none is
     signal: str
     before: float | None = None  # residual over the torque with the columns as logged
-    after: float | None = None  # residual over the torque with the columns in order
+    after: float | None = None  # residual over the torque in the best other order that was tried
     reason: str = ""  # why a value is not identifiable; else empty
 
 
@@ -104,6 +103,7 @@ class Unit:
 
     units: tuple[str, ...]  # of each joint's torque
     scale: float | None  # torque over that of the described links; null: not identifiable
+    std: float | None  # standard deviation of `scale`
     reason: str = ""  # why a value is not identifiable; else empty
 
 
@@ -135,73 +135,69 @@ class Boundary:
     turned: bool = False  # whether gravity points elsewhere than the description has it
 
 
+_NEVER = (
+    NotIdentifiable(
+        "compensated payload",
+        "a payload that the controller subtracts is absorbed by the last links' masses: "
+        "it needs a reference log, or links described within 5 %",
+    ),
+    NotIdentifiable(
+        "joint zero", "a joint zero that is off is absorbed by the links' centres of mass"
+    ),
+)
+
+
 def torque_boundary(
     logs: Sequence[ExperimentLog], config: BoundaryConfig | None = None
 ) -> Boundary | None:
-    """Return what the torque of `logs`, of one robot, is; None where none of them moves the arm."""
+    """Return what the torque of `logs`, of one robot, is; None where none of them moves the arm.
+
+    A fit that fails numerically leaves everything but the sign not identifiable, with its reason.
+    """
     config = config or BoundaryConfig()
-    subjects = [Subject(log) for log in _telling(logs)]
-    good = [
+    subjects = [Subject(log) for log in _informative(logs)]
+    usable = [
         subject.good
         for subject in subjects
         if subject.sampled and subject.good.time.known and subject.good.runs
     ]
-    if (
-        not good
-        or not np.isfinite(
-            np.concatenate([one.log.tau[run] for one in good for run in one.runs])
-        ).any()
-    ):
+    if not any(np.isfinite(one.log.tau[run]).any() for one in usable for run in one.runs):
         return None
-    robot = good[0].log.robot
-    touches = touches_of_zero(good, config)
-    motions = [motion for one in good if (motion := sample_motion(one)) is not None]
-    names = tuple(one.log.name for one in good)
-    if all(count is not None for count in touches):
-        sure = max(count or 0 for count in touches) >= config.touches
-        return (
-            _magnitude(robot, tuple(count or 0 for count in touches), names)
-            if sure
-            else _unread(robot, None, names)
+    robot = usable[0].log.robot
+    names = tuple(one.log.name for one in usable)
+    touches = touches_of_zero(usable, config)
+    counts = [count for count in touches if count is not None]
+    sign: str | None = "signed"
+    if len(counts) < len(touches):
+        signed = ", ".join(str(j) for j, count in enumerate(touches, 1) if count is None)
+        evidence = f"the torque of joint {signed} changes its sign"
+    elif max(counts) >= config.touches:
+        evidence = (
+            "no torque is ever negative, though they come down to zero "
+            f"{', '.join(map(str, counts))} times while the joints move"
         )
-    arm = generic_arm(robot)
-    if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
-        return None
-    return _estimated(robot, arm, motions, touches, names, config)
+        return _unread(robot, "magnitude", names, "not identifiable from magnitudes", evidence)
+    else:  # a load on one side: the same as its magnitude
+        sign = None if any(counts) else "signed"
+        evidence = "no torque changes its sign" + (", or comes near zero" if sign else "")
+    try:
+        arm = generic_arm(robot)
+        motions = [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
+        if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
+            return None
+        return _Estimate(robot, arm, motions, config).boundary(names, sign, evidence)
+    except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
+        reason = f"not identifiable: the fit failed: {error}"
+        return _unread(robot, sign, names, reason, evidence)
 
 
-def _telling(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
+def _informative(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
     """Logs in which all joints move; those of role "identify" where there are any."""
     moving = [log for log in logs if log.origin != "planned" and log.experiment in _MOVING]
     for role in ("identify", "validate", "reference"):
-        if own := [log for log in moving if log.role == role]:
-            return own[:4]
+        if of_role := [log for log in moving if log.role == role]:
+            return of_role[:4]
     return moving[:4]
-
-
-def _thinned(motions: Sequence[Sampled], moments: int) -> list[Sampled]:
-    step = max(1, -(-sum(len(motion.t) for motion in motions) // moments))
-    return [
-        replace(
-            motion,
-            **{
-                name: getattr(motion, name)[::step]
-                for name in ("t", "q", "dq", "ddq", "coulomb", "at")
-            },
-        )
-        for motion in motions
-    ]
-
-
-def _joined(parts: Sequence[Sampled]) -> Sampled:
-    """The moments of all logs as those of one."""
-    t, q, dq, ddq, coulomb, tau = (
-        np.concatenate([getattr(part, name) for part in parts])
-        for name in ("t", "q", "dq", "ddq", "coulomb", "tau")
-    )
-    return replace(
-        parts[0], t=t, q=q, dq=dq, ddq=ddq, coulomb=coulomb, torque=tau, at=np.arange(len(t))
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,247 +212,314 @@ class _Fits:
 
     @property
     def rms(self) -> float:
-        return float(np.sqrt(np.mean(self.best.residual**2)))
+        return _rms(self.best)
 
 
-def _fits(
-    arm: GenericArm,
-    motions: Sequence[Sampled],
-    described: Array,
-    config: BoundaryConfig,
-    q_order: Order | None = None,
-    tau_order: Order | None = None,
-    effective: Array | None = None,
-) -> _Fits:
-    """Fit the gravity from the described one, from none and from every axis."""
-    rows = torque_rows(arm, motions, q_order, tau_order)
-    model = GravityModel(rows, config.model_error, effective)
-    groups = _whole(rows.n_joints)
-    here = [described] if np.any(described) else []
-    starts = [*here, *(STANDARD_GRAVITY * _AXES)]
-    if effective is None:
-        first = max(
-            (model.fit(start) for start in (np.zeros(3), *starts)), key=lambda fit: fit.score
+class _Estimate:
+    """The torque boundary of one robot's logs."""
+
+    def __init__(
+        self,
+        robot: RobotDescription,
+        arm: GenericArm,
+        motions: Sequence[Sampled],
+        config: BoundaryConfig,
+    ) -> None:
+        self.robot, self.arm, self.motions, self.config = robot, arm, motions, config
+        self.described = np.array(robot.gravity)
+
+    def boundary(self, names: tuple[str, ...], sign: str | None, evidence: str) -> Boundary:
+        order, fits = self.ordered(self.fits())
+        covariance, coefficients, spread = gravity_spread(fits.model, fits.best, fits.model.whole)
+        gravity, direction, removed, turned = self.gravity(fits, covariance)
+        friction = self.friction(fits.model.rows.dissipated, coefficients, spread)
+        little = friction.upper is not None and friction.upper < self.config.friction_absent
+        sides = {True: None if little else "motor", False: "joint", None: None}
+        if order.signal:
+            removed = turned = False  # the order first: it is what the rest rests on
+        return Boundary(
+            sides[friction.present],
+            sign,
+            gravity,
+            friction,
+            direction,
+            order,
+            self.unit(fits),
+            _NEVER,
+            (evidence, *_in_words(fits, order)),
+            names,
+            removed,
+            turned,
         )
-        model.effective = effective_moments(
-            model.residuals(model.search(first.gravity, groups)), rows.start
+
+    def fits(self, order: ColumnOrder | None = None) -> _Fits:
+        """Fit the gravity from the described one, from none and from every axis."""
+        q_order, tau_order = (order.q, order.tau) if order else (None, None)
+        rows = torque_rows(self.arm, self.motions, q_order, tau_order)
+        model = GravityModel(rows, self.config.model_error)
+        here = [self.described] if np.any(self.described) else []
+        starts = [*here, *(STANDARD_GRAVITY * _AXES)]
+        first = max(map(model.fit, (np.zeros(3), *starts)), key=lambda fit: fit.score)
+        residuals = model.residuals(model.search(first.gravity, model.whole))
+        model.effective = effective_moments(residuals, rows.start)
+        turned: list[GravityFit] = []
+        tried = [model.search_direction(start, STANDARD_GRAVITY) for start in starts]
+        for fit in sorted(tried, key=lambda fit: -fit.score):
+            apart = (_angle(fit.gravity[0], other.gravity[0]) for other in turned)
+            if all(angle > self.config.tilt for angle in apart):
+                turned.append(fit)
+        none = model.fit(np.zeros(3))
+        free = [model.search(fit.gravity, model.whole) for fit in (none, *turned[:2])]
+        best = max([*free, none, *turned], key=lambda fit: fit.score)
+        return _Fits(model, model.fit(self.described), none, best, tuple(turned))
+
+    def ordered(self, fits: _Fits) -> tuple[JointOrder, _Fits]:
+        """Return the order of the columns, and the fits under it."""
+        config, n = self.config, fits.model.rows.n_joints
+        same = JointOrder(tuple(range(1, n + 1)), "")
+        mistaken = fits.best.score > fits.described.score + config.decisive
+        explained = fits.best.residual.max() < config.suspect
+        if n == 1:
+            return same, fits
+        travel = np.ptp(np.concatenate([motion.q for motion in self.motions]), axis=0)
+        tried = search_orders(
+            self.arm,
+            self.motions[:1],
+            self.described,
+            np.flatnonzero(travel > _HELD * travel.max()).tolist(),
+            config.model_error,
+            (config.order_rows, config.orders),
+            True if fits.rms > config.lost else False if explained else None,
+            -0.5 * float(np.sum(np.log(fits.best.variance))) - n,  # hopeless below
+            SIGNALS[:1] if explained else SIGNALS,
         )
-    turned: list[GravityFit] = []
-    for fit in sorted(
-        (model.search_direction(start, STANDARD_GRAVITY) for start in starts),
-        key=lambda fit: -fit.score,
-    ):
-        if all(_angle(fit.gravity[0], other.gravity[0]) > config.tilt for other in turned):
-            turned.append(fit)
-    turned.sort(key=lambda fit: (-fit.score, not _possible(model, fit)))
-    none = model.fit(np.zeros(3))
-    free = [model.search(fit.gravity, groups) for fit in (none, *turned[:2])]
-    best = max([*free, none, *turned], key=lambda fit: fit.score)
-    return _Fits(model, model.fit(described), none, best, tuple(turned))
+        if not tried:
+            return same, fits
+        # all orders by one number of independent moments, that of the order that leaves the least
+        variances, moments = map(np.stack, zip(*map(self.by_column, tried), strict=True))
+        gains = np.log(fits.best.variance / variances)
+        likelihoods = 0.5 * gains @ moments[np.argmin(np.log(variances).sum(axis=1))]
+        top = int(np.argmax(likelihoods))
+        gain = 0.5 * float(gains[top] @ np.minimum(fits.model.effective, moments[top]))
+        if gain < -(config.decisive if mistaken else config.alike):
+            return same, fits
+        chosen, other = tried[top], self.fits(tried[top])
+        if gain > config.decisive and _power(other.best) < config.explained * _power(fits.best):
+            columns = tuple(k + 1 for k in chosen.order)
+            order = JointOrder(columns, chosen.signal, fits.rms, other.rms)
+            near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
+            if len(near) > 1:
+                orders = "; ".join(f"{tried[k].signal} {_listed(tried[k].order)}" for k in near)
+                order = replace(order, columns=None, reason=f"several orders fit alike: {orders}")
+            return order, other
+        swapped = f"{chosen.signal} are in the order {_listed(chosen.order)}"
+        if not mistaken:
+            reason = f"not identifiable: the torque is explained as well if {swapped}"
+            return replace(same, before=fits.rms, after=other.rms, reason=reason), fits
+        if _power(other.described) < config.explained * _power(fits.described):
+            reason = f"either gravity is not as described, or {swapped}: both explain the torque"
+            return JointOrder(None, chosen.signal, _rms(fits.described), other.rms, reason), fits
+        return replace(same, before=fits.rms, after=other.rms), fits
+
+    def by_column(self, order: ColumnOrder) -> tuple[Array, Array]:
+        """Return the relative residual variance and the number of independent moments (n,) of each
+        column of the torque in another order.
+        """
+        rows = torque_rows(self.arm, self.motions, order.q, order.tau)
+        model = GravityModel(rows, self.config.model_error)
+        fit = model.search(np.tile(self.described, (rows.n_joints, 1)), model.whole)
+        joint = np.argsort(order.tau or range(rows.n_joints))
+        return fit.variance[joint], effective_moments(model.residuals(fit), rows.start)[joint]
+
+    def gravity(self, fits: _Fits, covariance: Array) -> tuple[Share, Direction, bool, bool]:
+        """Return share and direction of the gravity, whether it is absent, and whether it is
+        turned from the described one.
+        """
+        config, described = self.config, self.described
+        model, best, none, top = fits.model, fits.best, fits.none, fits.turned[0]
+        absent = none.score > top.score and bool(np.any(described))
+        along = described if absent else top.gravity[0]
+        along = along / np.linalg.norm(along)
+        share = float(best.gravity[0] @ along) / STANDARD_GRAVITY
+        variance = max(float(along @ covariance @ along), 0.0)
+        std = float(np.sqrt(variance)) / STANDARD_GRAVITY
+        drop = 2.0 * max(best.score - top.score, 1e-3)
+        if abs(share - 1.0) > 3.0 * std and drop < 2.0 * config.alike:
+            std = abs(share - 1.0) / float(np.sqrt(drop))  # the whole size explains the torque too
+        across = np.sqrt(max(float(np.trace(covariance)) - variance, 0.0)) / STANDARD_GRAVITY
+        known = std < config.undetermined and across < config.wide
+        present = _present(top, none, (share, std) if known else None, config)
+        if not known or present is None:
+            reason = "not identifiable: this motion does not tell the size of gravity"
+            found = Share(None, None, present=present, reason=reason)
+        else:
+            found = Share(share, std, present=present)
+        if found.share is not None and present:
+            joint_share, joint_std = _each_joint(model, best, config)
+            found = replace(found, joint_share=joint_share, joint_std=joint_std)
+        told = tuple(described.tolist())
+        if present is False:
+            removed = (
+                bool(np.any(described)) and none.score > fits.described.score + config.decisive
+            )
+            return (
+                found,
+                Direction(None, None, told, None, (), "the torque holds no gravity"),
+                removed,
+                False,
+            )
+        half = _power(top) < config.explained * _power(fits.described)
+        turned = (
+            half
+            and _angle(top.gravity[0], described) > config.tilt
+            and top.score > self.tilted(fits) + config.decisive
+        )
+        spread, reason = self.direction_spread(fits)
+        pointing = tuple(map(float, top.gravity[0]))
+        if reason:
+            return found, Direction(None, None, told, None, pointing, reason), False, turned
+        angle = _angle(top.gravity[0], described)
+        return found, Direction(pointing, spread, told, angle, pointing), False, turned
+
+    def tilted(self, fits: _Fits) -> float:
+        """Return the best score of all gravities that a tilted mounting leaves of the described."""
+        if not np.any(self.described):
+            return fits.described.score
+        tilt = self.config.tilt
+        near = [fit.score for fit in fits.turned if _angle(fit.gravity[0], self.described) < tilt]
+        along = self.described / np.linalg.norm(self.described)
+        cones = np.concatenate([along[None], _cone(along, 0.5 * tilt, 8), _cone(along, tilt, 8)])
+        return max(*near, *(fits.model.fit(STANDARD_GRAVITY * vector).score for vector in cones))
+
+    def direction_spread(self, fits: _Fits) -> tuple[float | None, str]:
+        """Return the standard deviation [rad] of gravity's direction, or why it is not identifiable.
+
+        The set of directions u of which (g u - a)ᵀ C⁻¹ (g u - a) is within 4 of the least, a the
+        free vector and C its covariance; half the angle to the farthest is the deviation.
+        """
+        top, model = fits.turned[0], fits.model
+        if any(fit.score > top.score - self.config.alike for fit in fits.turned[1:]):
+            return (
+                None,
+                "not identifiable: gravity in another direction explains the torque as well",
+            )
+        along = top.gravity[0] / STANDARD_GRAVITY
+        covariance = gravity_spread(model, top, model.whole)[0]
+        values, vectors = np.linalg.eigh(covariance)
+        inverse = vectors / np.maximum(values, 1e-12 * LOOSE**2) @ vectors.T
+        across = np.linalg.svd(along[None])[2][1:]
+        across = np.linalg.eigh(across @ covariance @ across.T)[1].T @ across  # along its valleys
+        angles = np.repeat(_ANGLES, 8)
+        away = np.concatenate([_cone(along, angle, 8, across) for angle in _ANGLES]) - along
+        apart = STANDARD_GRAVITY**2 * np.einsum("ij,jk,ik->i", away, inverse, away)
+        spread = 0.5 * float(angles[apart < _FOUR].max(initial=_ANGLES[0]))
+        if spread < self.config.direction_std:
+            return spread, ""
+        if spread < 0.5 * _ANGLES[-1]:
+            return None, f"not identifiable to better than {np.degrees(2 * spread):.0f} degrees"
+        return None, "not identifiable: turned gravity explains the torque as well"
+
+    def friction(self, dissipated: Array, coefficients: Array, covariance: Array) -> Share:
+        """Return the share of friction: of each joint the power that it takes, over the RMS of
+        torque and speed.
+
+        s_j = <τ_f v> / (rms τ · rms v)        linear, signed, for any friction law
+        """
+        config = self.config
+        n, c = coefficients.shape
+        weights = np.zeros((n, n * c))
+        for j in range(n):
+            weights[j, j * c : (j + 1) * c] = dissipated[j]
+        moves = np.any(dissipated != 0.0, axis=1)  # a joint that is held has none to tell
+        each = weights @ coefficients.ravel()
+        std = np.sqrt(np.maximum(np.einsum("jk,kl,jl->j", weights, covariance, weights), 0.0))
+        # by the balance of energy a cycle dissipates no more than the torque's power
+        told = moves & (std < config.undetermined) & (np.abs(each - 0.5) < 0.5 + 2.0 * std)
+        floor = 0.1 * config.friction_absent
+        sure = told / (std**2 + floor**2)  # a joint whose friction no motion tells has no say
+        mean = sure @ weights / max(float(sure.sum()), 1e-300)
+        share = float(mean @ coefficients.ravel())
+        own = float(np.sqrt(max(mean @ covariance @ mean, 0.0)))
+        upper = share + 2.0 * own
+        read = told & (std < config.friction_absent)
+        present: bool | None = None
+        reason = "not identifiable: the motion does not tell friction from none"
+        if (each - 3.0 * std > config.friction_absent)[told].any() or share > 3.0 * np.hypot(
+            own, floor
+        ):
+            present, reason = True, ""
+            if upper < config.friction_absent:
+                reason = "so little that it may be a direct drive, or what compensation leaves"
+        elif 3.0 * own < share < config.friction_absent:
+            reason = "so little that it may be what compensation leaves"
+        elif (
+            read.any()
+            and upper < config.friction_absent
+            and (each + 2.0 * std < 2.0 * config.friction_absent)[read].all()
+        ):
+            present = False
+            reason = (
+                "compensated friction and a torque measured beyond the gear are one answer here: "
+                "they differ by the rotor inertia alone"
+            )
+        joints = [
+            tuple(float(v) if k else None for v, k in zip(values, told, strict=True))
+            for values in (each, std)
+        ]
+        if not told.any():
+            return Share(None, None, joints[0], joints[1], reason=reason)
+        return Share(share, own, joints[0], joints[1], present, upper, reason)
+
+    def unit(self, fits: _Fits) -> Unit:
+        """Return the unit, and the rigid part of the torque over that of the described links."""
+        units = _units(self.robot)
+        links = [joint.link for joint in self.robot.joints if joint.link is not None]
+        if len(links) < self.robot.n_joints:
+            reason = "the description has no masses and inertias to compare with"
+            return Unit(units, None, None, reason)
+        rows, size = fits.model.rows, fits.model.size
+        phi = self.arm.combine @ np.ravel(standard_parameters(links))
+        pulled = np.einsum("jnkm,k,m->jn", rows.gravity, fits.best.gravity[0], phi[rows.heavy])
+        expected = (rows.inertial @ phi + pulled) / size[:, None]
+        xx, xy, yy = np.zeros(CLUSTERS), np.zeros(CLUSTERS), 0.0
+        for j in range(len(size)):
+            basis = np.linalg.qr(rows.own[j])[0]
+            x, y = (v - basis @ (basis.T @ v) for v in (expected[j], rows.tau[j] / size[j]))
+            xx += np.bincount(rows.cluster, x * x, CLUSTERS)
+            xy += np.bincount(rows.cluster, x * y, CLUSTERS)
+            yy += float(y @ y)
+        if xx.sum() <= 0.0 or xy.sum() ** 2 < 0.8 * xx.sum() * yy:
+            return Unit(units, None, None, "the described links do not explain the torque")
+        scale, covariance = jackknife(xx[:, None, None], xy[:, None], np.zeros((1, 1)))
+        return Unit(units, float(scale[0]), float(np.sqrt(covariance[0, 0])))
 
 
 def _angle(one: Array, other: Array) -> float:
-    """Angle [rad] between two vectors; π/2 where one is zero."""
+    """Return the angle [rad] between two vectors; π/2 where one is zero."""
     size = float(np.linalg.norm(one) * np.linalg.norm(other))
     return float(np.arccos(np.clip(one @ other / size, -1.0, 1.0))) if size > 0.0 else 0.5 * np.pi
 
 
-def _possible(model: GravityModel, fit: GravityFit) -> bool:
-    """Return whether the links alone have no negative inertia about any joint."""
-    return bool((model.rows.unit @ fit.parameters >= 0.0).all())
-
-
-def _whole(n: int) -> Array:
-    """(3, n, 3): changes of the gravity that all joints share."""
-    return np.stack([np.tile(axis, (n, 1)) for axis in np.eye(3)])
-
-
-def _estimated(
-    robot: RobotDescription,
-    arm: GenericArm,
-    motions: Sequence[Sampled],
-    touches: Sequence[int | None],
-    names: tuple[str, ...],
-    config: BoundaryConfig,
-) -> Boundary:
-    described = np.array(robot.gravity)
-    rows = _thinned(motions, config.rows)
-    fits = _fits(arm, rows, described, config)
-    signed = [str(j + 1) for j, count in enumerate(touches) if count is None]
-    evidence = [f"the torque of joint {', '.join(signed)} changes its sign"]
-    order, fits = _ordered(arm, motions, rows, fits, described, config)
-    if order.signal:
-        evidence.append(
-            f"residual over the torque: {order.before:.2g} with the columns as logged, "
-            f"{order.after:.2g} in another order"
-        )
-    gravity, direction, removed, turned = _gravity(fits, described, config)
-    friction = _friction(fits, config)
-    evidence += _in_words(fits, gravity, friction)
-    side = None if friction.present is None else "motor" if friction.present else "joint"
-    if order.signal:
-        removed = turned = False  # the order first: it is what the rest rests on
-    return Boundary(
-        side,
-        "signed",
-        gravity,
-        friction,
-        direction,
-        order,
-        _unit(robot, arm, rows, fits),
-        _never(robot),
-        tuple(evidence),
-        names,
-        removed,
-        turned,
-    )
-
-
-def _ordered(
-    arm: GenericArm,
-    motions: Sequence[Sampled],
-    rows: Sequence[Sampled],
-    fits: _Fits,
-    described: Array,
-    config: BoundaryConfig,
-) -> tuple[JointOrder, _Fits]:
-    """The order of the columns, and the fits under it."""
-    n = fits.model.rows.n_joints
-    same = JointOrder(tuple(range(1, n + 1)), "")
-    if n == 1 or fits.best.residual.max() < config.suspect:
-        return same, fits
-    one = _joined(_thinned(motions, config.order_rows))
-    travel = np.ptp(one.q, axis=0)
-    moving = np.flatnonzero(travel > _HELD * travel.max()).tolist()
-    tried = search_orders(
-        arm,
-        one,
-        described,
-        moving,
-        config.model_error,
-        (config.orders, config.order_rows_many, fits.rms > config.lost),
-    )
-    part = _thinned(motions, config.order_rows)
-    gains = [
-        _gain(fits, *_under(torque_rows(arm, part, *_applied(c)), described, config), c)
-        for c in tried
-    ]
-    if not tried or max(gains) < config.decisive:
-        return same, fits
-    top = int(np.argmax(gains))
-    chosen, found = tried[top], _fits(arm, rows, described, config, *_applied(tried[top]))
-    if found.rms**2 > config.explained * fits.rms**2:
-        return same, fits
-    alike = [c for c, gain in zip(tried, gains, strict=True) if gain > gains[top] - config.decisive]
-    if len(alike) > 1:
-        told = "; ".join(f"{c.signal} {','.join(str(k + 1) for k in c.order)}" for c in alike)
-        return JointOrder(
-            None, chosen.signal, fits.rms, found.rms, f"several orders fit alike: {told}"
-        ), found
-    return JointOrder(tuple(k + 1 for k in chosen.order), chosen.signal, fits.rms, found.rms), found
-
-
-def _applied(column: ColumnOrder) -> tuple[Order | None, Order | None]:
-    """The order of the positions and that of the torques; None as logged."""
-    return (
-        column.order if "q" in column.signal else None,
-        column.order if "tau" in column.signal else None,
-    )
-
-
-def _under(rows: TorqueRows, described: Array, config: BoundaryConfig) -> tuple[GravityFit, Array]:
-    """The best fit from the described gravity, and the independent moments of each joint."""
-    model = GravityModel(rows, config.model_error)
-    found = model.search(np.tile(described, (rows.n_joints, 1)), _whole(rows.n_joints))
-    return found, effective_moments(model.residuals(found), rows.start)
-
-
-def _gain(logged: _Fits, other: GravityFit, effective: Array, column: ColumnOrder) -> float:
-    """Log likelihood of the other order beyond that of the logged one, by each torque's number of
-    independent moments.
+def _cone(along: Array, angle: float, count: int, across: Array | None = None) -> Array:
+    """Return (count, 3) unit vectors at `angle` from the unit vector `along`, the first towards
+    the first of `across` (2, 3).
     """
-    taken = list(column.order) if "tau" in column.signal else list(range(len(column.order)))
-    moments = np.minimum(logged.model.effective[taken], effective)
-    return 0.5 * float(moments @ np.log(logged.best.variance[taken] / other.variance))
+    across = np.linalg.svd(along[None])[2][1:] if across is None else across
+    turns = np.linspace(0.0, 2.0 * np.pi, count, endpoint=False)
+    side = np.stack([np.cos(turns), np.sin(turns)], axis=1) @ across
+    return np.asarray(np.cos(angle) * along + np.sin(angle) * side)
 
 
-def _gravity(
-    fits: _Fits, described: Array, config: BoundaryConfig
-) -> tuple[Share, Direction, bool, bool]:
-    """Return share and direction of the gravity, whether it is absent, and whether it is turned
-    from the described one.
-    """
-    model, best = fits.model, fits.best
-    vector = best.gravity[0]
-    size = float(np.linalg.norm(vector))
-    along = vector / size if size > 0.0 else np.array([0.0, 0.0, -1.0])
-    covariance = gravity_spread(model, best, _whole(len(best.gravity)))
-    # along the vector, and as the size of a vector that is uncertain across it
-    std = float(np.sqrt(max(along @ covariance @ along, 0.0))) / STANDARD_GRAVITY
-    across = (
-        float(np.sqrt(max(np.trace(covariance) - along @ covariance @ along, 0.0)))
-        / STANDARD_GRAVITY
-    )
-    share = size / STANDARD_GRAVITY
-    known = std < config.undetermined and across < config.wide
-    top, none = fits.turned[0], fits.none
-    present = _present(top, none, (share, std) if known else None, config)
-    known = known and present is not None
-    removed = (
-        present is False
-        and bool(np.any(described))
-        and none.score > fits.described.score + config.decisive
-    )
-    found = Share(
-        share if known else None,
-        std if known else None,
-        present=present,
-        reason="" if known else "not identifiable: this motion does not tell the size of gravity",
-    )
-    if present and known:
-        joints = _each_joint(model, best, config)
-        found = replace(found, joint_share=joints[0], joint_std=joints[1])
-    if present is False:
-        return (
-            found,
-            Direction(
-                None, None, tuple(described.tolist()), None, reason="the torque holds no gravity"
-            ),
-            removed,
-            False,
-        )
-    half = float(np.sum(top.residual**2)) < config.explained * float(
-        np.sum(fits.described.residual**2)
-    )
-    # a gravity upside down is hardly seen where links of negative inertia take its place
-    turned = (
-        not removed
-        and (half or (_possible(model, top) and not _possible(model, fits.described)))
-        and _angle(top.gravity[0], described) > config.tilt
-        and top.score > _around(fits, described, config) + config.decisive
-    )
-    spread, why = _direction_spread(fits, config)
-    if (
-        across >= config.wide
-    ):  # only its size, which is known, would tell the part along the joints' axes
-        spread, why = None, "not identifiable: the part along the joints' axes acts on no joint"
-    told = spread is not None and spread < config.direction_std
-    pointing = top.gravity[0]
-    if not told and not why:
-        why = "not identifiable: the direction is known to some degrees only"
-    return (
-        found,
-        Direction(
-            tuple(map(float, pointing)) if told else None,
-            spread if told else None,
-            tuple(described.tolist()),
-            _angle(pointing, described) if told else None,
-            tuple(map(float, pointing)),
-            why,
-        ),
-        removed,
-        turned,
-    )
+def _power(fit: GravityFit) -> float:
+    return float(np.sum(fit.residual**2))
+
+
+def _rms(fit: GravityFit) -> float:
+    return float(np.sqrt(np.mean(fit.residual**2)))
+
+
+def _listed(order: Order) -> str:
+    return ",".join(str(k + 1) for k in order)
 
 
 def _present(
@@ -465,210 +528,61 @@ def _present(
     """Return whether the torque holds gravity: by its share, and by the fits of gravity of its
     whole size and of zero gravity.
     """
-    half = float(np.sum(top.residual**2)) < config.explained * float(np.sum(none.residual**2))
     if share is None:
-        return True if half and top.score > none.score + config.decisive else None
+        half = _power(top) < config.explained * _power(none)
+        return True if half and top.score > none.score + config.alike else None
     low, high = share[0] - 2.0 * share[1], share[0] + 2.0 * share[1]
-    if high < config.absent:
-        return (
-            False if none.score > top.score + config.decisive else None
-        )  # balanced links have no gravity either
+    if high < config.absent:  # balanced links have no gravity either
+        return False if none.score > top.score + config.alike else None
     return True if low > config.absent else None
-
-
-def _around(fits: _Fits, described: Array, config: BoundaryConfig) -> float:
-    """The best score of all gravities that a tilted mounting leaves of the described one."""
-    if not np.any(described):
-        return fits.described.score
-    near = [fit.score for fit in fits.turned if _angle(fit.gravity[0], described) < config.tilt]
-    along = described / np.linalg.norm(described)
-    cone = [along, *_cone(along, 0.5 * config.tilt), *_cone(along, config.tilt)]
-    return max(*near, *(fits.model.fit(STANDARD_GRAVITY * vector).score for vector in cone))
-
-
-def _cone(along: Array, tilt: float) -> list[Array]:
-    """Eight unit vectors at the angle `tilt` from `along`."""
-    across = np.linalg.svd(along[None])[2][1:]
-    turns = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
-    return [
-        np.cos(tilt) * along + np.sin(tilt) * (np.cos(turn) * across[0] + np.sin(turn) * across[1])
-        for turn in turns
-    ]
 
 
 def _each_joint(
     model: GravityModel, best: GravityFit, config: BoundaryConfig
 ) -> tuple[tuple[float | None, ...], ...]:
-    """Share of each joint's gravity, where its torque tells it, and its standard deviation."""
+    """Return the share of each joint's gravity, where its torque tells it, and its deviation."""
     n = len(best.gravity)
+    size = float(np.linalg.norm(best.gravity[0]))
     groups = np.einsum("jk,jx->kjx", np.eye(n), best.gravity)
     apart = model.search(best.gravity, groups)
-    std = np.sqrt(np.maximum(np.diag(gravity_spread(model, apart, groups)), 0.0))
-    share = np.linalg.norm(apart.gravity, axis=1) / STANDARD_GRAVITY
-    p = model.rows.inertial.shape[2]
-    m = len(model.rows.heavy)
-    pulled = np.einsum(
-        "jnkm,jk,m->jn",
-        model.projected[:, :, p : p + 3 * m].reshape(n, -1, 3, m),
-        best.gravity,
-        best.parameters[model.rows.heavy],
-    )
-    known = (std * np.linalg.norm(best.gravity[0]) / STANDARD_GRAVITY < config.undetermined) & (
-        np.sqrt(np.mean(pulled**2, axis=1)) > config.weighs
-    )
-    return (
-        tuple(float(v) if k else None for v, k in zip(share, known, strict=True)),
-        tuple(float(v) if k else None for v, k in zip(std, known, strict=True)),
+    std = np.sqrt(np.maximum(np.diag(gravity_spread(model, apart, groups)[0]), 0.0))
+    std = std * size / STANDARD_GRAVITY
+    share = apart.gravity @ best.gravity[0] / size / STANDARD_GRAVITY
+    pulled = model.pulls(best) @ best.gravity[0]
+    weighs = np.sqrt(np.mean(pulled**2, axis=1)) > config.weighs
+    known = (std < config.undetermined) & weighs
+    return tuple(
+        tuple(float(v) if k else None for v, k in zip(values, known, strict=True))
+        for values in (share, std)
     )
 
 
-def _direction_spread(fits: _Fits, config: BoundaryConfig) -> tuple[float | None, str]:
-    """Standard deviation [rad] by the profile of the likelihood, in the least certain direction; or
-    the reason why it is not identifiable.
-    """
-    top, model = fits.turned[0], fits.model
-    possible = _possible(model, top)
-    if any(
-        fit.score > top.score - _TWO and (_possible(model, fit) or not possible)
-        for fit in fits.turned[1:]
-    ):
-        return None, "not identifiable: gravity in another direction explains the torque as well"
-    along = top.gravity[0] / STANDARD_GRAVITY
-    worst = 0.0
-    for around in np.transpose([_cone(along, step) for step in _STEPS], (1, 0, 2)):
-        for step, vector in zip(_STEPS, around, strict=True):
-            drop = top.score - model.fit(STANDARD_GRAVITY * vector).score
-            if drop > _TWO:
-                worst = max(worst, float(step / np.sqrt(2.0 * drop)))
-                break
-        else:
-            return None, "not identifiable: turned gravity explains the torque as well"
-    return worst, ""
-
-
-def _friction(fits: _Fits, config: BoundaryConfig) -> Share:
-    """The share of friction: of each joint the power that it takes, over the RMS of torque and
-    speed.
-
-    s_j = <τ_f v> / (rms τ · rms v)        linear, signed, for any friction law
-    """
-    model = fits.model
-    rows = model.rows
-    coefficients, covariance = friction_spread(model, fits.best)
-    n, c = coefficients.shape
-    speed = rows.own[:, :, 2]
-    size = np.sqrt(np.mean(speed**2, axis=1) * np.mean(rows.tau**2, axis=1))
-    weights = np.zeros((n, n * c))
-    moves = size > 0.0  # a joint that is held, or without torque, has no friction to tell
-    for j in np.flatnonzero(moves).tolist():
-        power = rows.own[j, :, FRICTION] * speed[j][:, None]
-        weights[j, j * c + FRICTION.start : j * c + FRICTION.stop] = power.mean(axis=0) / size[j]
-    each = weights @ coefficients.ravel()
-    std = np.sqrt(np.maximum(np.einsum("jk,kl,jl->j", weights, covariance, weights), 0.0))
-    sure = moves / (
-        std**2 + (0.25 * config.friction_absent) ** 2
-    )  # a joint whose friction no motion tells has no say
-    mean = sure @ weights / max(float(sure.sum()), 1e-300)
-    share, own = (
-        float(mean @ coefficients.ravel()),
-        float(np.sqrt(max(mean @ covariance @ mean, 0.0))),
-    )
-    upper = share + 2.0 * own
-    present: bool | None = None
-    reason = ""
-    read = moves & (std < config.friction_absent)
-    if (each - 3.0 * std > config.friction_absent).any():
-        present = True
-    elif (
-        read.any()
-        and upper < config.friction_absent
-        and (each + 2.0 * std < 2.0 * config.friction_absent)[read].all()
-    ):
-        present = False
-        reason = (
-            "compensated friction and a torque measured beyond the gear are one answer here: "
-            "they differ by the rotor inertia alone"
-        )
-    else:
-        reason = "not identifiable: the motion does not tell friction from none"
-    told = [
-        tuple(float(v) if m else None for v, m in zip(values, moves, strict=True))
-        for values in (each, std)
-    ]
-    return Share(share, own, told[0], told[1], present, upper, reason)
-
-
-def _in_words(fits: _Fits, gravity: Share, friction: Share) -> list[str]:
-    rms = (
-        float(np.sqrt(np.mean(fits.described.residual**2))),
-        float(np.sqrt(np.mean(fits.none.residual**2))),
-        fits.rms,
-    )
+def _in_words(fits: _Fits, order: JointOrder) -> list[str]:
+    described, none = _rms(fits.described), _rms(fits.none)
     said = [
-        f"relative residual, joints weighted alike: {rms[0]:.2g} with gravity as described, "
-        f"{rms[1]:.2g} with none, {rms[2]:.2g} with the best-fitting vector"
+        f"the model leaves {_percent(described)} of a joint's torque with gravity as described, "
+        f"{_percent(none)} without gravity, {_percent(fits.rms)} with the gravity vector that fits best"
     ]
-    if gravity.share is not None and gravity.std is not None:
+    if order.signal and order.before is not None and order.after is not None:
         said.append(
-            f"gravity: {gravity.share:.2f} ± {gravity.std:.2f} of {STANDARD_GRAVITY:.2f} m/s²"
-        )
-    if friction.share is not None and friction.upper is not None:
-        said.append(
-            f"friction dissipates {100 * friction.share:.1f} % of rms torque times rms speed, "
-            f"at most {100 * friction.upper:.1f} %"
+            f"it leaves {_percent(order.before)} with the columns as logged, "
+            f"{_percent(order.after)} in the other order"
         )
     return said
 
 
-def _unit(
-    robot: RobotDescription, arm: GenericArm, motions: Sequence[Sampled], fits: _Fits
-) -> Unit:
-    """The unit, and the rigid part of the torque over that of the described links."""
-    units = _units(robot)
-    links = [joint.link for joint in robot.joints if joint.link is not None]
-    if len(links) < robot.n_joints:
-        return Unit(units, None, "the description has no masses and inertias to compare with")
-    gravity = fits.best.gravity[0]
-    described = described_torque(arm, motions, standard_parameters(links), gravity).T
-    rows = fits.model.rows
-    expected, measured = described / fits.model.size[:, None], rows.tau / fits.model.size[:, None]
-    slopes = []
-    for j in range(robot.n_joints):
-        basis, _ = np.linalg.qr(rows.own[j])
-        x, y = (v - basis @ (basis.T @ v) for v in (expected[j], measured[j]))
-        slopes.append((float(x @ y), float(x @ x), float(y @ y)))
-    xy, xx, yy = np.sum(slopes, axis=0)
-    if xx <= 0.0 or xy**2 < 0.8 * xx * yy:
-        return Unit(units, None, "the described links do not explain the torque")
-    return Unit(units, float(xy / xx))
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
 
 
 def _units(robot: RobotDescription) -> tuple[str, ...]:
     return tuple(joint_unit("tau", joint.revolute) for joint in robot.joints)
 
 
-def _never(robot: RobotDescription) -> tuple[NotIdentifiable, ...]:
-    return (
-        NotIdentifiable(
-            "compensated payload",
-            "a payload that the controller subtracts is absorbed by the last links' masses: "
-            "it needs a reference log, or links described within 5 %",
-        ),
-        NotIdentifiable(
-            "joint zero", "a joint zero that is off is absorbed by the links' centres of mass"
-        ),
-    )
-
-
 def _unread(
-    robot: RobotDescription, sign: str | None, names: tuple[str, ...], *evidence: str
+    robot: RobotDescription, sign: str | None, names: tuple[str, ...], why: str, *evidence: str
 ) -> Boundary:
-    """A boundary of which nothing but the sign is known."""
-    why = (
-        "not identifiable from magnitudes"
-        if sign == "magnitude"
-        else "not identifiable: no torque changes its sign"
-    )
+    """Return a boundary of which nothing but the sign is known."""
     nothing = Share(None, None, reason=why)
     return Boundary(
         None,
@@ -677,20 +591,8 @@ def _unread(
         nothing,
         Direction(None, None, robot.gravity, None, reason=why),
         JointOrder(None, "", reason=why),
-        Unit(_units(robot), None, why),
-        _never(robot),
+        Unit(_units(robot), None, None, why),
+        _NEVER,
         evidence,
         names,
-    )
-
-
-def _magnitude(
-    robot: RobotDescription, touches: tuple[int, ...], names: tuple[str, ...]
-) -> Boundary:
-    return _unread(
-        robot,
-        "magnitude",
-        names,
-        "no torque is ever negative, though they come down to zero "
-        f"{', '.join(map(str, touches))} times while the joints move",
     )

@@ -1,35 +1,36 @@
 """Find the order of the columns that a log's motion and torque fit.
 
-Every order is scored by the likelihood of the whole arm under its described gravity, on a few
-moments. Orders of positions and torques together come from columns that are named otherwise than
-the joints; orders of either alone from a column map.
+Every order is scored by the likelihood of the whole arm under its described gravity. Orders of
+positions and torques together come from columns that are named otherwise than the joints; orders of
+either alone from a column map.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
 import numpy as np
 
-from pipelines.estimation.checks.torque_rows import Array, GenericArm, Order
+from pipelines.estimation.checks.torque_rows import (
+    Array,
+    GenericArm,
+    Order,
+    RowFilter,
+    own_columns,
+    thinned,
+)
 from pipelines.model.rigid.chain import regressor
 from pipelines.model.row_fit import Sampled
 
-__all__ = ["ColumnOrder", "search_orders"]
+__all__ = ["SIGNALS", "ColumnOrder", "search_orders"]
 
-_ALL_UP_TO = {
-    "q and tau": 6,
-    "q": 4,
-    "tau": 4,
-}  # joints: 720 orders take a second; of more, orders are reached by swaps
-_SIGNALS = ("q and tau", "tau", "q")
-_AGAIN = 40  # orders that are compared once more, on more moments
-_BEAM = 12  # orders that are kept at each swap
-_AT_ONCE = 40  # orders whose regressors are formed together: 30 MB
-_RIDGE = 1e-8
-_ROUNDS = 3
+SIGNALS = ("q and tau", "tau", "q")
+_ALL_UP_TO = {"q and tau": 5, "q": 4, "tau": 4}  # joints; of more, orders are reached by exchanges
+_BEAM = 8  # orders that are kept at each exchange
+_RIDGE = 1e-9  # of equilibrated columns
+_ROUNDS = 4  # of reweighting, from what each joint by itself leaves
 
 
 @dataclass(frozen=True)
@@ -38,182 +39,137 @@ class ColumnOrder:
 
     signal: str  # "q and tau", "q" or "tau"
     order: Order
-    score: float  # log likelihood, of independent moments
 
+    @property
+    def q(self) -> Order | None:
+        """The order of the positions; None as logged."""
+        return self.order if "q" in self.signal else None
 
-class _Scorer:
-    """Scores of orders, each formed once."""
-
-    def __init__(
-        self, arm: GenericArm, motion: Sampled, gravity: Array, model_error: float
-    ) -> None:
-        self.arm, self.motion, self.model_error = arm, motion, model_error
-        self.gravity = gravity
-        tau = motion.tau / np.maximum(np.std(motion.tau, axis=0), 1e-12)
-        self.basis, self.tau = [], []
-        for k in range(tau.shape[1]):
-            speed, sign = motion.dq[:, k], motion.coulomb[:, k]
-            own = np.stack(
-                [
-                    motion.ddq[:, k],
-                    sign,
-                    speed,
-                    speed * np.abs(speed),
-                    sign * np.abs(tau[:, k]),
-                    np.ones(len(tau)),
-                ],
-                axis=-1,
-            )
-            q, _ = np.linalg.qr(own / np.maximum(np.linalg.norm(own, axis=0), 1e-300))
-            self.basis.append(q)
-            self.tau.append(tau - q @ (q.T @ tau))
-        self.known: dict[Order, tuple[Array, Array, Array]] = {}
-
-    def prepare(self, orders: Iterable[Order]) -> None:
-        """Form the normal equations of `orders` of the positions."""
-        new = [order for order in dict.fromkeys(orders) if order not in self.known]
-        chain = replace(self.arm.chain, gravity=self.gravity)
-        moments, n = self.motion.q.shape
-        for first in range(0, len(new), _AT_ONCE):
-            part = new[first : first + _AT_ONCE]
-            q, dq, ddq = (
-                np.concatenate([x[:, list(order)] for order in part])
-                for x in (self.motion.q, self.motion.dq, self.motion.ddq)
-            )
-            y = regressor(chain, q, dq, ddq, self.arm.columns).reshape(len(part), moments, n, -1)
-            for order, columns in zip(part, y, strict=True):
-                self.known[order] = self._normal(order, columns)
-
-    def _normal(self, order: Order, columns: Array) -> tuple[Array, Array, Array]:
-        """Per joint: Gram matrix (n, p, p), products with every torque (n, p, n), power of every
-        torque (n, n).
-        """
-        moments, n, p = columns.shape
-        gram, cross, power = np.empty((n, p, p)), np.empty((n, p, n)), np.empty((n, n))
-        for j, k in enumerate(order):
-            own = np.ascontiguousarray(columns[:, j])
-            own -= self.basis[k] @ (self.basis[k].T @ own)
-            gram[j], cross[j] = own.T @ own / moments, own.T @ self.tau[k] / moments
-            power[j] = np.mean(self.tau[k] ** 2, axis=0)
-        return gram, cross, power
-
-    def score(self, q_order: Order, tau_order: Order) -> float:
-        """Log likelihood a moment of an order of the positions, of those prepared, and one of the
-        torques.
-        """
-        gram, cross, power = self.known[q_order]
-        n = len(q_order)
-        right = cross[np.arange(n), :, list(tau_order)]
-        total = power[np.arange(n), list(tau_order)]
-        scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
-        scale[scale < 1e-10 * scale.max()] = np.inf
-        gram, right = gram / np.outer(scale, scale), right / scale
-        variance = np.ones(n)
-        for _ in range(_ROUNDS):
-            normal = np.einsum("jpq,j->pq", gram, 1.0 / variance)
-            ridge = _RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
-            phi = np.linalg.solve(normal + ridge, right.T @ (1.0 / variance))
-            left = total - 2.0 * right @ phi + np.einsum("p,jpq,q->j", phi, gram, phi)
-            variance = np.maximum(left, 0.0) + self.model_error**2
-        return -0.5 * float(np.sum(np.log(variance)))
+    @property
+    def tau(self) -> Order | None:
+        """The order of the torques; None as logged."""
+        return self.order if "tau" in self.signal else None
 
 
 def search_orders(
     arm: GenericArm,
-    motion: Sampled,
+    motions: Sequence[Sampled],
     gravity: Array,
     moving: Sequence[int],
     model_error: float,
-    config: tuple[int, int, bool],
+    size: tuple[int, int],
+    every: bool | None = None,
+    least: float = -np.inf,
+    signals: Sequence[str] = SIGNALS,
 ) -> tuple[ColumnOrder, ...]:
-    """Return the best orders that score better than the logged one, best first.
-
-    Exchanges of two columns come first; only where one of them fits better than the log, or
-    `every` is asked for, all others.
+    """Return the best orders other than the logged one, best first.
 
     Args:
-        motion: some hundred moments.
         gravity: (3,) [m/s^2] under which orders are compared.
         moving: joints that move; the others keep their place.
-        config: how many are returned at most; moments that all orders of many joints are compared
-        with; whether to try every order.
+        size: moments that orders are compared with; how many orders are returned at most.
+        every: whether to try every order, or exchanges of two columns only; None: every order
+            where an exchange fits better than the log, or of few joints.
+        least: log likelihood a moment, below which an order is not returned.
+        signals: whose columns are exchanged.
     """
-    keep, few, every = config
-    same: Order = tuple(range(motion.q.shape[1]))
-    exchanged = [_swapped(same, a, b) for a, b in combinations(moving, 2)]
-    scorer = _Scorer(arm, motion, gravity, model_error)
-    first = {
-        (signal, order): score
-        for signal in _SIGNALS
-        for order, score in _scores(scorer, signal, [same, *exchanged]).items()
-    }
-    logged = first["q and tau", same]
-    if not every and max(first.values()) <= logged:
-        return ()
-    coarse = scorer
-    if len(moving) > _ALL_UP_TO["q"]:
-        step = max(1, len(motion.t) // few)
-        thin = replace(
-            motion,
-            **{
-                name: getattr(motion, name)[::step]
-                for name in ("t", "q", "dq", "ddq", "coulomb", "at")
-            },
+    moments, most = size
+    scorer = _Scorer(arm, thinned(motions, moments), gravity, model_error)
+    same: Order = tuple(range(len(arm.chain.revolute)))
+    logged = scorer("q and tau", same)
+    swaps = [_exchanged(same, a, b) for a, b in combinations(moving, 2)]
+    scores: dict[tuple[str, Order], float] = {}
+    for signal in signals:
+        scores |= {(signal, order): scorer(signal, order) for order in swaps}
+    if every is None:
+        few = len(moving) <= min(_ALL_UP_TO.values())
+        every = few or max(scores.values(), default=logged) > logged
+    for signal in signals if every else ():
+        if len(moving) <= _ALL_UP_TO[signal]:
+            orders = {_placed(same, moving, moved) for moved in permutations(moving)} - {same}
+            scores |= {(signal, order): scorer(signal, order) for order in orders}
+            continue
+        own = {order: scores[signal, order] for order in swaps} | {same: logged}
+        beam: list[Order] = []
+        for _ in range(len(moving) - 1):
+            best = sorted(own, key=lambda order: -own[order])[:_BEAM]
+            if best == beam:
+                break
+            beam = best
+            near = {_exchanged(order, a, b) for order in beam for a, b in combinations(moving, 2)}
+            own |= {order: scorer(signal, order) for order in near - own.keys()}
+        scores |= {(signal, order): score for order, score in own.items() if order != same}
+    ranked = sorted(scores.items(), key=lambda item: -item[1])[:most]
+    return tuple(ColumnOrder(*key) for key, score in ranked if score > least)
+
+
+class _Scorer:
+    """Log likelihoods a moment of orders, each position's rows formed once."""
+
+    def __init__(
+        self, arm: GenericArm, motions: Sequence[Sampled], gravity: Array, model_error: float
+    ) -> None:
+        self.columns, self.chain = arm.columns, replace(arm.chain, gravity=gravity)
+        self.model_error = model_error
+        self.filter = RowFilter(motions)
+        self.q, self.dq, self.ddq, coulomb, tau = (
+            np.concatenate([getattr(motion, name) for motion in motions])
+            for name in ("q", "dq", "ddq", "coulomb", "tau")
         )
-        coarse = _Scorer(arm, thin, gravity, model_error)
-    found = {
-        (signal, order): score
-        for signal in _SIGNALS
-        for order, score in _all_of(coarse, signal, same, moving).items()
-    }
-    if coarse is not scorer:  # the best of them once more, on all moments
-        best = sorted(found, key=lambda key: -found[key])[:_AGAIN]
-        found = {(signal, order): _scores(scorer, signal, [order])[order] for signal, order in best}
-    better = {key: score for key, score in found.items() if score > logged and key[1] != same}
-    ranked = sorted(better.items(), key=lambda item: -item[1])[:keep]
-    return tuple(ColumnOrder(signal, order, score) for (signal, order), score in ranked)
+        own = self.filter(own_columns(self.dq, self.ddq, coulomb))
+        torque = self.filter(tau.T[:, :, None])[:, :, 0].T
+        self.size = np.maximum(np.std(torque, axis=0), 1e-12)
+        self.basis, self.tau = [], []  # of each column of the positions
+        for columns in own:
+            basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
+            self.basis.append(basis)
+            self.tau.append(torque - basis @ (basis.T @ torque))
+        self.known: dict[Order, tuple[Array, Array, Array]] = {}
+
+    def _normal(self, order: Order) -> tuple[Array, Array, Array]:
+        """Per joint: Gram matrix (n, p, p), products with every torque (n, p, n), power of every
+        torque (n, n).
+        """
+        at = list(order)
+        y = regressor(self.chain, self.q[:, at], self.dq[:, at], self.ddq[:, at], self.columns)
+        own = self.filter(y.transpose(1, 0, 2))
+        basis, tau = np.stack([self.basis[k] for k in at]), np.stack([self.tau[k] for k in at])
+        own = own - basis @ (basis.transpose(0, 2, 1) @ own)
+        moments, turned = own.shape[1], own.transpose(0, 2, 1)
+        return turned @ own / moments, turned @ tau / moments, np.mean(tau**2, axis=1)
+
+    def __call__(self, signal: str, order: Order) -> float:
+        """Return the log likelihood a moment of an order of the signals named."""
+        same: Order = tuple(range(len(order)))
+        q_order, tau_order = (order if name in signal else same for name in ("q", "tau"))
+        if q_order not in self.known:
+            self.known[q_order] = self._normal(q_order)
+        gram, cross, power = self.known[q_order]
+        size = self.size[list(tau_order)]
+        gram = gram / size[:, None, None] ** 2
+        right = cross[np.arange(len(order)), :, list(tau_order)] / size[:, None] ** 2
+        total = power[np.arange(len(order)), list(tau_order)] / size**2
+        scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
+        scale[scale < 1e-10 * scale.max()] = np.inf
+        gram, right = gram / np.outer(scale, scale), right / scale
+        ridge = 1e-6 * np.eye(len(scale)) * np.einsum("jpp->j", gram)[:, None, None] / len(scale)
+        alone = np.linalg.solve(gram + ridge, right[:, :, None])[:, :, 0]  # each joint by itself
+        variance = np.maximum(total - np.sum(right * alone, axis=1), 0.0) + self.model_error**2
+        for _ in range(_ROUNDS):
+            normal = np.einsum("jpq,j->pq", gram, 1.0 / variance)
+            ridge = _RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
+            phi = np.linalg.solve(normal + ridge, right.T @ (1.0 / variance))
+            rest = total - 2.0 * right @ phi + np.einsum("p,jpq,q->j", phi, gram, phi)
+            variance = np.maximum(rest, 0.0) + self.model_error**2
+        return -0.5 * float(np.sum(np.log(variance)))
 
 
-def _scores(scorer: _Scorer, signal: str, orders: Sequence[Order]) -> dict[Order, float]:
-    same: Order = tuple(range(len(orders[0])))
-    scorer.prepare(orders if "q" in signal else [same])
-    return {
-        order: scorer.score(order if "q" in signal else same, order if "tau" in signal else same)
-        for order in orders
-    }
+def _placed(same: Order, moving: Sequence[int], moved: Sequence[int]) -> Order:
+    order = list(same)
+    for place, joint in zip(moving, moved, strict=True):
+        order[place] = joint
+    return tuple(order)
 
 
-def _all_of(scorer: _Scorer, signal: str, same: Order, moving: Sequence[int]) -> dict[Order, float]:
-    """Scores of every order of one kind; of many joints, of those that exchanges of two columns
-    reach.
-    """
-    if len(moving) <= _ALL_UP_TO[signal]:
-        return _scores(scorer, signal, _placed(same, moving))
-    known, beam = _scores(scorer, signal, [same]), [same]
-    for _ in range(len(moving) - 1):
-        near = {_swapped(order, a, b) for order in beam for a, b in combinations(moving, 2)} - set(
-            known
-        )
-        known |= _scores(scorer, signal, sorted(near)) if near else {}
-        best = sorted(known, key=lambda order: -known[order])[:_BEAM]
-        if best == beam:
-            break
-        beam = best
-    return known
-
-
-def _placed(same: Order, moving: Sequence[int]) -> list[Order]:
-    """Every order of the joints that move."""
-    orders = []
-    for moved in permutations(moving):
-        whole = list(same)
-        for place, joint in zip(moving, moved, strict=True):
-            whole[place] = joint
-        orders.append(tuple(whole))
-    return orders
-
-
-def _swapped(order: Order, a: int, b: int) -> Order:
-    out = list(order)
-    out[a], out[b] = out[b], out[a]
-    return tuple(out)
+def _exchanged(order: Order, a: int, b: int) -> Order:
+    return _placed(order, (a, b), (order[b], order[a]))

@@ -12,49 +12,47 @@ class BoundaryConfig:
     """The numbers of the torque boundary, each with its meaning and its source.
 
     Attributes:
-        rows: moments of all logs together; seven joints then cost a tenth of a second.
-        order_rows: moments with which other orders of the columns are compared.
-        order_rows_many: moments of the first comparison of hundreds of orders.
+        order_rows: moments with which orders of the columns are compared.
         orders: other orders that are fitted in full.
-        model_error: share of a torque's RMS that no rigid-body model predicts better than; the best
-            published fits of recorded arms leave 1.4 % (Gaz et al. 2019). Smaller residuals are no
-            evidence for one model against another.
+        model_error: of a torque's RMS, the resolution of good torque sensors: smaller residuals
+            are no evidence for one model against another.
         decisive: gain in log likelihood that decides between two models, after the residual's
             correlation is counted: odds of 20,000.
+        alike: difference in log likelihood, below which two answers are equally likely: odds of 150.
         explained: share of the residual power of the rejected model that the accepted one may
             leave.
         lost: of the torques' RMS: where all joints together leave more, every order is tried, and
             not only exchanges of two columns.
-        suspect: of a torque's RMS: where no joint leaves more, other orders are not tried.
+        suspect: of a torque's RMS, three times the error of the model: where no joint leaves more,
+            other orders are not tried.
         tilt: [rad] 15 degrees: more than levelling leaves, so that the description is wrong and not
             the mounting.
         absent: of the gravity torque: a smaller share is an error of the compensation.
         undetermined: standard deviation of a share, above which it is not identifiable.
         wide: of g: standard deviation of the gravity vector across itself, of the three before any
             data, above which its size is not identifiable.
-        direction_std: [rad] 5 degrees: standard deviation of a direction, above which it is not
-            identifiable.
+        direction_std: [rad] 2.5 degrees: standard deviation of a direction, above which it is not
+            identifiable: two of them are 5 degrees.
         weighs: of its torque's RMS: a joint with less gravity has no share of its own.
-        friction_absent: of the torque's RMS: less is no friction; geared drives have 10 to 50 %,
-            direct drives 3 %.
+        friction_absent: of torque times speed, both RMS: less is what compensation leaves, or a
+            direct drive; geared drives have 10 to 50 %.
         no_negative: times the noise of a channel: a torque below minus that is negative.
         touches: times that a signed torque does not come down to zero without crossing it once.
     """
 
-    rows: int = 1500
     order_rows: int = 600
-    order_rows_many: int = 120
     orders: int = 12
-    model_error: float = 0.01
+    model_error: float = 0.003
     decisive: float = 10.0
+    alike: float = 5.0
     explained: float = 0.5
     lost: float = 0.2
-    suspect: float = 0.08
+    suspect: float = 0.01
     tilt: float = 0.26
     absent: float = 0.2
     undetermined: float = 0.25
     wide: float = 2.0
-    direction_std: float = 0.09
+    direction_std: float = 0.0436
     weighs: float = 0.1
     friction_absent: float = 0.02
     no_negative: float = 3.0

@@ -10,6 +10,7 @@ a costs less than a millisecond.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,6 +52,9 @@ class GravityModel:
         self.rows = rows
         self.model_error = model_error
         n, moments, p = rows.inertial.shape
+        self.whole = np.repeat(
+            np.eye(3)[:, None], n, axis=1
+        )  # (3, n, 3): one gravity of all joints
         self.effective = np.full(n, float(moments)) if effective is None else effective
         self.size = np.maximum(np.std(rows.tau, axis=1), 1e-12)
         basis, _ = np.linalg.qr(
@@ -63,6 +67,7 @@ class GravityModel:
         full -= basis @ (basis.transpose(0, 2, 1) @ full)
         self.projected = full  # (n, N, p + 3 m + 1)
         self.gram = full.transpose(0, 2, 1) @ full / moments
+        self.alone = self._alone()
         power = np.einsum("jpp->p", self.gram)
         scale = power[:p].copy()
         scale[rows.heavy] += 96.0 * power[p:-1].reshape(3, -1).sum(axis=0)  # at 9.8 m/s^2
@@ -70,6 +75,17 @@ class GravityModel:
         self.scale = np.where(
             scale > 1e-10 * scale.max(initial=1e-300), scale, np.inf
         )  # a parameter without any effect
+
+    def _alone(self) -> Array:
+        """Return the variance (n,) of each joint fitted by itself under any gravity: the least that
+        a fit of all can leave, from which its weights begin.
+        """
+        scale = np.sqrt(np.maximum(np.einsum("jpp->jp", self.gram), 1e-300))[:, :-1]
+        columns = self.gram[:, :-1, :-1] / (scale[:, :, None] * scale[:, None, :])
+        right = self.gram[:, :-1, -1] / scale
+        solved = np.linalg.solve(columns + 1e-6 * np.eye(len(scale[0])), right[:, :, None])
+        left = self.gram[:, -1, -1] - np.sum(right * solved[:, :, 0], axis=1)
+        return np.asarray(np.maximum(left, 0.0) + self.model_error**2)
 
     def _transform(self, gravity: Array) -> Array:
         """T (P, p) of one gravity (3,): columns of the model = [Y_0 Y_x Y_y Y_z] T."""
@@ -82,31 +98,20 @@ class GravityModel:
             )
         return out
 
-    def _parts(self, each: Array, weights: Array) -> list[tuple[Array, Array]]:
-        """Joints of one gravity together: their T, and their weighted Gram matrix."""
-        if (each == each[0]).all():
-            return [(self._transform(each[0]), np.tensordot(weights, self.gram, 1))]
-        return [
-            (self._transform(a), w * gram)
-            for a, w, gram in zip(each, weights, self.gram, strict=True)
-        ]
-
     def fit(self, gravity: Array, variance: Array | None = None) -> GravityFit:
         """Fit the parameters under `gravity`, (3,) or of each joint (n, 3), from the `variance`
         (n,) of a fit nearby.
         """
         each = np.broadcast_to(gravity, (self.rows.n_joints, 3))
-        variance = np.ones(len(each)) if variance is None else variance
+        variance = self.alone if variance is None else variance
         for _ in range(_ROUNDS):
             parts = self._parts(each, 1.0 / variance)
             normal = sum((t.T @ g[:-1, :-1] @ t for t, g in parts), np.zeros(()))
             right = sum((t.T @ g[:-1, -1] for t, g in parts), np.zeros(()))
             phi = np.linalg.solve(normal + _ridge(normal), right)
-            model = np.broadcast_to(
-                np.stack([np.append(t @ phi, -1.0) for t, _ in parts]),
-                (len(each), len(self.gram[0])),
-            )
-            left = np.einsum("jp,jp->j", model, np.matmul(self.gram, model[:, :, None])[:, :, 0])
+            model = np.stack([np.append(t @ phi, -1.0) for t, _ in parts])
+            model = np.broadcast_to(model, (len(each), model.shape[1]))
+            left = np.einsum("jp,jpq,jq->j", model, self.gram, model, optimize=True)
             before, variance = variance, np.maximum(left, 0.0) + self.model_error**2
             if np.abs(np.log(variance / before)).max() < _SETTLED:
                 break
@@ -114,6 +119,15 @@ class GravityModel:
             len(each) * LOOSE**2
         )
         return GravityFit(each, phi / self.scale, variance, np.sqrt(np.maximum(left, 0.0)), score)
+
+    def _parts(
+        self, each: Array, weights: Array, together: bool = True
+    ) -> list[tuple[Array, Array]]:
+        """Return each joint's T and weighted Gram matrix; joints of one gravity may be summed."""
+        if together and (each == each[0]).all():
+            return [(self._transform(each[0]), np.tensordot(weights, self.gram, 1))]
+        transforms = map(self._transform, each)
+        return list(zip(transforms, weights[:, None, None] * self.gram, strict=True))
 
     def _equilibrated(self, fit: GravityFit) -> Array:
         """The parameters (p,) of columns at unit length."""
@@ -136,16 +150,9 @@ class GravityModel:
             np.zeros(len(groups)),
             np.zeros(p),
         )
-        alike = bool((groups == groups[:, :1]).all() and (fit.gravity == fit.gravity[0]).all())
         weights, theta = self.effective / fit.variance, self._equilibrated(fit)
-        parts = (
-            self._parts(fit.gravity, weights)
-            if alike
-            else [
-                (self._transform(a), w * gram)
-                for a, w, gram in zip(fit.gravity, weights, self.gram, strict=True)
-            ]
-        )
+        together = bool((groups == groups[:, :1]).all())
+        parts = self._parts(fit.gravity, weights, together)
         for j, (transform, gram) in enumerate(parts):
             change = np.zeros((p + 3 * m, len(groups)))
             for k in range(3):
@@ -169,37 +176,40 @@ class GravityModel:
         )
 
     def search(self, start: Array, groups: Array) -> GravityFit:
-        """Fit the gravity as well, from `start` (n, 3), along `groups` (k, n, 3), by Levenberg-
-        Marquardt steps.
-        """
-        best, damping = self.fit(start), 1e-3
-        for _ in range(_STEPS):
-            slope, hessian = self.curvature(best, groups)
-            diagonal = np.diag(np.diag(hessian) + 1e-12 * np.trace(hessian) + 1e-300)
-            step = np.linalg.solve(hessian + damping * diagonal, slope)
-            tried = self.fit(best.gravity + np.einsum("k,kjx->jx", step, groups), best.variance)
-            if tried.score > best.score:
-                gained, best, damping = tried.score - best.score, tried, 0.1 * damping
-                if gained < _ENOUGH:
-                    break
-            else:
-                damping *= 10.0
-                if damping > 1e6:
-                    break
-        return best
+        """Fit the gravity as well, from `start` (n, 3), along `groups` (k, n, 3)."""
+
+        def stepped(fit: GravityFit, step: Array, along: Array) -> Array:
+            return np.asarray(fit.gravity + np.einsum("k,kjx->jx", step, along))
+
+        return self._climb(start, lambda _: groups, stepped)
 
     def search_direction(self, start: Array, size: float) -> GravityFit:
         """Fit the direction of a gravity of `size` [m/s^2], alike at all joints, from `start` (3,)."""
         n = self.rows.n_joints
-        best, damping = self.fit(size * start / np.linalg.norm(start)), 1e-3
+
+        def across(fit: GravityFit) -> Array:
+            return np.repeat(size * np.linalg.svd(fit.gravity[:1])[2][1:, None], n, axis=1)
+
+        def stepped(fit: GravityFit, step: Array, along: Array) -> Array:
+            turned = fit.gravity[0] + np.clip(step, -0.5, 0.5) @ along[:, 0]
+            return np.asarray(size * turned / np.linalg.norm(turned))
+
+        return self._climb(size * start / np.linalg.norm(start), across, stepped)
+
+    def _climb(
+        self,
+        start: Array,
+        groups_at: Callable[[GravityFit], Array],
+        stepped: Callable[[GravityFit, Array, Array], Array],
+    ) -> GravityFit:
+        """Climb the log likelihood by Levenberg-Marquardt steps."""
+        best, damping = self.fit(start), 1e-3
         for _ in range(_STEPS):
-            along = best.gravity[0] / size
-            groups = np.repeat(size * np.linalg.svd(along[None])[2][1:, None], n, axis=1)
+            groups = groups_at(best)
             slope, hessian = self.curvature(best, groups)
             diagonal = np.diag(np.diag(hessian) + 1e-12 * np.trace(hessian) + 1e-300)
             step = np.linalg.solve(hessian + damping * diagonal, slope)
-            turned = along + np.clip(step, -0.5, 0.5) @ groups[:, 0] / size
-            tried = self.fit(size * turned / np.linalg.norm(turned), best.variance)
+            tried = self.fit(stepped(best, np.asarray(step), groups), best.variance)
             if tried.score > best.score:
                 gained, best, damping = tried.score - best.score, tried, 0.1 * damping
                 if gained < _ENOUGH:
@@ -210,17 +220,21 @@ class GravityModel:
                     break
         return best
 
-    def rigid(self, joint: int, fit: GravityFit) -> Array:
-        """(N, p) equilibrated columns of the rigid body under the gravity of `fit`, own columns
-        projected out.
+    def pulls(self, fit: GravityFit) -> Array:
+        """Return the torque (n, N, 3) over its size of 1 m/s^2 along each axis, beyond what the
+        joints' own columns explain.
         """
-        return np.asarray(self.projected[joint, :, :-1] @ self._transform(fit.gravity[joint]))
+        n, m = self.rows.n_joints, len(self.rows.heavy)
+        p = self.rows.inertial.shape[2]
+        part = self.projected[:, :, p : p + 3 * m].reshape(n, -1, 3, m)
+        return np.asarray(part @ fit.parameters[self.rows.heavy])
 
     def residuals(self, fit: GravityFit) -> Array:
         """(n, N) the residual over the RMS of each joint's torque."""
         theta = self._equilibrated(fit)
-        return np.stack(
-            [self.projected[j, :, -1] - self.rigid(j, fit) @ theta for j in range(len(fit.gravity))]
+        models = np.stack([self._transform(gravity) @ theta for gravity in fit.gravity])
+        return np.asarray(
+            self.projected[:, :, -1] - (self.projected[:, :, :-1] @ models[:, :, None])[:, :, 0]
         )
 
 

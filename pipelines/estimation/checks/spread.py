@@ -1,9 +1,9 @@
 """Estimate the spread of a fit whose residual is correlated and partly an error of the model.
 
-    Cov = H⁻¹ (Σ_b s_b s_bᵀ) H⁻¹        s_b: score of a block of time (Liang & Zeger 1986)
+    Cov = (G-1)/G Σ_b (θ_-b - θ)(θ_-b - θ)ᵀ        θ_-b: the fit without cluster b
 
-That holds under correlation of any kind within the blocks. Where it is smaller, the variance of as
-many independent moments as the residual's correlation leaves is used instead.
+The jackknife over clusters (Bell & McCaffrey 2002) holds under correlation of any kind within them,
+and for as many parameters as clusters, for which a sandwich of scores is too small.
 """
 
 from __future__ import annotations
@@ -14,17 +14,16 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
-from pipelines.estimation.checks.torque_rows import Array
+from pipelines.estimation.checks.torque_rows import CLUSTERS, Array
 
-__all__ = ["effective_moments", "friction_spread", "gravity_spread"]
+__all__ = ["effective_moments", "gravity_spread", "jackknife"]
 
-_RIDGE = 1e-9  # of the largest eigenvalue of an equilibrated information matrix: below is rounding
-_BLOCKS = 20  # of all logs together
+_RIDGE = 1e-9  # of equilibrated columns: what is not excited gets the smallest parameters that fit
 
 
 def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
     """Return the number of independent moments (n,) of residuals (n, N), `starts` the first of
-    each log.
+    each stretch.
 
     ν = N / (1 + 2 Σ ρ_k), summed over the initial positive pairs of the autocorrelation (Geyer 1992).
     """
@@ -42,76 +41,69 @@ def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
     return np.asarray(np.maximum(total / correlation, 2.0))
 
 
-def gravity_spread(model: GravityModel, fit: GravityFit, groups: Array) -> Array:
-    """Return the covariance (k, k) of the gravity's changes along `groups` (k, n, 3), all else
-    fitted with it.
-    """
-    k = len(groups)
-    designs = [
-        np.concatenate([_pulls(model, fit, j) @ groups[:, j].T, model.rigid(j, fit)], axis=1)
-        for j in range(len(fit.gravity))
-    ]
-    prior = np.zeros((designs[0].shape[1],) * 2)
-    flat = groups.reshape(k, -1)
-    prior[:k, :k] = flat @ flat.T / (len(fit.gravity) * LOOSE**2)
-    _, covariance = _clustered(model, fit, designs, list(model.residuals(fit)), prior)
-    return covariance[:k, :k]
+def gravity_spread(
+    model: GravityModel, fit: GravityFit, groups: Array
+) -> tuple[Array, Array, Array]:
+    """Return the spread of the gravity along `groups` (k, n, 3) and of the own coefficients, all
+    fitted together.
 
-
-def friction_spread(model: GravityModel, fit: GravityFit) -> tuple[Array, Array]:
-    """Return the own coefficients (n, c) of all joints and their covariance (n c, n c), the gravity
-    that of `fit`.
+    Returns:
+        covariance (k, k) of the gravity's changes; own coefficients (n, c) and their covariance
+        (n c, n c).
     """
     rows = model.rows
     n, moments, p = rows.inertial.shape
-    c = rows.own.shape[2]
-    designs = []
+    c, k = rows.own.shape[2], len(groups)
+    width = k + p + n * c
+    gram, right = np.zeros((CLUSTERS, width, width)), np.zeros((CLUSTERS, width))
+    naive = np.zeros((width, width))
+    flat = groups.reshape(k, -1)
+    prior = np.zeros((width, width))
+    prior[:k, :k] = flat @ flat.T / (n * LOOSE**2)
+    own = slice(k + p, width)  # before any data no law of friction exceeds a joint's torque
+    laws = rows.own_rms * (rows.dissipated != 0.0) / model.size[:, None]
+    prior[own, own] = np.diag(laws.ravel() ** 2)
+    pulls = rows.gravity @ fit.parameters[rows.heavy]  # (n, N, 3)
     for j in range(n):
-        design = np.zeros((moments, p + n * c))
-        design[:, :p] = rows.inertial[j]
-        design[:, rows.heavy] += np.einsum("k,nkm->nm", fit.gravity[j], rows.gravity[j])
-        design[:, p + j * c : p + (j + 1) * c] = rows.own[j]
-        designs.append(design / model.size[j])
-    theta, covariance = _clustered(
-        model, fit, designs, [rows.tau[j] / model.size[j] for j in range(n)]
-    )
-    return theta[p:].reshape(n, c), covariance[p:, p:]
+        rigid = rows.inertial[j].copy()
+        rigid[:, rows.heavy] += np.einsum("k,nkm->nm", fit.gravity[j], rows.gravity[j])
+        design = np.concatenate([pulls[j] @ groups[:, j].T, rigid, rows.own[j]], axis=1)
+        design = design / (model.size[j] * np.sqrt(fit.variance[j]))
+        target = rows.tau[j] / (model.size[j] * np.sqrt(fit.variance[j]))
+        at = np.r_[0 : k + p, k + p + j * c : k + p + (j + 1) * c]
+        for b in range(CLUSTERS):
+            part = design[rows.cluster == b]
+            gram[b][np.ix_(at, at)] += part.T @ part
+            right[b][at] += part.T @ target[rows.cluster == b]
+        power = fit.residual[j] ** 2 / fit.variance[j]
+        naive[np.ix_(at, at)] += design.T @ design * power * moments / model.effective[j]
+    theta, covariance = jackknife(gram, right, prior, naive)
+    return covariance[:k, :k], theta[own].reshape(n, c), covariance[own, own]
 
 
-def _pulls(model: GravityModel, fit: GravityFit, joint: int) -> Array:
-    """(N, 3) torque of 1 m/s^2 along each axis, beyond what the joint's own columns explain."""
-    p, m = model.rows.inertial.shape[2], len(model.rows.heavy)
-    part = model.projected[joint, :, p : p + 3 * m].reshape(-1, 3, m)
-    return np.asarray(part @ fit.parameters[model.rows.heavy])
-
-
-def _clustered(
-    model: GravityModel,
-    fit: GravityFit,
-    designs: list[Array],
-    targets: list[Array],
-    prior: Array | float = 0.0,
+def jackknife(
+    gram: Array, right: Array, prior: Array, naive: Array | None = None
 ) -> tuple[Array, Array]:
-    """Weighted least squares over all joints, and its covariance."""
-    width, moments = designs[0].shape[1], designs[0].shape[0]
-    normal, naive = np.zeros((width, width)) + prior, np.zeros((width, width)) + prior
-    right = np.zeros(width)
-    for j, design in enumerate(designs):
-        gram = design.T @ design / fit.variance[j]
-        normal += gram
-        naive += gram * moments / model.effective[j]
-        right += design.T @ targets[j] / fit.variance[j]
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12 * np.max(np.diag(normal))))
-    values, vectors = np.linalg.eigh(normal / np.outer(scale, scale))
-    half = vectors / np.sqrt(np.maximum(values, _RIDGE * values[-1])) / scale[:, None]
-    inverse = half @ half.T
-    theta = inverse @ right
-    scores = np.zeros((_BLOCKS, width))
-    edges = np.linspace(0, moments, _BLOCKS + 1).astype(int)[:-1]
-    for j, design in enumerate(designs):
-        left = (targets[j] - design @ theta) / fit.variance[j]
-        scores += np.add.reduceat(design * left[:, None], edges, axis=0)
-    root = scores @ inverse * np.sqrt(_BLOCKS / (_BLOCKS - 1.0))
-    clustered, plain = root.T @ root, inverse @ naive @ inverse
-    ratio = np.sqrt(np.maximum(np.diag(plain) / np.maximum(np.diag(clustered), 1e-300), 1.0))
-    return theta, clustered * np.outer(ratio, ratio)
+    """Return the weighted least squares fit (w,) and its covariance (w, w).
+
+    Args:
+        gram: (G, w, w) normal matrix of each cluster.
+        right: (G, w) its right-hand side.
+        prior: (w, w) precision before any data, of zero mean.
+        naive: (w, w) of the scores, by the number of independent moments: the covariance is no
+            smaller than by it.
+    """
+    normal = gram.sum(axis=0) + prior
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-12 * np.max(np.diag(normal), initial=1e-300)))
+    ridge = np.diag(_RIDGE * scale**2)
+    theta = np.linalg.solve(normal + ridge, right.sum(axis=0))
+    without = normal[None] - gram + ridge
+    change = np.linalg.solve(without, (gram @ theta - right)[:, :, None])[:, :, 0]
+    count = len(gram)
+    covariance = (count - 1.0) / count * change.T @ change
+    inverse = np.linalg.inv(normal + ridge)
+    if naive is not None:
+        plain = inverse @ naive @ inverse
+        ratio = np.sqrt(np.maximum(np.diag(plain) / np.maximum(np.diag(covariance), 1e-300), 1.0))
+        covariance = covariance * np.outer(ratio, ratio)
+    return theta, covariance + inverse @ (prior @ inverse)

@@ -5,35 +5,52 @@
 The regressor is linear in the gravity vector a [m/s^2] (Atkeson, An & Hollerbach 1986, eq. (9)):
 Y_0 is the regressor without gravity, Y_k what a gravity of 1 m/s^2 along axis k adds. φ are the
 base parameters of the arm under gravity from anywhere, F the columns that a joint has for itself:
-rotor inertia, friction and an offset.
+rotor inertia, a smooth law of friction, and an offset.
+
+Accelerations of a log are noisy, and noise in a column makes its parameter too small: a link that
+seems lighter makes gravity seem larger. Columns and torque therefore pass through one low-pass
+filter, which keeps the equation exact (Gautier 1997, "parallel decimation").
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.base import base_set
-from pipelines.model.rigid.chain import inverse_dynamics, regressor
+from pipelines.model.rigid.chain import regressor
 from pipelines.model.rigid.geometry import SerialChain, serial_chain
 from pipelines.model.row_fit import Sampled
 
-__all__ = ["FRICTION", "Array", "Order", "TorqueRows", "generic_arm", "torque_rows"]
+__all__ = [
+    "CLUSTERS",
+    "Array",
+    "GenericArm",
+    "Order",
+    "RowFilter",
+    "TorqueRows",
+    "generic_arm",
+    "own_columns",
+    "thinned",
+    "torque_rows",
+]
 
 Array = npt.NDArray[np.float64]
 Order = tuple[int, ...]
 
-_ELSEWHERE = np.array(
-    [3.1, -5.3, 7.7]
-)  # [m/s^2] a gravity along no axis: every parameter that any gravity shows is then seen
+_ELSEWHERE = np.array([3.1, -5.3, 7.7])  # [m/s^2] along no axis: shows all that any gravity shows
 _SEED = 20040509
-FRICTION = slice(
-    1, 5
-)  # of the own columns: Coulomb, viscous, viscous quadratic, Coulomb in proportion to the load
+_PERIODS = 0.25  # of the motion's mean period: length of the filter, which then keeps 4 harmonics
+_OVERLAP = 6  # moments that are kept within the length of the filter: no aliasing
+_WIDTHS = (0.05, 0.15, 0.5)  # of a joint's RMS speed: where laws of friction bend
+CLUSTERS = 20  # of all moments together
+_APART, _AGAIN = 0.3, 0.02  # of twice the variance: a motion has moved on, and is back
+_RIDGE = 1e-6  # of equilibrated columns, for a first estimate of the load alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,19 +61,15 @@ class TorqueRows:
     gravity: Array  # Y_k (n, N, 3, m) [per m/s^2]
     heavy: npt.NDArray[np.intp]  # (m,) indices of the parameters on which gravity acts
     own: Array  # F (n, N, c): rotor inertia, friction, offset
-    # (n, p) mean columns of each joint's torque at an acceleration of one of that joint, without
-    # gravity
-    unit: Array
+    dissipated: Array  # (n, c) <F v> / (rms τ · rms v): power of each friction column; else 0
+    own_rms: Array  # (n, c) RMS of the own columns before the filter
     tau: Array  # (n, N) [N m]
-    start: npt.NDArray[np.intp]  # first moment of each log
+    start: npt.NDArray[np.intp]  # first moment of each stretch of even samples
+    cluster: npt.NDArray[np.intp]  # (N,) moments of one cluster share the model's error
 
     @property
     def n_joints(self) -> int:
         return int(self.tau.shape[0])
-
-    @property
-    def moments(self) -> int:
-        return int(self.tau.shape[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +84,8 @@ class GenericArm:
 def generic_arm(robot: RobotDescription) -> GenericArm:
     """Return the geometry and the base parameters of `robot` under gravity from anywhere."""
     chain = serial_chain(robot)
-    found = base_set(replace(chain, gravity=_ELSEWHERE), np.random.default_rng(_SEED))
-    return GenericArm(replace(chain, gravity=np.zeros(3)), found.chosen, found.combine)
+    base = base_set(replace(chain, gravity=_ELSEWHERE), np.random.default_rng(_SEED))
+    return GenericArm(replace(chain, gravity=np.zeros(3)), base.chosen, base.combine)
 
 
 def torque_rows(
@@ -94,40 +107,140 @@ def torque_rows(
         for name in ("q", "dq", "ddq", "coulomb")
     )
     tau = np.concatenate([motion.tau[:, of_tau] for motion in motions])
-    inertial = regressor(arm.chain, q, dq, ddq, arm.columns).transpose(1, 0, 2)
     heavy = np.array([k for k, column in enumerate(arm.columns) if column % 10 < 4], dtype=int)
+    inertial = regressor(arm.chain, q, dq, ddq, arm.columns)
     still = np.zeros_like(q)
-    pulled = [
-        regressor(
-            replace(arm.chain, gravity=axis), q, still, still, [arm.columns[k] for k in heavy]
-        )
-        for axis in np.eye(3)
+    masses = [arm.columns[k] for k in heavy]
+    pulled = [regressor(replace(arm.chain, gravity=a), q, still, still, masses) for a in np.eye(3)]
+    rigid = np.concatenate([inertial, *pulled], axis=2).transpose(1, 0, 2)
+    smooth = RowFilter(motions)
+    own = own_columns(dq, ddq, coulomb)
+    torque = smooth(tau.T[:, :, None])[:, :, 0]
+    slow = smooth(rigid)
+    load = _load(slow, smooth(own), torque, rigid)
+    friction = np.abs(load) * coulomb.T  # of gears, in proportion to the load
+    own = np.concatenate([own[:, :, :-1], friction[:, :, None], own[:, :, -1:]], axis=2)
+    dissipated = np.einsum("jnc,nj->jc", own, dq) / len(dq)
+    own_rms = np.sqrt(np.mean(own**2, axis=1))
+    scale = np.sqrt(np.mean(dq**2, axis=0) * np.mean(tau**2, axis=0))
+    dissipated = dissipated / np.where(scale > 0.0, scale, np.inf)[:, None]
+    dissipated[:, [0, -1]] = 0.0
+    p = len(arm.columns)
+    moments = torque.shape[1]
+    return TorqueRows(
+        slow[:, :, :p],
+        slow[:, :, p:].reshape(n, moments, 3, len(heavy)),
+        heavy,
+        smooth(own),
+        dissipated,
+        own_rms,
+        torque,
+        smooth.start,
+        smooth.clusters(q),
+    )
+
+
+def own_columns(dq: Array, ddq: Array, coulomb: Array) -> Array:
+    """Return the columns (n, N, c) of rotor inertia, friction in speed, and offset."""
+    size = np.sqrt(np.mean(dq**2, axis=0))
+    size = np.where(size > 0.0, size, 1.0)
+    laws = [coulomb, *(np.tanh(dq / (width * size)) for width in _WIDTHS), dq, dq * np.abs(dq)]
+    return np.stack([ddq, *laws, np.ones_like(dq)], axis=-1).transpose(1, 0, 2)
+
+
+def thinned(motions: Sequence[Sampled], moments: int) -> list[Sampled]:
+    """Return `motions` at every k-th moment, about `moments` of all together."""
+    step = max(1, sum(len(motion.t) for motion in motions) // moments)
+    names = ("t", "q", "dq", "ddq", "coulomb", "at")
+    return [
+        replace(motion, **{name: getattr(motion, name)[::step] for name in names})
+        for motion in motions
     ]
-    gravity = np.stack(pulled, axis=-2).transpose(1, 0, 2, 3)
-    load = np.abs(tau)
-    own = np.stack(
-        [ddq, coulomb, dq, dq * np.abs(dq), coulomb * load, np.ones_like(q)], axis=-1
-    ).transpose(1, 0, 2)
-    some = slice(None, None, max(1, len(q) // 100))
-    unit = np.stack(
-        [
-            regressor(arm.chain, q[some], still[some], still[some] + np.eye(n)[j], arm.columns)[
-                :, j
-            ].mean(axis=0)
-            for j in range(n)
-        ]
-    )
-    first = np.cumsum([0, *(len(motion.t) for motion in motions)])[:-1]
-    return TorqueRows(inertial, gravity, heavy, own, unit, tau.T.copy(), first)
 
 
-def described_torque(
-    arm: GenericArm, rows_of: Sequence[Sampled], standard: Array, gravity: Array
-) -> Array:
-    """Return the torque (N, n) of known standard parameters (10 · links,) under `gravity` (3,)
-    [m/s^2].
+def _load(slow: Array, own: Array, torque: Array, rigid: Array) -> Array:
+    """Return the torque (n, N) of the rigid body as each joint's own row has it, without friction.
+
+    The logged torque cannot stand for it: it contains the friction that is to be explained.
     """
-    q, dq, ddq = (
-        np.concatenate([getattr(motion, name) for motion in rows_of]) for name in ("q", "dq", "ddq")
-    )
-    return inverse_dynamics(arm.chain, q, dq, ddq, standard, gravity)
+    design = np.concatenate([slow, own], axis=2)
+    scale = np.linalg.norm(design, axis=1, keepdims=True)
+    design = design / np.where(scale > 0.0, scale, 1.0)
+    normal = design.transpose(0, 2, 1) @ design + _RIDGE * np.eye(design.shape[2])
+    fit = np.linalg.solve(normal, design.transpose(0, 2, 1) @ torque[:, :, None])
+    weight = fit / np.where(scale > 0.0, scale, 1.0).transpose(0, 2, 1)
+    return np.asarray((rigid @ weight[:, : rigid.shape[2]])[:, :, 0])
+
+
+class RowFilter:
+    """A Hann window over a part of the motion's period, stretch by stretch."""
+
+    def __init__(self, motions: Sequence[Sampled]) -> None:
+        self.edges: list[tuple[int, int]] = []
+        spacing, done = [], 0
+        for motion in motions:
+            step = float(np.median(np.diff(motion.t)))
+            cuts = 1 + np.flatnonzero(np.abs(np.diff(motion.t) - step) > 0.5 * step)
+            bounds = [done, *(done + cuts).tolist(), done + len(motion.t)]
+            self.edges += list(pairwise(bounds))
+            spacing.append(step)
+            done += len(motion.t)
+        self.spacing = float(np.median(spacing))
+        rates = [
+            np.sqrt(np.mean(motion.dq**2, axis=0)) / np.maximum(np.std(motion.q, axis=0), 1e-12)
+            for motion in motions
+        ]
+        period = 2.0 * np.pi / max(float(np.max(rates)), 1e-12)
+        wanted = min(_PERIODS * period / self.spacing, 0.1 * max(b - a for a, b in self.edges))
+        self.step = max(1, int(wanted / _OVERLAP))
+        self.steps = max(1, min(int(wanted), _OVERLAP))  # within the length of the window
+        length = self.step * self.steps
+        self.edges = [edge for edge in self.edges if edge[1] - edge[0] >= length]
+        window = np.sin(np.pi * (np.arange(length) + 0.5) / length) ** 2
+        self.window = (window / window.sum()).reshape(self.steps, self.step)
+        self.count = [(b - a - length) // self.step + 1 for a, b in self.edges]
+        self.start = np.cumsum([0, *self.count])[:-1]
+
+    def __call__(self, columns: Array) -> Array:
+        """Return `columns` (n, N_all, k) filtered and thinned: (n, N, k)."""
+        outputs = []
+        for (a, _), count in zip(self.edges, self.count, strict=True):
+            blocks = count + self.steps - 1
+            part = columns[:, a : a + blocks * self.step]
+            shape = (len(columns), blocks, self.step, columns.shape[2])
+            sums = self.window @ part.reshape(shape)
+            outputs.append(sum(sums[:, k : k + count, k] for k in range(self.steps)))
+        return np.concatenate(outputs, axis=1)
+
+    def clusters(self, q: Array) -> npt.NDArray[np.intp]:
+        """Return the cluster (N,) of each moment: of equal stretches of time, or of the phase.
+
+        A model errs alike each time that a motion is repeated: a period counts once.
+        """
+        slow = self(q.T[:, :, None])[:, :, 0]
+        total = slow.shape[1]
+        k = int(np.argmax(self.count))
+        period = _period(slow[:, self.start[k] : self.start[k] + self.count[k]])
+        if period is None:
+            return np.asarray(np.arange(total) * CLUSTERS // total)
+        place = np.concatenate([np.arange(count) for count in self.count])
+        return np.asarray(((place % period) * CLUSTERS / period).astype(int))
+
+
+def _period(q: Array) -> float | None:
+    """Return after how many moments the motion q (n, N) repeats; None where it does not."""
+    moments = q.shape[1]
+    power = np.maximum(2.0 * np.var(q, axis=1), 1e-300)
+    apart = [
+        float(np.mean(np.mean((q[:, lag:] - q[:, :-lag]) ** 2, axis=1) / power))
+        for lag in range(1, 2 * moments // 3)
+    ]
+    left = np.flatnonzero(np.array(apart) > _APART)
+    if not left.size:
+        return None
+    back = np.flatnonzero(np.array(apart[left[0] :]) < _AGAIN)
+    if not back.size:
+        return None
+    first = left[0] + int(back[0])
+    near = slice(first, first + _OVERLAP)
+    return float(1 + first + int(np.argmin(apart[near])))

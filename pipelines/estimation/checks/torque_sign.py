@@ -19,6 +19,8 @@ from pipelines.log.order_statistics import median
 __all__ = ["touches_of_zero"]
 
 _NEAR, _FAR = 0.03, 0.3  # of the RMS: at zero, and away from it again
+_SHORT = 8  # samples: a shorter run tells neither noise nor motion
+_BELOW = 0.1  # of the samples at zero: a magnitude has none below it
 _STANDING = 0.05  # of its RMS: a joint that is slower may stand, held by its brake
 
 
@@ -40,21 +42,20 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
     size = np.sqrt(np.nanmean(np.concatenate([tau for tau, _ in parts]) ** 2)) if parts else 0.0
     count = 0
     for tau, q in parts:
+        if tau.size < _SHORT:
+            continue
         speed = np.abs(np.gradient(q))
         moving = speed > _STANDING * np.sqrt(np.nanmean(speed**2))
-        # Of white noise the second difference has six times the variance (Hampel 1974 for the
-        # median deviation).
-
-        noise = (
-            1.4826 * _finite_median(np.abs(np.diff(tau, 2))) / np.sqrt(6.0)
-            if tau.size > 2
-            else 0.0
-        )
-        if np.nansum(tau < -max(config.no_negative * noise, 1e-6 * size)) > max(
-            2.0, 1e-3 * tau.size
-        ):
+        # of white noise the second difference has six times the variance
+        noise = 1.4826 * _finite_median(np.abs(np.diff(tau, 2))) / np.sqrt(6.0)
+        level = config.no_negative * noise
+        if np.nansum(tau < -max(level, 1e-6 * size)) > max(2.0, 1e-3 * tau.size):
             return None
-        near = tau < max(_NEAR * size, config.no_negative * noise)
+        # a magnitude is reflected at zero: it arrives there within one step of its own
+        step = np.abs(np.diff(tau, prepend=tau[:1]))
+        near = tau < np.maximum(np.minimum(step, _NEAR * size), level)
+        if near.any() and np.mean(tau[near] < 0.0) > _BELOW:
+            return None
         state = np.where(near & moving, 1, np.where(tau > _FAR * size, -1, 0))
         state = state[state != 0]
         count += int(np.sum((state[1:] == 1) & (state[:-1] == -1)))
