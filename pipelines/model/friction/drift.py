@@ -25,6 +25,7 @@ __all__ = ["DriftConfig", "drift_of"]
 
 _FORMS = ("whole", "viscous", "coulomb")
 _PULLED = 1e-3  # the least that 1 - leverage may be
+_ROUNDS = 4
 Index = npt.NDArray[np.intp]
 
 _RANK = 1e-7  # singular values of unit columns below it: two columns that are one
@@ -38,40 +39,66 @@ class DriftConfig:
     block: float = 1.0  # [s] of rows whose errors may depend on one another
     fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
-    steps: int = 40  # instants of a step that are tried
     ends: float = 0.08  # of all rows, that lie before and after a step
     times: tuple[float, ...] = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 5.0)  # over the duration; 5: straight
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
 
 
-def drift_of(stretches: Sequence[Stretch], y: Array, known: Array, config: DriftConfig) -> Course | None:
+def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> Course | None:
     """The course of friction that rows show beyond chance; None where they show none.
 
     Args:
         stretches: whose rows these are; they slide.
         y: (rows,) mean torque [N m].
-        known: (rows, columns) of all that is beside the drift: inertia, gravity, and a curve of friction, free or fitted.
+        rigid: (rows, columns) of inertia, gravity and whatever else is no friction.
+        curve: (rows, columns) of a free curve of friction.
     """
     speed, t = (np.concatenate([stretch.middle[k] for stretch in stretches]) for k in (1, 2))
     log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])
+    known = np.hstack([rigid, curve])
     basis = _basis(known)
-    left = y - basis @ (basis.T @ y)
     blocks = _blocks(t, log, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
         return None
-    side = np.stack([np.sign(speed), speed], axis=1)
-    level = np.linalg.lstsq(side, y, rcond=None)[0]
-    shapes = {"whole": side @ level, "viscous": speed, "coulomb": np.sign(speed)}
-    courses = [*_trends(stretches, config), *_steps(stretches, t, log, config)]
-    columns = [_outside(course, stretches, shapes[course.form], basis) for course in courses]
-    rests = [_rest(one, left) for one in columns]
-    best = int(np.argmin(rests))
-    own = columns[best]
-    gains = np.log(_held_out(basis, y, blocks) / _held_out(np.hstack([basis, _basis(own)]), y, blocks))
-    change = np.linalg.lstsq(own, left, rcond=_RANK)[0]
-    size = abs(courses[best].whole) * float(np.median(np.abs(shapes[courses[best].form] * change)))
-    large = size >= config.least * float(np.median(np.abs(shapes["whole"])))
-    return courses[best] if large and by_flips(gains) <= config.chance else None
+    trends = _trends(stretches, config)
+    found = [_best(kind, form, stretches, y, known, curve, basis, speed, trends, config)
+             for kind in ("trend", "step") for form in _FORMS]
+    course, own, change, _ = min(found, key=lambda one: one[3])
+    gains = np.log(_held_out(basis, y, blocks) / _held_out(_basis(np.column_stack([known, own])), y, blocks))
+    whole = curve @ _least(np.column_stack([known, own]), y)[rigid.shape[1]:-1]
+    size = float(np.median(np.abs(own[own != 0.0] * change))) if course.kind == "step" else float(np.ptp(own * change / whole))
+    large = size >= config.least * (float(np.median(np.abs(whole))) if course.kind == "step" else 1.0)
+    return course if large and by_flips(gains) <= config.chance else None
+
+
+def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: Array, curve: Array, basis: Array,
+          speed: Array, trends: Sequence[Course], config: DriftConfig) -> tuple[Course, Array, float, float]:
+    """The course of this kind and form that leaves least, its column (rows,), its factor, and the sum of squares it leaves.
+
+    The curve that changes as a whole is itself fitted: scan, fit, scan again.
+    """
+    left = y - basis @ (basis.T @ y)
+    shape = speed if form == "viscous" else np.sign(speed)
+    beta = _least(known, y)
+    for _ in range(_ROUNDS if form == "whole" else 1):
+        if form == "whole":
+            shape = curve @ beta[known.shape[1] - curve.shape[1]:known.shape[1]]
+        if kind == "step":
+            course = _step(stretches, form, shape, basis, left, config)[0]
+        else:
+            course = max((one for one in trends if one.form == form),
+                         key=lambda one: _gain(_outside(one, stretches, shape, basis), left))
+        own = np.concatenate([course.at(part, stretch.middle[2]) for part, stretch in enumerate(stretches)]) * shape
+        columns = np.column_stack([known, own])
+        beta = _least(columns, y)
+    return course, own, float(beta[-1]), float(np.square(y - columns @ beta).sum())
+
+
+def _least(columns: Array, y: Array) -> Array:
+    """Least squares over columns of unit length."""
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    return np.asarray(np.linalg.lstsq(columns / scale, y, rcond=_RANK)[0] / scale)
 
 
 def _outside(course: Course, stretches: Sequence[Stretch], shape: Array, basis: Array) -> Array:
@@ -81,10 +108,9 @@ def _outside(course: Course, stretches: Sequence[Stretch], shape: Array, basis: 
     return np.asarray(columns - basis @ (basis.T @ columns))
 
 
-def _rest(columns: Array, left: Array) -> float:
-    """Sum of squares that is left."""
-    own = _basis(columns)
-    return float(left @ left - np.square(own.T @ left).sum())
+def _gain(column: Array, left: Array) -> float:
+    """What a column (rows, 1) takes off the sum of squares."""
+    return float(np.square(column[:, 0] @ left) / max(float(np.square(column).sum()), 1e-300))
 
 
 def _basis(columns: Array) -> Array:
@@ -117,10 +143,20 @@ def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
     return [Course("trend", form, starts, share * duration, 0.5 * duration, duration) for share in config.times for form in _FORMS]
 
 
-def _steps(stretches: Sequence[Stretch], t: Array, log: Index, config: DriftConfig) -> list[Course]:
-    """Steps between rows; a step lasts until the end of the last log."""
+def _step(stretches: Sequence[Stretch], form: str, shape: Array, basis: Array, left: Array,
+          config: DriftConfig) -> tuple[Course, float]:
+    """The instant between two rows from which a step of `shape` (rows,) explains most, and how much (Andrews 1993, sup F).
+
+    A step's column is g from some row on. Its products with any other column are sums from that row to the last.
+    """
+    t = np.concatenate([stretch.middle[2] for stretch in stretches])
+    log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])
+    after = np.cumsum((shape[:, None] * np.column_stack([left, shape, basis]))[::-1], axis=0)[::-1]
+    outside = np.maximum(after[:, 1] - np.square(after[:, 2:]).sum(axis=1), _RANK * after[0, 1])
+    rows = np.arange(max(1, int(config.ends * len(t))), int((1.0 - config.ends) * len(t)))
+    gains = np.square(after[rows, 0]) / outside[rows]
+    row = int(rows[np.argmax(gains)])
+    before, here = int(log[row - 1]), int(log[row])
     starts = tuple(float(stretch.t[0]) for stretch in stretches)
-    rows = np.unique(np.linspace(config.ends * len(t), (1.0 - config.ends) * (len(t) - 1), config.steps).astype(np.intp))
-    since = [float(t[row] - starts[log[row]]) for row in rows]
-    return [Course("step", form, starts, when, 0.0, when, int(log[row]))
-            for row, when in zip(rows, since, strict=True) for form in _FORMS]
+    when = 0.5 * float(t[row - 1] + t[row]) - starts[here] if before == here else 0.0
+    return Course("step", form, starts, when, 0.0, when, here), float(gains.max())

@@ -37,6 +37,8 @@ from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["JointFit", "JointLogs", "Seen", "fit_joint", "fractions", "with_fit"]
 
+LAGMIN = 1e-3
+_COURSES = 5
 _CURVE = 100  # points of a curve, each way
 _MEMORY = 1.0  # [s] over which errors of a law may depend on one another
 _ROUNDS = 2  # of refining before laws are compared
@@ -107,7 +109,7 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
     course = _course(stretches, rows, arm, config, DriftConfig())
-    stretches = _along(stretches, course, fit)
+    stretches, fit, course = _with_course(stretches, rows.fitted, course, fit, arm)
     identify, validate = stretches[:rows.fitted], stretches[rows.fitted:]
     judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
     sticks = any(stretch.sticks is not None for stretch in identify)
@@ -116,8 +118,10 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     chosen = ladder.chosen.fit
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
-    identify, validate = (_along(part, course, chosen) for part in (identify, validate))
-    final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+    for _ in range(_COURSES if course is not None else 1):
+        identify, validate = (_along(part, course, chosen) for part in (identify, validate))
+        final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+        course, chosen = _next(course, final), final
     if sticks:
         final = _with_errors_in_variables(replace(final, found=with_block_covariance(final.found, _blocks(identify))),
                                           rows.sliding.attenuation)
@@ -170,7 +174,7 @@ def _usable_rows(logs: JointLogs, window: float, beside: tuple[int, ...], arm: O
 def _about_a_flexible_law(stretches: tuple[Stretch, ...], fitted: int, arm: OneJoint,
                           resolution: float) -> tuple[tuple[Stretch, ...], LawFit]:
     """The motion refined about a law that follows any curve, and that law."""
-    flexible = law_named(_FLEXIBLE) or LADDER[-1]
+    flexible = Law("flexible", ("three_sigmoid", "asymmetric_friction"))
     fit = fit_law(LawEquations.of(stretches[:fitted], arm), flexible)
     for _ in range(_ROUNDS):
         before, stretches = fit, tuple(refined(stretch, fit, resolution) for stretch in stretches)
@@ -195,18 +199,45 @@ def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: 
         stretches = left_out(stretches, slides)
     fitted = stretches[:rows.fitted]
     equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
-    return drift_of(fitted, equations.y, np.hstack([equations.fixed, free_curve(speed, config)]), drift)
+    return drift_of(fitted, equations.y, equations.fixed, free_curve(speed, config), drift)
+
+
+def _with_course(stretches, fitted, course, fit, arm):
+    for _ in range(_COURSES if course is not None else 1):
+        stretches = _along(stretches, course, fit)
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, [fit.theta])
+        course = _next(course, fit)
+    return _along(stretches, course, fit), fit, course
 
 
 def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -> tuple[Stretch, ...]:
     """The stretches with columns of `course`, a change of the curve of `fit`."""
-    if course is None or not stretches:
+    if not stretches:
         return stretches
-    fastest = max(float(np.abs(stretch.dq).max()) for stretch in stretches)
-    side = fastest * np.geomspace(1e-4, 1.0, _CURVE)
+    rows = np.abs(np.concatenate([stretch.middle[1] for stretch in stretches]))
+    fastest, slowest = float(max(np.abs(stretch.dq).max() for stretch in stretches)), max(float(rows.min()), 1e-3 * float(rows.max()))
+    side = np.geomspace(slowest, fastest, _CURVE)
     speed = np.concatenate([-side[::-1], side])
-    own = replace(course, curve=(speed, fit.curve(speed)))
-    return tuple(replace(stretch, course=own) for stretch in stretches)
+    curve = fit.curve(speed)
+    slope = np.where(speed > 0.0, curve[-1] - curve[-10], curve[9] - curve[0]) / (side[-1] - side[-10])
+    bent = curve - slope * speed
+    half = len(side)
+    lag = None
+    if max(np.ptp(bent[:half]), np.ptp(bent[half:])) > LAGMIN * np.abs(curve).max() and any(stretch.sticks is not None for stretch in stretches):
+        lag = (speed, bent)
+    own = None if course is None else replace(course, curve=(speed, curve))
+    return tuple(replace(stretch, course=own, lag=lag) for stretch in stretches)
+
+
+def _next(course: Course | None, fit: LawFit) -> Course | None:
+    """The course with the time constant of a fit, one step of Gauss and Newton on."""
+    if course is None or course.kind == "step":
+        return course
+    last = fit.found.beta[fit.rigid_size - (2 if course.change != 0.0 else 1):fit.rigid_size]
+    if len(last) == 1:
+        return replace(course, change=float(last[0]))
+    time = float(np.clip(course.time * np.exp(np.clip(last[1], -0.5, 0.5)), 0.05 * course.until, 10.0 * course.until))
+    return replace(course, change=float(last[0]), time=time)
 
 
 def _with_errors_in_variables(fit: LawFit, attenuation: float) -> LawFit:

@@ -272,8 +272,9 @@ def drift_of_joint(joint: JointFit) -> Drift | None:
     speed = 0.5 * joint.covered.fastest
     level = float(np.mean(np.abs(fit.curve(np.array([speed, -speed])))))
     own = joint.stretches[0].course or course
-    share = course.whole * float(np.mean(np.abs(own.shape(np.array([speed, -speed]))))) / level
-    change = Value(share * float(fit.found.beta[fit.rigid_size - 1]), abs(share) * float(fit.std[fit.rigid_size - 1]), "1")
+    share = float(np.mean(np.abs(own.shape(np.array([speed, -speed]))))) / level
+    place = fit.rigid_size - (2 if own.change != 0.0 else 1)
+    change = Value(share * float(fit.found.beta[place]), abs(share) * float(fit.std[place]), "1")
     return Drift(course.kind, course.form, course.time, change, speed, course.holds, joint.stretches[course.part].name)
 
 
