@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from pipelines.fit.equations import Array
 
-__all__ = ["Linear", "Separable", "SeparableFit", "fit_separable", "linear_part", "scan", "search",
+__all__ = ["Linear", "Separable", "SeparableFit", "fit_separable", "held_out", "linear_part", "scan", "search",
            "with_block_covariance"]
 
 _RANK = 1e-5  # singular values of unit columns below it: two columns that are one to within what any log can tell
@@ -220,16 +220,26 @@ def with_block_covariance(found: SeparableFit, blocks: npt.NDArray[np.intp]) -> 
     """
     scale = np.linalg.norm(found.jacobian, axis=0)
     scale = np.where(scale > 0.0, scale, np.inf)
-    unit = found.jacobian / scale
-    values, vectors = np.linalg.eigh(unit.T @ unit)
-    kept = values > _RANK**2 * values[-1]
-    turn = vectors[:, kept] / np.sqrt(values[kept])
-    basis, count = unit @ turn, int(blocks.max()) + 1
-    meat = np.zeros((basis.shape[1], basis.shape[1]))
-    for block in range(count):
-        own, rest = basis[blocks == block], found.residual[blocks == block]
-        size, axes = np.linalg.eigh(own.T @ own)
-        score = axes @ ((axes.T @ (own.T @ rest)) / np.maximum(1.0 - size, _PULLED))
-        meat += np.outer(score, score)
+    turn = _root((found.jacobian / scale).T @ (found.jacobian / scale))
+    basis = found.jacobian / scale @ turn
+    rest = held_out(basis, found.residual, blocks)
+    sums = np.zeros((int(blocks.max()) + 1, basis.shape[1]))
+    np.add.at(sums, blocks, basis * rest[:, None])
     back = turn / scale[:, None]
-    return replace(found, covariance=back @ meat @ back.T * (count - 1.0) / count)
+    return replace(found, covariance=back @ (sums.T @ sums) @ back.T * (len(sums) - 1.0) / len(sums))
+
+
+def held_out(basis: Array, residual: Array, blocks: npt.NDArray[np.intp]) -> Array:
+    """The residual (m,) of every block of rows as the other blocks predict it: (I - U_b U_bᵀ)⁻¹ r_b.
+
+    Args:
+        basis: (m, k) orthonormal columns U of the same space as the regressors.
+        residual: (m,) of least squares over all rows.
+        blocks: (m,) number of the block of every row, from 0.
+    """
+    rest = residual.copy()
+    for block in range(int(blocks.max()) + 1):
+        own = basis[blocks == block]
+        size, axes = np.linalg.eigh(own.T @ own)
+        rest[blocks == block] += own @ (axes @ ((axes.T @ (own.T @ residual[blocks == block])) / np.maximum(1.0 - size, _PULLED)))
+    return rest

@@ -18,13 +18,13 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.flips import by_flips
+from pipelines.fit.varpro import held_out
 from pipelines.model.friction.weak_form import Course, Stretch
 from pipelines.model.rigid.body import Array
 
 __all__ = ["DriftConfig", "drift_of"]
 
 _FORMS = ("whole", "viscous", "coulomb")
-_PULLED = 1e-3  # the least that 1 - leverage may be
 _ROUNDS = 4
 Index = npt.NDArray[np.intp]
 
@@ -127,14 +127,9 @@ def _blocks(t: Array, log: Index, length: float) -> Index:
 
 
 def _held_out(basis: Array, y: Array, blocks: Index) -> Array:
-    """Sum of squares of every block as the other blocks predict it (blocks,): e_b = (I - H_bb)⁻¹ r_b, H over `basis`."""
-    rest, found = y - basis @ (basis.T @ y), []
-    for block in range(int(blocks.max()) + 1):
-        own, here = basis[blocks == block], rest[blocks == block]
-        values, vectors = np.linalg.eigh(own.T @ own)
-        push = (vectors.T @ (own.T @ here)) / np.maximum(1.0 - values, _PULLED)
-        found.append(float(np.sum(np.square(here + own @ (vectors @ push)))))
-    return np.asarray(np.maximum(np.array(found), 1e-300))
+    """Sum of squares of every block as the other blocks predict it (blocks,)."""
+    rest = held_out(basis, y - basis @ (basis.T @ y), blocks)
+    return np.asarray(np.maximum(np.bincount(blocks, np.square(rest)), 1e-300))
 
 
 def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
