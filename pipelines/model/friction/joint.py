@@ -108,8 +108,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
     if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
-    course = _course(stretches, rows, arm, config, DriftConfig())
-    stretches, fit, course = _with_course(stretches, rows.fitted, course, fit, arm)
+    courses = _courses(stretches, rows, arm, config, DriftConfig()) or [None]
+    stretches, fit, course = min((_with_course(stretches, rows.fitted, one, fit, arm) for one in courses), key=lambda end: end[1].found.rms)
     identify, validate = stretches[:rows.fitted], stretches[rows.fitted:]
     judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
     sticks = any(stretch.sticks is not None for stretch in identify)
@@ -189,11 +189,11 @@ def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, con
     return float(doubt.mean()) <= config.worse * sliding.mean_square or float(doubt.sum()) <= float(sure.sum())
 
 
-def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
-            drift: DriftConfig) -> Course | None:
+def _courses(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
+            drift: DriftConfig) -> list[Course]:
     """How friction changes in time over the logs that are fitted."""
     if not rows.any_slide:
-        return None
+        return []
     slides = rows.sliding.slides
     if all(stretch.sticks is None for stretch in stretches):
         stretches = left_out(stretches, slides)
@@ -203,9 +203,9 @@ def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: 
 
 
 def _with_course(stretches, fitted, course, fit, arm):
-    for _ in range(_COURSES if course is not None else 1):
+    for k in range(_COURSES if course is not None else 1):
         stretches = _along(stretches, course, fit)
-        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, [fit.theta])
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, None if k == 0 else [fit.theta])
         course = _next(course, fit)
     return _along(stretches, course, fit), fit, course
 
