@@ -27,6 +27,8 @@ _GAIN = 1e-6  # of the sum of squares: of a thousand rows, a thousandth of what 
 _MOST = 40  # steps
 _DAMPING = 1e-3
 _PULLED = 0.1  # the least that 1 - leverage may be
+_FREEDOM = 2.0  # the least: below it t has no variance
+_STUDENT = (1.43, 1.53, 1.25, 1.0)  # in 1/freedom: quantile of t over 2, where the normal one is 2 (Fisher & Cornish 1960)
 _UNSHOWN = 1e-9  # of the largest slope's square: what hardly shows is held where it is
 
 
@@ -213,7 +215,8 @@ def with_block_covariance(found: SeparableFit, blocks: npt.NDArray[np.intp]) -> 
     """`found` with a covariance that lets all errors within a block of rows depend on one another.
 
     Each block enters with the residual that it has when it is left out, (I - H_bb)⁻¹ r_b: CR3, the jackknife over blocks, of Bell
-    & McCaffrey 2002, Survey Methodology 28, p. 169.
+    & McCaffrey 2002, Survey Methodology 28, p. 169. A direction that few blocks decide has a variance of few degrees of freedom,
+    (Σ s²)²/Σ s⁴ by Satterthwaite 1946: it is widened so that two standard deviations cover what those of Student's t do.
 
     Args:
         blocks: (m,) number of the block of every row, from 0.
@@ -225,8 +228,12 @@ def with_block_covariance(found: SeparableFit, blocks: npt.NDArray[np.intp]) -> 
     rest = held_out(basis, found.residual, blocks)
     sums = np.zeros((int(blocks.max()) + 1, basis.shape[1]))
     np.add.at(sums, blocks, basis * rest[:, None])
-    back = turn / scale[:, None]
-    return replace(found, covariance=back @ (sums.T @ sums) @ back.T * (len(sums) - 1.0) / len(sums))
+    size, axes = np.linalg.eigh(sums.T @ sums)
+    shares = np.square(sums @ axes)
+    freedom = np.square(shares.sum(axis=0)) / np.maximum(np.square(shares).sum(axis=0), 1e-300)
+    wide = np.polyval(_STUDENT, 1.0 / np.maximum(freedom, _FREEDOM))
+    back = turn @ (axes * wide * np.sqrt(np.maximum(size, 0.0))) / scale[:, None]
+    return replace(found, covariance=back @ back.T * (len(sums) - 1.0) / len(sums))
 
 
 def held_out(basis: Array, residual: Array, blocks: npt.NDArray[np.intp]) -> Array:

@@ -44,8 +44,8 @@ class DriftConfig:
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
 
 
-def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> list[Course]:
-    """The course of friction that rows show beyond chance; None where they show none.
+def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> tuple[Course, ...]:
+    """The courses of friction, one for every form, of the kind that rows show beyond chance; empty where they show none.
 
     Args:
         stretches: whose rows these are; they slide.
@@ -59,17 +59,17 @@ def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array,
     basis = _basis(known)
     blocks = _blocks(t, log, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
-        return []
+        return ()
     trends = _trends(stretches, config)
     found = [_best(kind, form, stretches, y, known, curve, basis, speed, trends, config)
              for kind in ("trend", "step") for form in _FORMS]
     course, own, change, _ = min(found, key=lambda one: one[3])
-    alike = [one[0] for one in found if one[0].kind == course.kind]
+    alike = tuple(one[0] for one in found if one[0].kind == course.kind)
     gains = np.log(_held_out(basis, y, blocks) / _held_out(_basis(np.column_stack([known, own])), y, blocks))
     whole = curve @ _least(np.column_stack([known, own]), y)[rigid.shape[1]:-1]
     size = float(np.median(np.abs(own[own != 0.0] * change))) if course.kind == "step" else float(np.ptp(own * change / whole))
     large = size >= config.least * (float(np.median(np.abs(whole))) if course.kind == "step" else 1.0)
-    return alike if large and by_flips(gains) <= config.chance else []
+    return alike if large and by_flips(gains) <= config.chance else ()
 
 
 def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: Array, curve: Array, basis: Array,
