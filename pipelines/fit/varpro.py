@@ -29,6 +29,7 @@ _DAMPING = 1e-3
 _PULLED = 0.1  # the least that 1 - leverage may be
 _FREEDOM = 2.0  # the least: below it t has no variance
 _STUDENT = (1.43, 1.53, 1.25, 1.0)  # in 1/freedom: quantile of t over 2, where the normal one is 2 (Fisher & Cornish 1960)
+_NOTHING = 1e-100  # length of a column whose square is lost
 _UNSHOWN = 1e-9  # of the largest slope's square: what hardly shows is held where it is
 
 
@@ -190,7 +191,7 @@ def _with_covariance(problem: Separable, theta: Array, now: Linear, slopes: Arra
     """
     jacobian = np.hstack([now.columns, slopes])
     scale = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(scale > 0.0, scale, np.inf)  # a number that no row shows
+    scale = np.where(scale > _NOTHING, scale, np.inf)  # a number that no row shows
     unit = jacobian / scale
     values, vectors = np.linalg.eigh(unit.T @ unit)
     kept = values > _RANK**2 * values[-1]
@@ -222,7 +223,7 @@ def with_block_covariance(found: SeparableFit, blocks: npt.NDArray[np.intp]) -> 
         blocks: (m,) number of the block of every row, from 0.
     """
     scale = np.linalg.norm(found.jacobian, axis=0)
-    scale = np.where(scale > 0.0, scale, np.inf)
+    scale = np.where(scale > _NOTHING, scale, np.inf)
     turn = _root((found.jacobian / scale).T @ (found.jacobian / scale))
     basis = found.jacobian / scale @ turn
     rest = held_out(basis, found.residual, blocks)
