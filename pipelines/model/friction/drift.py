@@ -6,7 +6,8 @@ c(t) is a trend 1 - exp(-(t - t0)/T) that begins anew in every log, as a joint w
 on rows that slide, beside inertia, gravity and a free curve of friction (sliding.py), so that no law is assumed and what
 a curve can hold is no drift. The course that leaves least must predict blocks of time that were held out better than no change
 does: logarithms of the ratio of their squared errors, in closed form by leverage, against draws of their signs
-(fit/flips.py). A course that costs a number and gains nothing loses there.
+(fit/flips.py). A course that costs a number and gains nothing loses there. A step may lie between any two rows; the time
+constant of a trend is fitted later with the law (joint.py), and so is which part of friction changes.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ import numpy.typing as npt
 
 from pipelines.fit.flips import by_flips
 from pipelines.fit.varpro import held_out
-from pipelines.model.friction.weak_form import Course, Stretch
+from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time
 from pipelines.model.rigid.body import Array
 
 __all__ = ["DriftConfig", "drift_of"]
 
 _FORMS = ("whole", "viscous", "coulomb")
-_ROUNDS = 4
+_ROUNDS = 4  # of scanning for a course and fitting the curve that changes
 Index = npt.NDArray[np.intp]
 
 _RANK = 1e-7  # singular values of unit columns below it: two columns that are one
@@ -50,31 +51,29 @@ def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array,
     Args:
         stretches: whose rows these are; they slide.
         y: (rows,) mean torque [N m].
-        rigid: (rows, columns) of inertia, gravity and whatever else is no friction.
+        rigid: (rows, columns) of inertia, gravity and all else that is no friction.
         curve: (rows, columns) of a free curve of friction.
     """
-    speed, t = (np.concatenate([stretch.middle[k] for stretch in stretches]) for k in (1, 2))
-    log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])
+    speed = np.concatenate([stretch.middle[1] for stretch in stretches])
     known = np.hstack([rigid, curve])
-    basis = _basis(known)
-    blocks = _blocks(t, log, config.block)
+    basis, blocks = _basis(known), blocks_of_time(stretches, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
         return ()
     trends = _trends(stretches, config)
     found = [_best(kind, form, stretches, y, known, curve, basis, speed, trends, config)
              for kind in ("trend", "step") for form in _FORMS]
-    course, own, change, _ = min(found, key=lambda one: one[3])
+    course, own, size, _ = min(found, key=lambda one: one[3])
     alike = tuple(one[0] for one in found if one[0].kind == course.kind)
     gains = np.log(_held_out(basis, y, blocks) / _held_out(_basis(np.column_stack([known, own])), y, blocks))
     whole = curve @ _least(np.column_stack([known, own]), y)[rigid.shape[1]:-1]
-    size = float(np.median(np.abs(own[own != 0.0] * change))) if course.kind == "step" else float(np.ptp(own * change / whole))
-    large = size >= config.least * (float(np.median(np.abs(whole))) if course.kind == "step" else 1.0)
+    large = size >= config.least * float(np.median(np.abs(whole)))
     return alike if large and by_flips(gains) <= config.chance else ()
 
 
 def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: Array, curve: Array, basis: Array,
           speed: Array, trends: Sequence[Course], config: DriftConfig) -> tuple[Course, Array, float, float]:
-    """The course of this kind and form that leaves least, its column (rows,), its factor, and the sum of squares it leaves.
+    """The course of this kind and form that leaves least, its column (rows,), by how much it changes friction
+    [N m], and the sum of squares it leaves.
 
     The curve that changes as a whole is itself fitted: scan, fit, scan again.
     """
@@ -92,7 +91,8 @@ def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: A
         own = np.concatenate([course.at(part, stretch.middle[2]) for part, stretch in enumerate(stretches)]) * shape
         columns = np.column_stack([known, own])
         beta = _least(columns, y)
-    return course, own, float(beta[-1]), float(np.square(y - columns @ beta).sum())
+    size = abs(float(beta[-1])) * float(np.median(np.abs(shape)))
+    return course, own, size, float(np.square(y - columns @ beta).sum())
 
 
 def _least(columns: Array, y: Array) -> Array:
@@ -110,7 +110,7 @@ def _outside(course: Course, stretches: Sequence[Stretch], shape: Array, basis: 
 
 
 def _gain(column: Array, left: Array) -> float:
-    """What a column (rows, 1) takes off the sum of squares."""
+    """Return by how much a column (rows, 1) lowers the sum of squares."""
     return float(np.square(column[:, 0] @ left) / max(float(np.square(column).sum()), 1e-300))
 
 
@@ -119,12 +119,6 @@ def _basis(columns: Array) -> Array:
     scale = np.linalg.norm(columns, axis=0)
     left, size, _ = np.linalg.svd(columns[:, scale > 0.0] / scale[scale > 0.0], full_matrices=False)
     return np.asarray(left[:, size > _RANK * size.max(initial=0.0)])
-
-
-def _blocks(t: Array, log: Index, length: float) -> Index:
-    """Number of the block of time of every row (rows,)."""
-    code = log * 10**7 + np.floor(t / length).astype(np.intp)
-    return np.asarray(np.unique(code, return_inverse=True)[1], dtype=np.intp)
 
 
 def _held_out(basis: Array, y: Array, blocks: Index) -> Array:
@@ -143,7 +137,7 @@ def _step(stretches: Sequence[Stretch], form: str, shape: Array, basis: Array, l
           config: DriftConfig) -> tuple[Course, float]:
     """The instant between two rows from which a step of `shape` (rows,) explains most, and how much (Andrews 1993, sup F).
 
-    A step's column is g from some row on. Its products with any other column are sums from that row to the last.
+    A step's column is g from some row on: its products with other columns are sums over the later rows.
     """
     t = np.concatenate([stretch.middle[2] for stretch in stretches])
     log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import SeparableFit, with_block_covariance
@@ -31,7 +30,7 @@ from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
 from pipelines.model.friction.simulate import Simulated, simulate_joint
 from pipelines.model.friction.sliding import Sliding, SlidingConfig, free_curve, left_out, sliding_rows
 from pipelines.model.friction.speed_map import SpeedMap, speed_map
-from pipelines.model.friction.weak_form import Course, Stretch, stretches_of, swaying
+from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 
@@ -125,8 +124,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
         final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
         course, chosen = _next(course, final), final
     if sticks:
-        final = _with_errors_in_variables(replace(final, found=with_block_covariance(final.found, _blocks(identify))),
-                                          rows.sliding.attenuation)
+        robust = with_block_covariance(final.found, blocks_of_time(identify, _MEMORY))
+        final = _with_errors_in_variables(replace(final, found=robust), rows.sliding.attenuation)
     ripple = ripple_of(LawEquations.of(identify, arm), final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
@@ -251,12 +250,6 @@ def _with_errors_in_variables(fit: LawFit, attenuation: float) -> LawFit:
     places = fit.rigid_size * np.arange(len(fit.postures))
     covariance[places, places] += np.square(min(attenuation, 1.0) * fit.found.beta[places])
     return replace(fit, found=replace(fit.found, covariance=covariance))
-
-
-def _blocks(stretches: Sequence[Stretch]) -> npt.NDArray[np.intp]:
-    """Number of the block of `_MEMORY` seconds that each row is in (rows,)."""
-    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / _MEMORY) for k, stretch in enumerate(stretches)]
-    return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
 def _swaying(logs: JointLogs) -> tuple[int, ...]:

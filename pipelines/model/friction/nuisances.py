@@ -28,8 +28,9 @@ def drift_in_words(drift: Drift | None, name: str, revolute: bool) -> str:
         return (f"{part} of {name} {size} at once, {plain_number(drift.when)} s into {drift.log}; the law "
                 "is that before.")
     middle = plain_number(drift.holds_at)
-    return (f"{part} of {name} {size} of its value at {middle} s in the course of each log, with a time constant of about "
-            f"{plain_number(drift.when)} s; the law holds at {middle} s.")
+    return (f"{part} of {name} {size} of its value at {middle} s in the course of each log, with a time constant of "
+            f"{plain_number(drift.when)}{f' ± {plain_number(drift.when_std)}' if drift.when_std is not None else ''} s; "
+            f"the law holds at {middle} s.")
 
 
 def sticking_in_words(sticking: Sticking | None, name: str, revolute: bool) -> str:
@@ -41,7 +42,8 @@ def sticking_in_words(sticking: Sticking | None, name: str, revolute: bool) -> s
              f"up to a travel of {plain_number(sticking.distance)} {'rad' if revolute else 'm'}, and friction is no "
              "function of its speed.")
     if sticking.slips:
-        words += f" It sticks and slips on {sticking.slips} times amid motion one way."
+        words += (f" It sticks and slips on {sticking.slips} times amid motion one way: only the slips are fitted, and the law "
+                  "holds from the slowest speed that was driven on. Drive faster or with a stiffer loop to see slower sliding.")
     return words
 
 

@@ -53,8 +53,3 @@ def sway_columns(t: Array, q: Array, dq: Array, sways: Sequence[Sway], revolute:
             found.append(np.diff(sway.lean * dq) * rate)
         found += [lean * part for part in turn] if revolute else [lean]
     return np.vstack([np.stack(found, axis=1), np.zeros((1, len(found)))])
-
-
-def sway_count(sways: Sequence[Sway], revolute: bool) -> int:
-    """Number of these columns."""
-    return sum((2 if revolute else 1) + ((3 if revolute else 2) if sway.nearer else 2) for sway in sways)

@@ -22,14 +22,14 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.friction.nodes import Nodes, lay_nodes
 from pipelines.model.friction.one_joint import gravity_acts, gravity_columns
-from pipelines.model.friction.sway import Sway, sway_columns, sway_count
+from pipelines.model.friction.sway import Sway, sway_columns
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_jerk
 
-__all__ = ["Course", "Stretch", "Windows", "moved", "stretches_of", "swaying"]
+__all__ = ["Course", "Stretch", "Windows", "blocks_of_time", "moved", "stretches_of", "swaying"]
 
 _MOTIONLESS = ("edges", "kept", "impulse", "length", "torque")
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
@@ -187,7 +187,7 @@ class Stretch:
         if self.sway.shape[1]:
             sway = np.diff(self.swayed[self.edges], axis=0) / self.length[:, None]
             if self.untimed:
-                sway[:, sway_count(self.beside, self.revolute)] = self._timing
+                sway[:, 0] = self._timing
             columns.append(sway[self.kept])
         return np.hstack(columns)
 
@@ -224,13 +224,13 @@ class Stretch:
     def sway(self) -> Array:
         """Columns beside inertia and gravity over the step after each sample (samples, columns).
 
-        Of joints that are held and sway; of a torque sample that may act a part of a step later or earlier, its change over
-        the step; and of friction that changes in time.
+        Of a torque sample that may act a part of a step later or earlier, its change over the step; of joints that are held and
+        sway; of friction that lags behind its speed; and of friction that changes in time.
         """
         parts = [sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)]
         if self.untimed:
             known = np.where(np.isfinite(self.tau), self.tau, 0.0)
-            parts.append(np.append(np.diff(known), 0.0)[:, None])
+            parts.insert(0, np.append(np.diff(known), 0.0)[:, None])
         if self.lag is not None:
             level = np.interp(self.dq, *self.lag)
             parts.append(np.append(np.diff(level) / np.diff(self.t), 0.0)[:, None])
@@ -253,6 +253,12 @@ class Stretch:
         """Position, speed and time of every row (rows,), as means over its window."""
         mean = self.windows.means(np.hstack([self.nodes.q, self.nodes.dq, self.nodes.t[:, None]]))
         return mean[:, 0], mean[:, 1], mean[:, 2]
+
+
+def blocks_of_time(stretches: Sequence[Stretch], length: float) -> npt.NDArray[np.intp]:
+    """Number of the block of `length` seconds that each row is in (rows,), from 0."""
+    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / length) for k, stretch in enumerate(stretches)]
+    return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
 def swaying(found: Reconstructed, joint: int, resolution: Array) -> tuple[int, ...]:
