@@ -72,10 +72,10 @@ def test_friction_that_warms_up_is_named_with_its_course(shared: Path, tmp_path:
 
 
 MACHINES = {
-    "rests": replace(draw("rests", 1), seconds=14.0, rests=0.2),
+    "rests": replace(draw("rests", 1), seconds=20.0, rests=0.2),
     # a drive that regenerates and does not log it: torque that falls as speed rises
-    "regenerating": replace(draw("rests", 1), seed=2, seconds=14.0, rests=0.2, viscous=(-0.4, -0.4), coulomb=(4.0, 4.0)),
-    "step": replace(draw("step", 1), rate=draw("rests", 1).rate, seconds=14.0, rests=0.2, when=6.0, drift=0.2),
+    "regenerating": replace(draw("rests", 1), seed=2, seconds=20.0, rests=0.2, viscous=(-0.4, -0.4), coulomb=(4.0, 4.0)),
+    "step": replace(draw("step", 1), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=9.0, drift=0.3),
 }
 
 
@@ -117,13 +117,13 @@ def test_viscous_friction_below_zero_is_named(logs: dict[str, ExperimentLog]) ->
 
 
 def test_friction_that_jumps_is_named_with_its_instant(logs: dict[str, ExperimentLog]) -> None:
-    """Friction rises by 20 % at 6 s: instant to a rest's length, size to 2 %; inertia and curve are those before the step."""
+    """Friction rises by 30 % at 9 s: instant to a rest's length, size to 2 %; inertia and curve are those before the step."""
     machine = MACHINES["step"]
     joint, _ = computed(logs["step"], "asymmetric_friction+stribeck")
     assert joint.drift is not None
     assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
-    assert joint.drift.when == pytest.approx(6.0, abs=machine.rests)
-    assert joint.drift.change.value == pytest.approx(0.2, abs=0.02)
+    assert joint.drift.when == pytest.approx(9.0, abs=machine.rests)
+    assert joint.drift.change.value == pytest.approx(0.3, abs=0.02)
     assert sure(joint.inertia, machine.inertia)
     speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
     apart = np.abs(np.interp(speed, joint.series.speed, joint.series.curve) - machine.friction(speed))
