@@ -128,3 +128,15 @@ def test_friction_that_jumps_is_named_with_its_instant(logs: dict[str, Experimen
     speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
     apart = np.abs(np.interp(speed, joint.series.speed, joint.series.curve) - machine.friction(speed))
     assert np.all(apart <= 0.01 * np.abs(machine.friction(speed)))
+
+
+def test_a_validation_log_at_rest_judges_nothing(logs: dict[str, ExperimentLog]) -> None:
+    """It is reported, and held-out blocks of the identification log judge."""
+    log = logs["rests"]
+    still = {name: replace(signal, values=signal.values[:2500].copy()) for name, signal in log.signals.items()}
+    still["q"] = replace(still["q"], values=MACHINES["rests"].encoder * (np.arange(2500) % 7 == 0.0)[:, None])
+    rest = replace(log, name="rest", role="validate", signals=still)
+    result = fit_friction.compute(Inputs(tuple(Opened(Path(f"{one.name}.h5"), "", one, ()) for one in (log, rest)), label="logs"),
+                                  Settings(law="coulomb+viscous"))
+    assert result.joints[0].judged_by == "blocks"
+    assert any(check.code == "RRID-D09" and "validation" in check.message for check in result.checks)

@@ -48,7 +48,7 @@ def sticking_in_words(sticking: Sticking | None, name: str, revolute: bool) -> s
 
 
 def nuisance_findings(joint: JointFit, name: str) -> tuple[Check, ...]:
-    """D26 friction that drifts, D08 an encoder too coarse, S14 viscous friction below zero."""
+    """D26 friction that drifts, D08 an encoder too coarse, D09 nothing to judge by, S14 viscous friction below zero."""
     where = joint.logs.identify[0][0].source or joint.logs.identify[0][0].name
     found = []
     if words := drift_in_words(drift_of_joint(joint), name, joint.fit.joint.revolute):
@@ -61,6 +61,10 @@ def nuisance_findings(joint: JointFit, name: str) -> tuple[Check, ...]:
             "D08", "warn", f"the encoder is too coarse for these motions: {noise:.0f} % of the acceleration of joint "
             f"{joint.logs.joint} is noise (variance), and its inertia comes out as much too small", where=where, gate=True,
             remedy="record quicker changes of speed, at higher speeds, or a finer encoder"))
+    if joint.logs.validate and not joint.driven.judging:
+        found.append(Check.of(
+            "D09", "warn", f"joint {joint.logs.joint} slides in none of its validation logs: blocks of the identification logs "
+            "judge its law", where=where, remedy="record validation logs at the speeds of the identification logs"))
     if check := _negative_viscous(joint, where):
         found.append(check)
     return tuple(found)
