@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from pipelines.fit.equations import Array
 
-__all__ = ["Linear", "Separable", "SeparableFit", "fit_separable", "linear_part", "scan", "search",
+__all__ = ["Linear", "Separable", "SeparableFit", "fit_separable", "held_out", "linear_part", "scan", "search",
            "with_block_covariance"]
 
 _RANK = 1e-5  # singular values of unit columns below it: two columns that are one to within what any log can tell
@@ -27,6 +27,9 @@ _GAIN = 1e-6  # of the sum of squares: of a thousand rows, a thousandth of what 
 _MOST = 40  # steps
 _DAMPING = 1e-3
 _PULLED = 0.1  # the least that 1 - leverage may be
+_FREEDOM = 2.0  # the least: below it t has no variance
+_STUDENT = (1.43, 1.53, 1.25, 1.0)  # in 1/freedom: quantile of t over 2, where the normal one is 2 (Fisher & Cornish 1960)
+_NOTHING = 1e-100  # length of a column whose square is lost
 _UNSHOWN = 1e-9  # of the largest slope's square: what hardly shows is held where it is
 
 
@@ -188,7 +191,7 @@ def _with_covariance(problem: Separable, theta: Array, now: Linear, slopes: Arra
     """
     jacobian = np.hstack([now.columns, slopes])
     scale = np.linalg.norm(jacobian, axis=0)
-    scale = np.where(scale > 0.0, scale, np.inf)  # a number that no row shows
+    scale = np.where(scale > _NOTHING, scale, np.inf)  # a number that no row shows
     unit = jacobian / scale
     values, vectors = np.linalg.eigh(unit.T @ unit)
     kept = values > _RANK**2 * values[-1]
@@ -213,23 +216,38 @@ def with_block_covariance(found: SeparableFit, blocks: npt.NDArray[np.intp]) -> 
     """`found` with a covariance that lets all errors within a block of rows depend on one another.
 
     Each block enters with the residual that it has when it is left out, (I - H_bb)⁻¹ r_b: CR3, the jackknife over blocks, of Bell
-    & McCaffrey 2002, Survey Methodology 28, p. 169.
+    & McCaffrey 2002, Survey Methodology 28, p. 169. A direction that few blocks decide has a variance of few degrees of freedom,
+    (Σ s²)²/Σ s⁴ by Satterthwaite 1946: it is widened so that two standard deviations cover what those of Student's t do.
 
     Args:
         blocks: (m,) number of the block of every row, from 0.
     """
     scale = np.linalg.norm(found.jacobian, axis=0)
-    scale = np.where(scale > 0.0, scale, np.inf)
-    unit = found.jacobian / scale
-    values, vectors = np.linalg.eigh(unit.T @ unit)
-    kept = values > _RANK**2 * values[-1]
-    turn = vectors[:, kept] / np.sqrt(values[kept])
-    basis, count = unit @ turn, int(blocks.max()) + 1
-    meat = np.zeros((basis.shape[1], basis.shape[1]))
-    for block in range(count):
-        own, rest = basis[blocks == block], found.residual[blocks == block]
+    scale = np.where(scale > _NOTHING, scale, np.inf)
+    turn = _root((found.jacobian / scale).T @ (found.jacobian / scale))
+    basis = found.jacobian / scale @ turn
+    rest = held_out(basis, found.residual, blocks)
+    sums = np.zeros((int(blocks.max()) + 1, basis.shape[1]))
+    np.add.at(sums, blocks, basis * rest[:, None])
+    size, axes = np.linalg.eigh(sums.T @ sums)
+    shares = np.square(sums @ axes)
+    freedom = np.square(shares.sum(axis=0)) / np.maximum(np.square(shares).sum(axis=0), 1e-300)
+    wide = np.polyval(_STUDENT, 1.0 / np.maximum(freedom, _FREEDOM))
+    back = turn @ (axes * wide * np.sqrt(np.maximum(size, 0.0))) / scale[:, None]
+    return replace(found, covariance=back @ back.T * (len(sums) - 1.0) / len(sums))
+
+
+def held_out(basis: Array, residual: Array, blocks: npt.NDArray[np.intp]) -> Array:
+    """The residual (m,) of every block of rows as the other blocks predict it: (I - U_b U_bᵀ)⁻¹ r_b.
+
+    Args:
+        basis: (m, k) orthonormal columns U of the same space as the regressors.
+        residual: (m,) of least squares over all rows.
+        blocks: (m,) number of the block of every row, from 0.
+    """
+    rest = residual.copy()
+    for block in range(int(blocks.max()) + 1):
+        own = basis[blocks == block]
         size, axes = np.linalg.eigh(own.T @ own)
-        score = axes @ ((axes.T @ (own.T @ rest)) / np.maximum(1.0 - size, _PULLED))
-        meat += np.outer(score, score)
-    back = turn / scale[:, None]
-    return replace(found, covariance=back @ meat @ back.T * (count - 1.0) / count)
+        rest[blocks == block] += own @ (axes @ ((axes.T @ (own.T @ residual[blocks == block])) / np.maximum(1.0 - size, _PULLED)))
+    return rest

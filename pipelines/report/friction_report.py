@@ -197,7 +197,8 @@ def _band(joint: JointResult) -> str:
 def _words(joint: JointResult) -> tuple[str, ...]:
     slowest, fastest = joint.driven
     unit = _speed_unit(joint)
-    words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}; logs: {', '.join(joint.logs)}."]
+    words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}, for which the law holds; "
+             f"logs: {', '.join(joint.logs)}."]
     words += [text for text in (drift_in_words(joint.drift, joint.name, joint.revolute),
                                 sticking_in_words(joint.sticking, joint.name, joint.revolute)) if text]
     if joint.held is not None:

@@ -16,11 +16,12 @@ import pytest
 
 from pipelines import fit_friction
 from pipelines.fit_friction import Settings
+from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 from pipelines.model.friction.result import JointResult, Result, Value
 from pipelines.stage import Inputs
 from tests.cli.commands import rrrid
-from tests.model.friction.closed_loop import Machine, draw, logs_of
+from tests.model.friction.closed_loop import draw, logs_of
 
 
 def fitted(shared: Path, folder: Path, case: str, law: str | None) -> dict[str, Any]:
@@ -70,8 +71,21 @@ def test_friction_that_warms_up_is_named_with_its_course(shared: Path, tmp_path:
     assert within(joint["inertia"], 0.5, 2.0, 0.002)
 
 
-def computed(machine: Machine, law: str) -> tuple[JointResult, Result]:
-    (log,) = logs_of([machine]).values()
+MACHINES = {
+    "rests": replace(draw("rests", 1), seconds=20.0, rests=0.2),
+    # a drive that regenerates and does not log it: torque that falls as speed rises
+    "regenerating": replace(draw("rests", 1), seed=2, seconds=20.0, rests=0.2, viscous=(-0.4, -0.4), coulomb=(4.0, 4.0)),
+    "step": replace(draw("step", 1), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=9.0, drift=0.3),
+}
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, ExperimentLog]:
+    """Logs of all machines, integrated side by side."""
+    return dict(zip(MACHINES, logs_of(list(MACHINES.values())).values(), strict=True))
+
+
+def computed(log: ExperimentLog, law: str) -> tuple[JointResult, Result]:
     result = fit_friction.compute(Inputs((Opened(Path("a.h5"), "", log, ()),), label="logs"), Settings(law=law))
     return result.joints[0], result
 
@@ -81,10 +95,10 @@ def sure(value: Value, truth: float) -> bool:
     return abs(value.value - truth) <= max(3.0 * value.std, 0.002 * abs(truth))
 
 
-def test_constant_speeds_under_a_loop_and_gravity() -> None:
+def test_constant_speeds_under_a_loop_and_gravity(logs: dict[str, ExperimentLog]) -> None:
     """Inertia, both sides of gravity and the curve, to three standard deviations or 0.2 %."""
-    machine = replace(draw("rests", 1), seconds=14.0, rests=0.2)
-    joint, result = computed(machine, "asymmetric_friction")
+    machine = MACHINES["rests"]
+    joint, result = computed(logs["rests"], "asymmetric_friction")
     assert sure(joint.inertia, machine.inertia)
     assert sure(joint.gravity["sine"], machine.weight * np.cos(machine.hanging))
     assert sure(joint.gravity["cosine"], -machine.weight * np.sin(machine.hanging))
@@ -94,10 +108,35 @@ def test_constant_speeds_under_a_loop_and_gravity() -> None:
     assert not any(check.code in ("RRID-D26", "RRID-D08", "RRID-S14") for check in result.checks)
 
 
-def test_viscous_friction_below_zero_is_named() -> None:
-    """A drive that regenerates and does not log it: torque that falls as speed rises. It is told with what to look at."""
-    machine = replace(draw("rests", 1), seconds=14.0, rests=0.2, viscous=(-0.4, -0.4), coulomb=(4.0, 4.0))
-    _, result = computed(machine, "coulomb+viscous")
+def test_viscous_friction_below_zero_is_named(logs: dict[str, ExperimentLog]) -> None:
+    """It is reported with the possible reasons."""
+    _, result = computed(logs["regenerating"], "coulomb+viscous")
     (check,) = [check for check in result.checks if check.code == "RRID-S14"]
     assert "viscous friction" in check.message
     assert "regenerat" in check.remedy
+
+
+def test_friction_that_jumps_is_named_with_its_instant(logs: dict[str, ExperimentLog]) -> None:
+    """Friction rises by 30 % at 9 s: instant to a rest's length, size to 2 %; inertia and curve are those before the step."""
+    machine = MACHINES["step"]
+    joint, _ = computed(logs["step"], "asymmetric_friction+stribeck")
+    assert joint.drift is not None
+    assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
+    assert joint.drift.when == pytest.approx(9.0, abs=machine.rests)
+    assert joint.drift.change.value == pytest.approx(0.3, abs=0.02)
+    assert sure(joint.inertia, machine.inertia)
+    speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
+    apart = np.abs(np.interp(speed, joint.series.speed, joint.series.curve) - machine.friction(speed))
+    assert np.all(apart <= 0.01 * np.abs(machine.friction(speed)))
+
+
+def test_a_validation_log_at_rest_judges_nothing(logs: dict[str, ExperimentLog]) -> None:
+    """It is reported, and held-out blocks of the identification log judge."""
+    log = logs["rests"]
+    still = {name: replace(signal, values=signal.values[:2500].copy()) for name, signal in log.signals.items()}
+    still["q"] = replace(still["q"], values=MACHINES["rests"].encoder * (np.arange(2500) % 7 == 0.0)[:, None])
+    rest = replace(log, name="rest", role="validate", signals=still)
+    result = fit_friction.compute(Inputs(tuple(Opened(Path(f"{one.name}.h5"), "", one, ()) for one in (log, rest)), label="logs"),
+                                  Settings(law="coulomb+viscous"))
+    assert result.joints[0].judged_by == "blocks"
+    assert any(check.code == "RRID-D09" and "validation" in check.message for check in result.checks)

@@ -6,7 +6,8 @@ c(t) is a trend 1 - exp(-(t - t0)/T) that begins anew in every log, as a joint w
 on rows that slide, beside inertia, gravity and a free curve of friction (sliding.py), so that no law is assumed and what
 a curve can hold is no drift. The course that leaves least must predict blocks of time that were held out better than no change
 does: logarithms of the ratio of their squared errors, in closed form by leverage, against draws of their signs
-(fit/flips.py). A course that costs a number and gains nothing loses there.
+(fit/flips.py). A course that costs a number and gains nothing loses there. A step may lie between any two rows; the time
+constant of a trend is fitted later with the law (joint.py), and so is which part of friction changes.
 """
 
 from __future__ import annotations
@@ -18,13 +19,14 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.flips import by_flips
-from pipelines.model.friction.weak_form import Course, Stretch
+from pipelines.fit.varpro import held_out
+from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time
 from pipelines.model.rigid.body import Array
 
 __all__ = ["DriftConfig", "drift_of"]
 
 _FORMS = ("whole", "viscous", "coulomb")
-_PULLED = 1e-3  # the least that 1 - leverage may be
+_ROUNDS = 4  # of scanning for a course and fitting the curve that changes
 Index = npt.NDArray[np.intp]
 
 _RANK = 1e-7  # singular values of unit columns below it: two columns that are one
@@ -38,40 +40,66 @@ class DriftConfig:
     block: float = 1.0  # [s] of rows whose errors may depend on one another
     fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
-    steps: int = 40  # instants of a step that are tried
     ends: float = 0.08  # of all rows, that lie before and after a step
     times: tuple[float, ...] = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 5.0)  # over the duration; 5: straight
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
 
 
-def drift_of(stretches: Sequence[Stretch], y: Array, known: Array, config: DriftConfig) -> Course | None:
-    """The course of friction that rows show beyond chance; None where they show none.
+def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> tuple[Course, ...]:
+    """The courses of friction, one for every form, of the kind that rows show beyond chance; empty where they show none.
 
     Args:
         stretches: whose rows these are; they slide.
         y: (rows,) mean torque [N m].
-        known: (rows, columns) of all that is beside the drift: inertia, gravity, and a curve of friction, free or fitted.
+        rigid: (rows, columns) of inertia, gravity and all else that is no friction.
+        curve: (rows, columns) of a free curve of friction.
     """
-    speed, t = (np.concatenate([stretch.middle[k] for stretch in stretches]) for k in (1, 2))
-    log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])
-    basis = _basis(known)
-    left = y - basis @ (basis.T @ y)
-    blocks = _blocks(t, log, config.block)
+    speed = np.concatenate([stretch.middle[1] for stretch in stretches])
+    known = np.hstack([rigid, curve])
+    basis, blocks = _basis(known), blocks_of_time(stretches, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
-        return None
-    side = np.stack([np.sign(speed), speed], axis=1)
-    level = np.linalg.lstsq(side, y, rcond=None)[0]
-    shapes = {"whole": side @ level, "viscous": speed, "coulomb": np.sign(speed)}
-    courses = [*_trends(stretches, config), *_steps(stretches, t, log, config)]
-    columns = [_outside(course, stretches, shapes[course.form], basis) for course in courses]
-    rests = [_rest(one, left) for one in columns]
-    best = int(np.argmin(rests))
-    own = columns[best]
-    gains = np.log(_held_out(basis, y, blocks) / _held_out(np.hstack([basis, _basis(own)]), y, blocks))
-    change = np.linalg.lstsq(own, left, rcond=_RANK)[0]
-    size = abs(courses[best].whole) * float(np.median(np.abs(shapes[courses[best].form] * change)))
-    large = size >= config.least * float(np.median(np.abs(shapes["whole"])))
-    return courses[best] if large and by_flips(gains) <= config.chance else None
+        return ()
+    trends = _trends(stretches, config)
+    found = [_best(kind, form, stretches, y, known, curve, basis, speed, trends, config)
+             for kind in ("trend", "step") for form in _FORMS]
+    course, own, size, _ = min(found, key=lambda one: one[3])
+    alike = tuple(one[0] for one in found if one[0].kind == course.kind)
+    gains = np.log(_held_out(basis, y, blocks) / _held_out(_basis(np.column_stack([known, own])), y, blocks))
+    whole = curve @ _least(np.column_stack([known, own]), y)[rigid.shape[1]:-1]
+    large = size >= config.least * float(np.median(np.abs(whole)))
+    return alike if large and by_flips(gains) <= config.chance else ()
+
+
+def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: Array, curve: Array, basis: Array,
+          speed: Array, trends: Sequence[Course], config: DriftConfig) -> tuple[Course, Array, float, float]:
+    """The course of this kind and form that leaves least, its column (rows,), by how much it changes friction
+    [N m], and the sum of squares it leaves.
+
+    The curve that changes as a whole is itself fitted: scan, fit, scan again.
+    """
+    left = y - basis @ (basis.T @ y)
+    shape = speed if form == "viscous" else np.sign(speed)
+    beta = _least(known, y)
+    for _ in range(_ROUNDS if form == "whole" else 1):
+        if form == "whole":
+            shape = curve @ beta[known.shape[1] - curve.shape[1]:known.shape[1]]
+        if kind == "step":
+            course = _step(stretches, form, shape, basis, left, config)[0]
+        else:
+            course = max((one for one in trends if one.form == form),
+                         key=lambda one: _gain(_outside(one, stretches, shape, basis), left))
+        own = np.concatenate([course.at(part, stretch.middle[2]) for part, stretch in enumerate(stretches)]) * shape
+        columns = np.column_stack([known, own])
+        beta = _least(columns, y)
+    size = abs(float(beta[-1])) * float(np.median(np.abs(shape)))
+    return course, own, size, float(np.square(y - columns @ beta).sum())
+
+
+def _least(columns: Array, y: Array) -> Array:
+    """Least squares over columns of unit length."""
+    scale = np.linalg.norm(columns, axis=0)
+    scale = np.where(scale > 0.0, scale, 1.0)
+    return np.asarray(np.linalg.lstsq(columns / scale, y, rcond=_RANK)[0] / scale)
 
 
 def _outside(course: Course, stretches: Sequence[Stretch], shape: Array, basis: Array) -> Array:
@@ -81,10 +109,9 @@ def _outside(course: Course, stretches: Sequence[Stretch], shape: Array, basis: 
     return np.asarray(columns - basis @ (basis.T @ columns))
 
 
-def _rest(columns: Array, left: Array) -> float:
-    """Sum of squares that is left."""
-    own = _basis(columns)
-    return float(left @ left - np.square(own.T @ left).sum())
+def _gain(column: Array, left: Array) -> float:
+    """Return by how much a column (rows, 1) lowers the sum of squares."""
+    return float(np.square(column[:, 0] @ left) / max(float(np.square(column).sum()), 1e-300))
 
 
 def _basis(columns: Array) -> Array:
@@ -94,21 +121,10 @@ def _basis(columns: Array) -> Array:
     return np.asarray(left[:, size > _RANK * size.max(initial=0.0)])
 
 
-def _blocks(t: Array, log: Index, length: float) -> Index:
-    """Number of the block of time of every row (rows,)."""
-    code = log * 10**7 + np.floor(t / length).astype(np.intp)
-    return np.asarray(np.unique(code, return_inverse=True)[1], dtype=np.intp)
-
-
 def _held_out(basis: Array, y: Array, blocks: Index) -> Array:
-    """Sum of squares of every block as the other blocks predict it (blocks,): e_b = (I - H_bb)⁻¹ r_b, H over `basis`."""
-    rest, found = y - basis @ (basis.T @ y), []
-    for block in range(int(blocks.max()) + 1):
-        own, here = basis[blocks == block], rest[blocks == block]
-        values, vectors = np.linalg.eigh(own.T @ own)
-        push = (vectors.T @ (own.T @ here)) / np.maximum(1.0 - values, _PULLED)
-        found.append(float(np.sum(np.square(here + own @ (vectors @ push)))))
-    return np.asarray(np.maximum(np.array(found), 1e-300))
+    """Sum of squares of every block as the other blocks predict it (blocks,)."""
+    rest = held_out(basis, y - basis @ (basis.T @ y), blocks)
+    return np.asarray(np.maximum(np.bincount(blocks, np.square(rest)), 1e-300))
 
 
 def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
@@ -117,10 +133,20 @@ def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
     return [Course("trend", form, starts, share * duration, 0.5 * duration, duration) for share in config.times for form in _FORMS]
 
 
-def _steps(stretches: Sequence[Stretch], t: Array, log: Index, config: DriftConfig) -> list[Course]:
-    """Steps between rows; a step lasts until the end of the last log."""
+def _step(stretches: Sequence[Stretch], form: str, shape: Array, basis: Array, left: Array,
+          config: DriftConfig) -> tuple[Course, float]:
+    """The instant between two rows from which a step of `shape` (rows,) explains most, and how much (Andrews 1993, sup F).
+
+    A step's column is g from some row on: its products with other columns are sums over the later rows.
+    """
+    t = np.concatenate([stretch.middle[2] for stretch in stretches])
+    log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])
+    after = np.cumsum((shape[:, None] * np.column_stack([left, shape, basis]))[::-1], axis=0)[::-1]
+    outside = np.maximum(after[:, 1] - np.square(after[:, 2:]).sum(axis=1), _RANK * after[0, 1])
+    rows = np.arange(max(1, int(config.ends * len(t))), int((1.0 - config.ends) * len(t)))
+    gains = np.square(after[rows, 0]) / outside[rows]
+    row = int(rows[np.argmax(gains)])
+    before, here = int(log[row - 1]), int(log[row])
     starts = tuple(float(stretch.t[0]) for stretch in stretches)
-    rows = np.unique(np.linspace(config.ends * len(t), (1.0 - config.ends) * (len(t) - 1), config.steps).astype(np.intp))
-    since = [float(t[row] - starts[log[row]]) for row in rows]
-    return [Course("step", form, starts, when, 0.0, when, int(log[row]))
-            for row, when in zip(rows, since, strict=True) for form in _FORMS]
+    when = 0.5 * float(t[row - 1] + t[row]) - starts[here] if before == here else 0.0
+    return Course("step", form, starts, when, 0.0, when, here), float(gains.max())

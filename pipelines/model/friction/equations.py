@@ -52,6 +52,9 @@ class Equations(Protocol):
     def y(self) -> Array: ...
 
     @property
+    def largest(self) -> float: ...
+
+    @property
     def width(self) -> int: ...
 
     @property
@@ -93,6 +96,11 @@ class LawEquations:
     @cached_property
     def y(self) -> Array:
         return np.concatenate([stretch.torque[::self.every] for stretch in self.stretches])
+
+    @property
+    def largest(self) -> float:
+        """Largest mean torque of a window, rests and reversals included [N m]."""
+        return max(float(np.abs(np.diff(stretch.impulse[stretch.edges]) / stretch.length).max()) for stretch in self.stretches)
 
     @cached_property
     def width(self) -> int:

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import SeparableFit, with_block_covariance
@@ -23,7 +22,7 @@ from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.fit_law import fit_law
 from pipelines.model.friction.ladder import Judge, Ladder, climb
 from pipelines.model.friction.law_fit import LawFit
-from pipelines.model.friction.laws import LADDER, Law, law_named
+from pipelines.model.friction.laws import LADDER, Law
 from pipelines.model.friction.one_joint import OneJoint, gravity_columns
 from pipelines.model.friction.postures import alike
 from pipelines.model.friction.refine import refined
@@ -31,16 +30,19 @@ from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
 from pipelines.model.friction.simulate import Simulated, simulate_joint
 from pipelines.model.friction.sliding import Sliding, SlidingConfig, free_curve, left_out, sliding_rows
 from pipelines.model.friction.speed_map import SpeedMap, speed_map
-from pipelines.model.friction.weak_form import Course, Stretch, stretches_of, swaying
+from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["JointFit", "JointLogs", "Seen", "fit_joint", "fractions", "with_fit"]
 
+_BENT = 1e-3  # of friction: a curve that departs less from straight lines does not show whether it lags
+_COURSES = 5  # steps of Gauss and Newton for the time constant of a drift
 _CURVE = 100  # points of a curve, each way
+_FASTEST = 9  # of them, over which its slope at the highest speeds is taken
 _MEMORY = 1.0  # [s] over which errors of a law may depend on one another
 _ROUNDS = 2  # of refining before laws are compared
-_FLEXIBLE = "three_sigmoid"  # follows any curve that a healthy joint has: no law of the ladder is favoured
+_FLEXIBLE = Law("flexible", ("three_sigmoid", "asymmetric_friction"))  # follows any curve: no law of the ladder is favoured
 
 Seen = tuple[ExperimentLog, Reconstructed]
 
@@ -106,9 +108,10 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
     if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
-    course = _course(stretches, rows, arm, config, DriftConfig())
-    stretches = _along(stretches, course, fit)
-    identify, validate = stretches[:rows.fitted], stretches[rows.fitted:]
+    courses = _courses(stretches, rows, arm, config, DriftConfig()) or (None,)
+    ends = [_with_course(stretches, rows.fitted, one, fit, arm) for one in courses]
+    stretches, fit, course = min(ends, key=lambda end: end[1].found.rms)
+    identify, validate = stretches[:rows.fitted], tuple(stretch for stretch in stretches[rows.fitted:] if stretch.rows)
     judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
     sticks = any(stretch.sticks is not None for stretch in identify)
     laws = tuple(one for one in LADDER if one.pointwise or not sticks)  # what is left out is what presliding would show
@@ -116,11 +119,13 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     chosen = ladder.chosen.fit
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
-    identify, validate = (_along(part, course, chosen) for part in (identify, validate))
-    final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+    for _ in range(_COURSES if course is not None else 1):
+        identify, validate = (_along(part, course, chosen) for part in (identify, validate))
+        final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+        course, chosen = _next(course, final), final
     if sticks:
-        final = _with_errors_in_variables(replace(final, found=with_block_covariance(final.found, _blocks(identify))),
-                                          rows.sliding.attenuation)
+        robust = with_block_covariance(final.found, blocks_of_time(identify, _MEMORY))
+        final = _with_errors_in_variables(replace(final, found=robust), rows.sliding.attenuation)
     ripple = ripple_of(LawEquations.of(identify, arm), final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
@@ -170,11 +175,10 @@ def _usable_rows(logs: JointLogs, window: float, beside: tuple[int, ...], arm: O
 def _about_a_flexible_law(stretches: tuple[Stretch, ...], fitted: int, arm: OneJoint,
                           resolution: float) -> tuple[tuple[Stretch, ...], LawFit]:
     """The motion refined about a law that follows any curve, and that law."""
-    flexible = law_named(_FLEXIBLE) or LADDER[-1]
-    fit = fit_law(LawEquations.of(stretches[:fitted], arm), flexible)
+    fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE)
     for _ in range(_ROUNDS):
         before, stretches = fit, tuple(refined(stretch, fit, resolution) for stretch in stretches)
-        fit = fit_law(LawEquations.of(stretches[:fitted], arm), flexible, [before.theta])
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE, [before.theta])
     return stretches, fit
 
 
@@ -185,28 +189,59 @@ def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, con
     return float(doubt.mean()) <= config.worse * sliding.mean_square or float(doubt.sum()) <= float(sure.sum())
 
 
-def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
-            drift: DriftConfig) -> Course | None:
-    """How friction changes in time over the logs that are fitted."""
+def _courses(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
+            drift: DriftConfig) -> tuple[Course, ...]:
+    """How friction may change in time over the logs that are fitted: a course for every form; empty where it does not."""
     if not rows.any_slide:
-        return None
+        return ()
     slides = rows.sliding.slides
     if all(stretch.sticks is None for stretch in stretches):
         stretches = left_out(stretches, slides)
     fitted = stretches[:rows.fitted]
     equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
-    return drift_of(fitted, equations.y, np.hstack([equations.fixed, free_curve(speed, config)]), drift)
+    return drift_of(fitted, equations.y, equations.fixed, free_curve(speed, config), drift)
+
+
+def _with_course(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit,
+                 arm: OneJoint) -> tuple[tuple[Stretch, ...], LawFit, Course | None]:
+    """The stretches along `course`, their flexible law, and the course with its time constant fitted."""
+    for k in range(_COURSES if course is not None else 0):
+        stretches = _along(stretches, course, fit)
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, None if k == 0 else [fit.theta])
+        course = _next(course, fit)
+    return _along(stretches, course, fit), fit, course
 
 
 def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -> tuple[Stretch, ...]:
-    """The stretches with columns of `course`, a change of the curve of `fit`."""
-    if course is None or not stretches:
+    """The stretches with columns of `course`, a change of the curve of `fit`, and of friction that lags behind its speed.
+
+    f(v(t - T)) = f - T df/dt to first order (Armstrong-Hélouvry et al. 1994, Section 2.1). Of f counts what departs from the slope
+    at the highest speeds: viscous friction does not lag, and its lag would be inertia. T < 0 where bristles straighten.
+    """
+    if not stretches:
         return stretches
-    fastest = max(float(np.abs(stretch.dq).max()) for stretch in stretches)
-    side = fastest * np.geomspace(1e-4, 1.0, _CURVE)
+    rows = np.abs(np.concatenate([stretch.middle[1] for stretch in stretches]))
+    fastest = float(max(np.abs(stretch.dq).max() for stretch in stretches))
+    side = np.geomspace(max(float(rows.min()), 1e-3 * float(rows.max())), fastest, _CURVE)
     speed = np.concatenate([-side[::-1], side])
-    own = replace(course, curve=(speed, fit.curve(speed)))
-    return tuple(replace(stretch, course=own) for stretch in stretches)
+    curve = fit.curve(speed)
+    ends = (curve[_FASTEST] - curve[0], curve[-1] - curve[-1 - _FASTEST])
+    bent = curve - np.where(speed < 0.0, *ends) / (side[-1] - side[-1 - _FASTEST]) * speed
+    lags = max(np.ptp(bent[:_CURVE]), np.ptp(bent[_CURVE:])) > _BENT * float(np.abs(curve).max())
+    lags = lags and any(stretch.sticks is not None for stretch in stretches)
+    own = None if course is None else replace(course, curve=(speed, curve))
+    return tuple(replace(stretch, course=own, lag=(speed, bent) if lags else None) for stretch in stretches)
+
+
+def _next(course: Course | None, fit: LawFit) -> Course | None:
+    """The course with the time constant of a fit, one step of Gauss and Newton on."""
+    if course is None or course.kind == "step":
+        return course
+    if course.change == 0.0:
+        return replace(course, change=float(fit.found.beta[fit.rigid_size - 1]))
+    change, step = fit.found.beta[fit.rigid_size - 2:fit.rigid_size]
+    time = float(np.clip(course.time * np.exp(np.clip(step, -0.5, 0.5)), 0.05 * course.until, 10.0 * course.until))
+    return replace(course, change=float(change), time=time)
 
 
 def _with_errors_in_variables(fit: LawFit, attenuation: float) -> LawFit:
@@ -215,12 +250,6 @@ def _with_errors_in_variables(fit: LawFit, attenuation: float) -> LawFit:
     places = fit.rigid_size * np.arange(len(fit.postures))
     covariance[places, places] += np.square(min(attenuation, 1.0) * fit.found.beta[places])
     return replace(fit, found=replace(fit.found, covariance=covariance))
-
-
-def _blocks(stretches: Sequence[Stretch]) -> npt.NDArray[np.intp]:
-    """Number of the block of `_MEMORY` seconds that each row is in (rows,)."""
-    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / _MEMORY) for k, stretch in enumerate(stretches)]
-    return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
 def _swaying(logs: JointLogs) -> tuple[int, ...]:

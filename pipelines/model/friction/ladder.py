@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.fit.varpro import linear_part
+from pipelines.fit.varpro import held_out, linear_part
 from pipelines.model.friction.equations import Equations
 from pipelines.model.friction.fit_law import fit_law, takes_power
 from pipelines.model.friction.law_fit import LawFit
@@ -175,16 +175,12 @@ def _alike(one: Array, best: Array) -> bool:
 def _held_out(fit: LawFit) -> Array:
     """The residual of every block of rows as the other blocks would have it.
 
-    By the first order of the law about the whole fit: δ solves r = F δ over the other rows, F = ∂ŷ/∂(β, θ).
+    By the first order of the law about the whole fit.
     """
     found = fit.found
-    rows = np.arange(len(found.residual))
-    residual = np.empty(len(rows))
-    for part in np.array_split(rows, _FOLDS):
-        rest = np.delete(rows, part)
-        change = linear_part(found.jacobian[rest], found.residual[rest])
-        residual[part] = found.residual[part] - found.jacobian[part] @ change.beta
-    return residual
+    part = linear_part(found.jacobian, found.residual)
+    blocks = np.arange(len(found.residual)) * _FOLDS // len(found.residual)
+    return held_out(part.columns @ part.root, found.residual, blocks)
 
 
 def _fault(fit: LawFit, takes: bool) -> str:

@@ -28,8 +28,9 @@ def drift_in_words(drift: Drift | None, name: str, revolute: bool) -> str:
         return (f"{part} of {name} {size} at once, {plain_number(drift.when)} s into {drift.log}; the law "
                 "is that before.")
     middle = plain_number(drift.holds_at)
-    return (f"{part} of {name} {size} of its value at {middle} s in the course of each log, with a time constant of about "
-            f"{plain_number(drift.when)} s; the law holds at {middle} s.")
+    return (f"{part} of {name} {size} of its value at {middle} s in the course of each log, with a time constant of "
+            f"{plain_number(drift.when)}{f' ± {plain_number(drift.when_std)}' if drift.when_std is not None else ''} s; "
+            f"the law holds at {middle} s.")
 
 
 def sticking_in_words(sticking: Sticking | None, name: str, revolute: bool) -> str:
@@ -41,12 +42,13 @@ def sticking_in_words(sticking: Sticking | None, name: str, revolute: bool) -> s
              f"up to a travel of {plain_number(sticking.distance)} {'rad' if revolute else 'm'}, and friction is no "
              "function of its speed.")
     if sticking.slips:
-        words += f" It sticks and slips on {sticking.slips} times amid motion one way."
+        words += (f" It sticks and slips on {sticking.slips} times amid motion one way: only the slips are fitted, and the law "
+                  "holds from the slowest speed that was driven on. Drive faster or with a stiffer loop to see slower sliding.")
     return words
 
 
 def nuisance_findings(joint: JointFit, name: str) -> tuple[Check, ...]:
-    """D26 friction that drifts, D08 an encoder too coarse, S14 viscous friction below zero."""
+    """D26 friction that drifts, D08 an encoder too coarse, D09 nothing to judge by, S14 viscous friction below zero."""
     where = joint.logs.identify[0][0].source or joint.logs.identify[0][0].name
     found = []
     if words := drift_in_words(drift_of_joint(joint), name, joint.fit.joint.revolute):
@@ -59,6 +61,10 @@ def nuisance_findings(joint: JointFit, name: str) -> tuple[Check, ...]:
             "D08", "warn", f"the encoder is too coarse for these motions: {noise:.0f} % of the acceleration of joint "
             f"{joint.logs.joint} is noise (variance), and its inertia comes out as much too small", where=where, gate=True,
             remedy="record quicker changes of speed, at higher speeds, or a finer encoder"))
+    if joint.logs.validate and not joint.driven.judging:
+        found.append(Check.of(
+            "D09", "warn", f"joint {joint.logs.joint} slides in none of its validation logs: blocks of the identification logs "
+            "judge its law", where=where, remedy="record validation logs at the speeds of the identification logs"))
     if check := _negative_viscous(joint, where):
         found.append(check)
     return tuple(found)

@@ -91,6 +91,7 @@ class Drift:
     speed: float  # [rad/s] at which
     holds_at: float  # [s] since the start of a log, when friction is the law; of a step, before it
     log: str
+    when_std: float | None = None  # [s] of a time constant; null of a step, and of a trend that runs straight
 
 
 @dataclass(frozen=True)
@@ -272,9 +273,11 @@ def drift_of_joint(joint: JointFit) -> Drift | None:
     speed = 0.5 * joint.covered.fastest
     level = float(np.mean(np.abs(fit.curve(np.array([speed, -speed])))))
     own = joint.stretches[0].course or course
-    share = course.whole * float(np.mean(np.abs(own.shape(np.array([speed, -speed]))))) / level
-    change = Value(share * float(fit.found.beta[fit.rigid_size - 1]), abs(share) * float(fit.std[fit.rigid_size - 1]), "1")
-    return Drift(course.kind, course.form, course.time, change, speed, course.holds, joint.stretches[course.part].name)
+    share = float(np.mean(np.abs(own.shape(np.array([speed, -speed]))))) / level
+    place = fit.rigid_size - (2 if own.change != 0.0 else 1)
+    change = Value(share * float(fit.found.beta[place]), abs(share) * float(fit.std[place]), "1")
+    when_std = course.time * float(fit.std[fit.rigid_size - 1]) if own.change != 0.0 else None
+    return Drift(course.kind, course.form, course.time, change, speed, course.holds, joint.stretches[course.part].name, when_std)
 
 
 def _sticking(joint: JointFit) -> Sticking | None:

