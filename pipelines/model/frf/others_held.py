@@ -1,19 +1,22 @@
 """Take the motion of the other joints out of a response: what the joint would answer were they held.
 
-    τ_j = Z_jj(s) a_j + F(s) Σ_k D_jk a_k,    Z_jj(s) = D_jj + Σ_m (c_m + d_m s) / (1 + b_m s + a_m s²) + friction, gravity
+    τ_j = Σ_k Z_jk(s) e^(sδ) a_k,    Z_jk(s) = D_jk - Σ_m b_jm b_km s² / (s² + 2 ζ_m ω_m s + ω_m²)
 
-a_k are accelerations and D is the mass matrix. Compliance makes the poles of the dynamic stiffness Z (Ewins 2000, Modal
-Testing, §2.4): a base those of Z_jj alone (F = 1), a spring in the joint those of all that its link carries (F = 1 over its
-section). The other joints are held by their controllers, and above the band of those they swing freely: the inertia at joint j
-then falls from D_jj towards 1 / (D⁻¹)_jj, which looks like a heavily damped mode. Their motion is in the log; with it D_jk is
-found by least squares over frequency, linear once the poles are given.
+a_k are accelerations and D is the mass matrix; friction and gravity of the joint add to Z_jj. The modes m are those of the arm
+with all joints locked: the arm on its base, and each link on the spring that its motor turns it with. They are the poles of all
+Z_jk alike, and their residues are of rank one (Ewins 2000, Modal Testing, §2.4; Craig, Bampton 1968, AIAA J. 6, p. 1313). The
+other joints are held by their controllers, and above the band of those they swing freely: the inertia at joint j then falls from
+D_jj towards 1 / (D⁻¹)_jj, which looks like a heavily damped mode. Their motion is in the log, as noisy as it is read: Z is found
+by maximum likelihood, |τ_j - Σ Z_jk a_k|² over its own variance (Pintelon, Schoukens 2012, System Identification, §9.11).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from pipelines.log.experiment import Array
 from pipelines.model.frf.controller import Complex
@@ -27,29 +30,19 @@ class HeldConfig:
     """How Z is found.
 
     Attributes:
-        poles: pairs of them at most: a base and a joint.
-        frequencies, dampings: tried for each pair, the best of which is refined up to the largest damping.
-        gain: of the squares that are left, the share that a further pair of poles may leave at most. Errors of the model are
-            alike over many bins: statistics of independent bins would let it follow them. True modes leave a tenth.
+        modes: at most: a base and a spring in two joints.
+        frequencies, dampings: tried for each mode; the last damping is the largest.
+        delay: [s] the largest.
         floor: of the torque, what the model leaves out in every bin.
         fewest: bins.
     """
 
-    poles: int = 2
+    modes: int = 3
     frequencies: int = 60
     dampings: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
-    gain: float = 1.0 / 3.0
+    delay: float = 0.02
     floor: float = 0.01
     fewest: int = 20
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """Least squares with some poles."""
-
-    sections: tuple[Complex, ...]  # 1 + b s + a s² (bins,) of each pair of poles
-    coupling: Complex  # F D_jk (bins, other joints)
-    cost: float  # weighted sum of squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,13 +51,36 @@ class _Rows:
 
     torque: Complex  # (bins,)
     acceleration: Complex  # a_j, then those of the others (bins, joints)
-    weight: Array  # 1 / std of a part of the rest (bins,)
+    covariance: Complex  # of torque and accelerations (bins, 1 + joints, 1 + joints)
+    floor: Array  # std that the torque has at least (bins,)
     s: Complex  # jω (bins,)
+    independent: float  # bins that count
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Z with some modes."""
+
+    shape: Array  # δ [s], then log ω [rad/s] and log ζ of each mode (1 + 2 modes,)
+    gains: Array  # D_jk, b_jm b_km of each mode, friction and gravity of joint j (joints (1 + modes) + 2,)
+    impedance: Complex  # Z_jk e^(sδ) (bins, joints)
+    rest: Array  # real and imaginary parts over their std (2 bins,)
+
+    @property
+    def passive(self) -> bool:
+        """Whether every b_jm² is positive."""
+        joints = self.impedance.shape[1]
+        return bool((self.gains[joints:-2:joints] > 0.0).all())
+
+    def description(self, independent: float) -> float:
+        """n log(sum of squares) + p log n (Rissanen 1978, Automatica 14)."""
+        n = 2.0 * independent
+        return float(n * np.log(max(float(self.rest @ self.rest), 1e-300)) + (len(self.shape) + len(self.gains)) * np.log(n))
 
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
                 config: HeldConfig | None = None) -> FrequencyResponse | None:
-    """The response from torque to position with the other joints held; None where their motion does not matter.
+    """Return the response from torque to position with the other joints held; None where there are none.
 
     Args:
         responses: from v to torque and all positions, in the excited band.
@@ -74,68 +90,84 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     config = config or HeldConfig()
     if not others or len(responses.frequency) < config.fewest:
         return None
-    s = np.asarray(2j * np.pi * responses.frequency)
-    target = responses.response[:, torque]
-    own = responses.covariance[:, torque, torque].real + (config.floor * np.abs(target)) ** 2
-    rows = _Rows(target, responses.response[:, [position, *others]] / rigid[:, None], 1.0 / np.sqrt(0.5 * own), s)
-    first = _least_squares(rows, (), None)
-    to = _taking(responses, first.coupling, rigid, torque, position, others)
-    left = np.einsum("ba,bac,bc->b", to[:, 0], responses.covariance, np.conj(to[:, 0])).real + (config.floor * np.abs(target)) ** 2
-    rows = replace(rows, weight=1.0 / np.sqrt(0.5 * left))
-    coupled = _with_poles(rows, config)
-    to = _taking(responses, coupled.coupling, rigid, torque, position, others)
-    return closed_loop(replace(responses, response=(to @ responses.response[:, :, None])[..., 0],
-                               covariance=to @ responses.covariance @ np.conj(np.swapaxes(to, 1, 2)),
+    kept = [torque, position, *others]
+    scale = np.stack([np.ones_like(rigid), *(1.0 / rigid for _ in kept[1:])], axis=1)
+    values = responses.response[:, kept] * scale
+    covariance = responses.covariance[:, kept][:, :, kept] * scale[:, :, None] * np.conj(scale[:, None, :])
+    rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.abs(values[:, 0]),
+                 np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
+    coupling = _with_modes(rows, config).impedance[:, 1:]
+    to = np.zeros((len(rigid), 2, len(kept)), dtype=np.complex128)
+    to[:, 0, 0], to[:, 1, 1] = 1.0, 1.0
+    to[:, 0, 2:] = -coupling / rigid[:, None]
+    own = responses.covariance[:, kept][:, :, kept]
+    return closed_loop(replace(responses, response=(to @ responses.response[:, kept, None])[..., 0],
+                               covariance=to @ own @ np.conj(np.swapaxes(to, 1, 2)),
                                coherence=responses.coherence[:, [torque, position]]))
 
 
-def _taking(responses: Responses, coupling: Complex, rigid: Complex, torque: int, position: int,
-            others: tuple[int, ...]) -> Complex:
-    """From all outputs to the torque less that of the other joints, and the position (bins, 2, outputs)."""
-    to = np.zeros((len(rigid), 2, responses.response.shape[1]), dtype=np.complex128)
-    to[:, 0, torque], to[:, 1, position] = 1.0, 1.0
-    to[:, 0, list(others)] = -coupling / rigid[:, None]
-    return to
-
-
-def _with_poles(rows: _Rows, config: HeldConfig) -> _Fit:
-    """Add pairs of poles as long as each explains most of the residual."""
-    best = _least_squares(rows, (), None)
-    for number in range(config.poles):
-        if best.cost <= 2.0 * len(rows.s):  # explained to within `floor` and noise (Morozov's discrepancy principle)
+def _with_modes(rows: _Rows, config: HeldConfig) -> _Fit:
+    """Add modes as long as they shorten the description."""
+    rigid = _linear(rows, np.zeros(1), np.sqrt(rows.covariance[:, 0, 0].real + rows.floor**2))
+    best = known = _likely(rows, rigid, config)
+    frequencies = np.log(np.geomspace(abs(rows.s[0]), abs(rows.s[-1]), config.frequencies))
+    for _ in range(config.modes):
+        spread = _spread(rows, known.impedance)
+        trials = [_linear(rows, np.array([*known.shape, w, np.log(z)]), spread) for w in frequencies for z in config.dampings]
+        more = min((one for one in trials if one.passive), key=lambda one: float(one.rest @ one.rest), default=None)
+        if more is None:
             break
-        more = min((_pole_more(rows, best, by, config) for by in (None, *range(number + 1))), key=lambda fit: fit.cost)
-        if more.cost > config.gain * best.cost:
-            break
-        best = more
+        known = _likely(rows, more, config)
+        if known.passive and known.description(rows.independent) < best.description(rows.independent):
+            best = known
     return best
 
 
-def _pole_more(rows: _Rows, known: _Fit, filtered: int | None, config: HeldConfig) -> _Fit:
-    """The best pair of poles more: over the whole band, then nearer and nearer to the best."""
-    omega = np.abs(rows.s)
-    frequencies, dampings = np.geomspace(omega[0], omega[-1], config.frequencies), np.array(config.dampings)
-    step, best = np.log(frequencies[1] / frequencies[0]), known
-    for narrower in (0.5, 0.25, 0.125, 0.0625, 0.0312, 0.0156):
-        tried = [(_least_squares(rows, (*known.sections, 1.0 + 2.0 * z * rows.s / w + (rows.s / w) ** 2), filtered), w, z)
-                 for w in frequencies for z in dampings]
-        best, w, z = min(tried, key=lambda one: one[0].cost)
-        frequencies = w * np.exp(narrower * step * np.array([-1.0, 0.0, 1.0]))
-        dampings = np.minimum(z * 2.0 ** (narrower * np.array([-1.0, 0.0, 1.0])), config.dampings[-1])
-    return best
+def _likely(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
+    """The most likely parameters near `start`."""
+    count, modes = len(start.shape), len(start.shape) // 2
+    size = np.concatenate([[1e-4], np.full(2 * modes, 0.01), np.maximum(0.01 * np.abs(start.gains), 1e-9)])
+    low, high = np.full(len(size), -np.inf), np.full(len(size), np.inf)
+    low[:count] = [-config.delay, *np.tile([np.log(abs(rows.s[0])), np.log(1e-3)], modes)]
+    high[:count] = [config.delay, *np.tile([np.log(abs(rows.s[-1])), np.log(1.01 * config.dampings[-1])], modes)]
+    x = np.concatenate([start.shape, start.gains])
+
+    def at(x: Array) -> _Fit:
+        impedance = _impedance(rows, x[:count], x[count:])
+        rest = (rows.torque - (impedance * rows.acceleration).sum(axis=1)) / _spread(rows, impedance)
+        return _Fit(x[:count], x[count:], impedance, np.concatenate([rest.real, rest.imag]))
+
+    found = least_squares(lambda y: at(y * size).rest, np.clip(x, low + 1e-9, high - 1e-9) / size,
+                          bounds=(low / size, high / size), max_nfev=20)
+    return at(found.x * size)
 
 
-def _least_squares(rows: _Rows, sections: tuple[Complex, ...], filtered: int | None) -> _Fit:
-    """Real coefficients of every column, F = 1 over the section `filtered`."""
-    s, own = rows.s, rows.acceleration[:, :1]
-    through = 1.0 if filtered is None else 1.0 / sections[filtered][:, None]
-    shapes = np.stack([np.ones_like(s), 1.0 / s, 1.0 / s**2, *(part for one in sections for part in (1.0 / one, s / one))], axis=1)
-    columns = np.concatenate([own * shapes, rows.acceleration[:, 1:] * through], axis=1) * rows.weight[:, None]
-    stacked = np.concatenate([columns.real, columns.imag])
-    right = np.concatenate([(rows.torque * rows.weight).real, (rows.torque * rows.weight).imag])
+def _spread(rows: _Rows, impedance: Complex) -> Array:
+    """Std of a part of τ_j - Σ Z_jk a_k (bins,)."""
+    to = np.concatenate([np.ones((len(impedance), 1)), -impedance], axis=1)
+    variance = np.einsum("ba,bac,bc->b", to, rows.covariance, np.conj(to)).real
+    return np.asarray(np.sqrt(0.5 * (variance + rows.floor**2)))
+
+
+def _linear(rows: _Rows, shape: Array, spread: Array) -> _Fit:
+    """Least squares of the gains, `spread` (bins,) given."""
+    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in _shapes(rows, shape)], axis=1) / spread[:, None]
+    stacked, target = np.concatenate([columns.real, columns.imag]), rows.torque / spread
+    right = np.concatenate([target.real, target.imag])
     size = np.maximum(np.sqrt((stacked**2).sum(axis=0)), 1e-300)
     stacked /= size
-    solution = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
-    cost = max(float(((right - stacked @ solution) ** 2).sum()), 1e-300)
-    coupling = np.broadcast_to((solution / size)[shapes.shape[1]:] * through, (len(s), rows.acceleration.shape[1] - 1))
-    return _Fit(sections, np.asarray(coupling, dtype=np.complex128), cost)
+    gains = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
+    return _Fit(shape, gains / size, _impedance(rows, shape, gains / size), right - stacked @ gains)
+
+
+def _impedance(rows: _Rows, shape: Array, gains: Array) -> Complex:
+    return np.asarray(sum(gain * one for gain, one in zip(gains, _shapes(rows, shape), strict=True)))
+
+
+def _shapes(rows: _Rows, shape: Array) -> Sequence[Complex]:
+    """What each gain multiplies in Z e^(sδ), each (bins, joints)."""
+    s, joints = rows.s, rows.acceleration.shape[1]
+    late = np.exp(shape[0] * s)
+    modes = [late, *(-late * s**2 / (s**2 + 2.0 * np.exp(z + w) * s + np.exp(2.0 * w)) for w, z in shape[1:].reshape(-1, 2))]
+    return [*(one[:, None] * unit for one in modes for unit in np.eye(joints)),
+            *((late / s**power)[:, None] * np.eye(joints)[0] for power in (1, 2))]
