@@ -66,6 +66,7 @@ class Turned:
     left_out: float  # share of the samples
     filled: float  # share of the samples that were lost, and filled alike in all channels
     held: bool  # the input is held from one sample to the next; False: sampled at some instant between two, as position is
+    torque_held: bool  # the same of the torque
     mean_input: tuple[float | None, float | None]  # of the input, forwards and backwards: what friction and load leave
 
     @property
@@ -140,7 +141,8 @@ def turned_joint(log: ExperimentLog) -> Turned:
     return Turned(log.name, joint, posture, log.sample_time, quantity, log.controller,
                   log.robot.joints[j].revolute, top if top > _STILL else 0.0, _swing(stretches, log.sample_time),
                   excitation_period(even.recorded_v, log.period, log.sample_time), stretches, signals, 1.0 - kept / len(signals),
-                  even.filled, quantity == "r" or log.torque != "measured", (_mean(stretches, 1), _mean(stretches, -1)))
+                  even.filled, quantity == "r" or log.torque != "measured", log.torque != "measured",
+                  (_mean(stretches, 1), _mean(stretches, -1)))
 
 
 @dataclass(frozen=True, eq=False)

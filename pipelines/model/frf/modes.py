@@ -31,11 +31,9 @@ _SURE = 0.05  # relative std of a frequency that is known at all
 # Relative std of a damping beside noise: the slope of friction, the joint's and that of held joints, depends on how far the speed
 # swings. On the bench, with swings of a tenth of the turn, it changes damping by 2 to 6 %.
 _BY_FRICTION = 0.03
-_CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
-_NARROW = 0.25  # of the resolution, the least width 2 ζ f of a mode
 _STUCK = 3.0  # misfit that a search which found the modes hardly leaves
 _SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
 _LONGEST = 0.05  # [s] no delay is longer
@@ -118,17 +116,19 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     relative = relative.where(measured.excited.holds(relative.frequency))
     fit = _fitted(part)
     moving = [(m, to) for m, to in _moving(measured, part, fit) if measured.excited.holds(np.array(m.frequency.value))]
-    modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution))
-    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m, part.resolution))
+    modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m))
+    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
     rise = float(np.prod([p.rise for p in pairs])) if pairs else 1.0
     above = Known(level.value * rise, float(np.hypot(level.std * rise, level.value * rise * _rise_std(pairs))))
+    ratio = measured.torque_per_input
+    inertia = None if ratio is None else Known(ratio / level.value, abs(ratio) * level.std / level.value**2)
     smooth = np.arange(_STRAIGHT[0], min(_STRAIGHT[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
-                 _inertia(measured, level), _friction_below(relative, level), fit.misfit, _left(fit, part),
+                 inertia, _friction_below(relative, level), fit.misfit, _left(fit, part),
                  (float(part.frequency[0]), float(part.frequency[-1])), fit,
                  HELD_STILL if measured.held is None else TAKEN_OUT)
 
@@ -197,14 +197,14 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
     return np.asarray(found), np.sqrt(np.diag(inverse) * correlated * max(misfit, 1.0))
 
 
-def _is_mode(mode: Mode, resolution: float) -> bool:
-    """One that is known, and not narrower than what the spectrum resolves."""
+def _is_mode(mode: Mode) -> bool:
+    """One that is known."""
     f, damping = mode.frequency, mode.damping.value
-    return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value and 2.0 * damping * f.value > _NARROW * resolution
+    return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value
 
 
-def _is_trace(mode: Mode, resolution: float) -> bool:
-    return _is_mode(replace(mode, distinct=True), resolution) and mode.damping.value > _SEEN * mode.damping.std
+def _is_trace(mode: Mode) -> bool:
+    return _is_mode(replace(mode, distinct=True)) and mode.damping.value > _SEEN * mode.damping.std
 
 
 def _moving(measured: Measured, part: FrequencyResponse, fit: Rational) -> list[tuple[Mode, Mode]]:
@@ -247,21 +247,6 @@ def _rise_std(pairs: tuple[Pair, ...]) -> float:
     """Relative, of the product of all rises."""
     parts = [2.0 * f.std / f.value for p in pairs for f in (p.antiresonance.frequency, p.resonance.frequency)]
     return float(np.sqrt(np.sum(np.square(parts))))
-
-
-def _inertia(measured: Measured, level: Known) -> Known | None:
-    """u/τ is one number per joint, D̂ or 1: the inertia is that over the level."""
-    torque, plant = (one.where(measured.excited.holds(one.frequency)).within(*_CONSTANT)
-                     for one in (measured.compliance, measured.plant))
-    if not len(torque.frequency) or len(torque.frequency) != len(plant.frequency):
-        return None
-    ratio = plant.response / torque.response  # τ/u
-    weight = np.abs(torque.response) ** 2 / np.maximum(torque.variance, 1e-300)
-    order = np.argsort(ratio.real)
-    middle = np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum())
-    torque_per_input = float(ratio.real[order][min(int(middle), len(order) - 1)])
-    value = torque_per_input / level.value
-    return Known(value, abs(value) * level.std / abs(level.value))
 
 
 def _friction_below(relative: FrequencyResponse, level: Known) -> float:

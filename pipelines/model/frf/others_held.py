@@ -34,6 +34,7 @@ class HeldConfig:
         frequencies, dampings: tried for each mode; the last damping is the largest.
         delay: [s] the largest.
         floor: of the torque, what the model leaves out in every bin.
+        weighings: times that the variance of the rest is renewed.
         fewest: bins.
     """
 
@@ -42,6 +43,7 @@ class HeldConfig:
     dampings: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
     delay: float = 0.02
     floor: float = 0.01
+    weighings: int = 4
     fewest: int = 20
 
 
@@ -65,17 +67,25 @@ class _Fit:
     gains: Array  # D_jk, b_jm b_km of each mode, friction and gravity of joint j (joints (1 + modes) + 2,)
     impedance: Complex  # Z_jk e^(sδ) (bins, joints)
     rest: Array  # real and imaginary parts over their std (2 bins,)
+    spread: Array  # that std (bins,)
+
+    inside: bool = True  # every frequency and damping lies within its bounds: at one, it is not found
+
+    @property
+    def cost(self) -> float:
+        return max(float(self.rest @ self.rest), 1e-300)
 
     @property
     def passive(self) -> bool:
-        """Whether every b_jm² is positive."""
+        """Whether every b_jm² is positive, of a mode that is found."""
         joints = self.impedance.shape[1]
-        return bool((self.gains[joints:-2:joints] > 0.0).all())
+        return self.inside and bool((self.gains[joints:-2:joints] > 0.0).all())
 
     def description(self, independent: float) -> float:
-        """n log(sum of squares) + p log n (Rissanen 1978, Automatica 14)."""
-        n = 2.0 * independent
-        return float(n * np.log(max(float(self.rest @ self.rest), 1e-300)) + (len(self.shape) + len(self.gains)) * np.log(n))
+        """-2 log-likelihood + p log n (Rissanen 1978, Automatica 14)."""
+        share = 2.0 * independent / len(self.rest)
+        return float(share * (self.cost + 4.0 * np.log(self.spread).sum())
+                     + (len(self.shape) + len(self.gains)) * np.log(2.0 * independent))
 
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
@@ -108,38 +118,39 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
 
 def _with_modes(rows: _Rows, config: HeldConfig) -> _Fit:
     """Add modes as long as they shorten the description."""
-    rigid = _linear(rows, np.zeros(1), np.sqrt(rows.covariance[:, 0, 0].real + rows.floor**2))
-    best = known = _likely(rows, rigid, config)
+    plain = np.sqrt(0.5 * (rows.covariance[:, 0, 0].real + rows.floor**2))
+    delays = np.arange(-config.delay, config.delay, np.pi / 4.0 / abs(rows.s[-1]))
+    rigid = [_linear(rows, np.array([delay]), plain) for delay in (0.0, *delays)]
+    best = known = _refined(rows, min(rigid, key=lambda one: one.cost), config)
     frequencies = np.log(np.geomspace(abs(rows.s[0]), abs(rows.s[-1]), config.frequencies))
+    shapes = [np.array([w, np.log(z)]) for w in frequencies[1:-1] for z in config.dampings]
     for _ in range(config.modes):
-        spread = _spread(rows, known.impedance)
-        trials = [_linear(rows, np.array([*known.shape, w, np.log(z)]), spread) for w in frequencies for z in config.dampings]
-        more = min((one for one in trials if one.passive), key=lambda one: float(one.rest @ one.rest), default=None)
-        if more is None:
+        starts = []
+        for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
+            trials = (_linear(rows, np.concatenate([[delay], known.shape[1:], shape]), spread) for shape in shapes)
+            starts.append(min((one for one in trials if one.passive), key=lambda one: one.cost, default=None))
+        found = [one for one in (_refined(rows, start, config) for start in starts if start is not None) if one.passive]
+        if not found:
             break
-        known = _likely(rows, more, config)
-        if known.passive and known.description(rows.independent) < best.description(rows.independent):
+        known = min(found, key=lambda one: one.cost)
+        if known.description(rows.independent) < best.description(rows.independent):
             best = known
     return best
 
 
-def _likely(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
-    """The most likely parameters near `start`."""
-    count, modes = len(start.shape), len(start.shape) // 2
-    size = np.concatenate([[1e-4], np.full(2 * modes, 0.01), np.maximum(0.01 * np.abs(start.gains), 1e-9)])
-    low, high = np.full(len(size), -np.inf), np.full(len(size), np.inf)
-    low[:count] = [-config.delay, *np.tile([np.log(abs(rows.s[0])), np.log(1e-3)], modes)]
-    high[:count] = [config.delay, *np.tile([np.log(abs(rows.s[-1])), np.log(1.01 * config.dampings[-1])], modes)]
-    x = np.concatenate([start.shape, start.gains])
-
-    def at(x: Array) -> _Fit:
-        impedance = _impedance(rows, x[:count], x[count:])
-        rest = (rows.torque - (impedance * rows.acceleration).sum(axis=1)) / _spread(rows, impedance)
-        return _Fit(x[:count], x[count:], impedance, np.concatenate([rest.real, rest.imag]))
-
-    found = least_squares(lambda y: at(y * size).rest, np.clip(x, low + 1e-9, high - 1e-9) / size,
-                          bounds=(low / size, high / size), max_nfev=20)
-    return at(found.x * size)
+def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
+    """Delay, frequencies and dampings by variable projection (Golub, Pereyra 1973, SIAM J. Numer. Anal. 10, p. 413), the
+    variance of the rest from the impedance found before."""
+    modes = len(start.shape) // 2
+    low = np.array([-config.delay, *np.tile(np.log([abs(rows.s[0]), 1e-3]), modes)])
+    high = np.array([config.delay, *np.tile(np.log([abs(rows.s[-1]), 1.01 * config.dampings[-1]]), modes)])
+    fit, mask = start, np.zeros(len(low))
+    for _ in range(config.weighings):
+        spread = _spread(rows, fit.impedance)
+        found = least_squares(lambda x, spread=spread: _linear(rows, x, spread).rest, np.clip(fit.shape, low + 1e-9, high - 1e-9),
+                              bounds=(low, high), x_scale=np.array([1e-4, *np.full(2 * modes, 0.1)]), max_nfev=10)
+        fit, mask = _linear(rows, found.x, spread), found.active_mask
+    return replace(fit, inside=not mask[1:].any())
 
 
 def _spread(rows: _Rows, impedance: Complex) -> Array:
@@ -157,7 +168,7 @@ def _linear(rows: _Rows, shape: Array, spread: Array) -> _Fit:
     size = np.maximum(np.sqrt((stacked**2).sum(axis=0)), 1e-300)
     stacked /= size
     gains = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
-    return _Fit(shape, gains / size, _impedance(rows, shape, gains / size), right - stacked @ gains)
+    return _Fit(shape, gains / size, _impedance(rows, shape, gains / size), right - stacked @ gains, spread)
 
 
 def _impedance(rows: _Rows, shape: Array, gains: Array) -> Complex:

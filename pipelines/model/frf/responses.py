@@ -41,6 +41,7 @@ _SEGMENTS = 4  # at least, for Welch's coherence and variance
 _NO_POWER = 1e-12  # of the strongest bin of the source
 _FOLDED = 0.1  # of the density of v in its band, near half the rate: it goes on beyond
 _COUPLED = 4.0  # [Hz] from where on friction and gravity of the other joints matter less than their inertia
+_CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _DENSITY = 1.0  # [s] of the segments that show where v has power
 _SMOOTH = 25  # lines over which distortion is compared with noise
 
@@ -69,6 +70,7 @@ class Measured:
     turned: tuple[Turned, ...]  # its logs
     plant: FrequencyResponse  # u → q by Φ_vq/Φ_vu
     held: FrequencyResponse | None  # the same in the excited band, were the other joints held; None where that is all one
+    torque_per_input: float | None  # D̂ [kg m^2] under computed torque, 1 under PD; None where they cannot be compared
     aliased: bool  # the input was sampled, not held, and v has power up to half the rate: what lies above has folded back
     excited: ExcitedBand  # where it exists: nothing is fitted, judged or named outside
     direct: FrequencyResponse
@@ -134,9 +136,11 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     band = excited_band(_outputs(several, (INPUT - 1, POSITION - 1)), density)
     inside = density[band.holds(several.frequency)]
     aliased = not first.held and bool(len(inside)) and top > _FOLDED * float(np.median(inside))
-    return Measured(turned, plant, _held(several, first, band), aliased, band,
+    compliance = closed_loop(several, POSITION - 1, TORQUE - 1)
+    ratio = _torque_per_input(plant, compliance, band)
+    return Measured(turned, plant, _held(several, first, band, ratio), ratio, aliased, band,
                     _direct([s.signals for s in stretches], turned, how), both[0], both[1],
-                    closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion, detected)
+                    compliance, sensitivity, _with_reversal(turned, how), distortion, detected)
 
 
 def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tuple[Array, float]:
@@ -147,13 +151,30 @@ def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tup
     return np.interp(frequency, spectra.frequency, density), float(np.median(density[spectra.frequency > 0.45 * rate]))
 
 
-def _held(several: Responses, first: Turned, band: ExcitedBand) -> FrequencyResponse | None:
-    """Of a joint whose input is its torque; computed torque uncouples the joints."""
-    if first.quantity != "tau":
-        return None
+def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None) -> FrequencyResponse | None:
+    """u → q with the other joints held: computed torque leaves them at rest only where nothing gives way."""
     inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
-    rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.held), dtype=np.complex128)
-    return others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])))
+    rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.torque_held), dtype=np.complex128)
+    found = others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])))
+    if found is None or ratio is None:
+        return None
+    return found.times(np.asarray(ratio * double_integrator(inside.frequency, first.sample_time, _delay(first), first.held) / rigid))
+
+
+def _delay(first: Turned) -> int:
+    return loop_delay(first.controller, first.quantity)[1]
+
+
+def _torque_per_input(plant: FrequencyResponse, compliance: FrequencyResponse, band: ExcitedBand) -> float | None:
+    """τ/u, one number per joint, D̂ or 1: the median, weighted by what is known."""
+    torque, whole = (one.where(band.holds(one.frequency)).within(*_CONSTANT) for one in (compliance, plant))
+    if not len(torque.frequency) or len(torque.frequency) != len(whole.frequency):
+        return None
+    ratio = (whole.response / torque.response).real
+    weight = np.abs(torque.response) ** 2 / np.maximum(torque.variance, 1e-300)
+    order = np.argsort(ratio)
+    middle = np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum())
+    return float(ratio[order][min(int(middle), len(order) - 1)])
 
 
 def _outputs(several: Responses, which: tuple[int, ...]) -> Responses:
