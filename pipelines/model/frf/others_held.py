@@ -33,7 +33,8 @@ class HeldConfig:
         modes: at most: a base and a spring in two joints.
         frequencies, dampings: tried for each mode; the last damping is the largest.
         delay: [s] the largest.
-        floor: of the torque, what the model leaves out in every bin.
+        floor: of the torque, what the model leaves out.
+        alike: share of the frequency over which that is the same: its bins count as one.
         weighings: times that the variance of the rest is renewed.
         fewest: bins.
     """
@@ -43,6 +44,7 @@ class HeldConfig:
     dampings: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
     delay: float = 0.02
     floor: float = 0.01
+    alike: float = 0.15
     weighings: int = 4
     fewest: int = 20
 
@@ -104,9 +106,11 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     scale = np.stack([np.ones_like(rigid), *(1.0 / rigid for _ in kept[1:])], axis=1)
     values = responses.response[:, kept] * scale
     covariance = responses.covariance[:, kept][:, :, kept] * scale[:, :, None] * np.conj(scale[:, None, :])
-    rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.abs(values[:, 0]),
+    f = responses.frequency
+    alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
+    rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
                  np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
-    coupling = _with_modes(rows, config).impedance[:, 1:]
+    coupling = _unattenuated(rows, _with_modes(rows, config)).impedance[:, 1:]
     to = np.zeros((len(rigid), 2, len(kept)), dtype=np.complex128)
     to[:, 0, 0], to[:, 1, 1] = 1.0, 1.0
     to[:, 0, 2:] = -coupling / rigid[:, None]
@@ -169,6 +173,25 @@ def _linear(rows: _Rows, shape: Array, spread: Array) -> _Fit:
     stacked /= size
     gains = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
     return _Fit(shape, gains / size, _impedance(rows, shape, gains / size), right - stacked @ gains, spread)
+
+
+def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
+    """The gains without what noise of the accelerations takes off them; as they are where that is more than the half.
+
+    Expected normal equations hold the covariance of the noise; it is known, and taken out (Söderström 2007, Automatica 43, §5.1).
+    """
+    shapes, w = np.stack(_shapes(rows, fit.shape)), 0.5 / fit.spread**2  # (gains, bins, joints)
+    columns = np.einsum("gbk,bk->gb", shapes, rows.acceleration)
+    noise = np.einsum("gbk,bkl,hbl,b->gh", shapes, rows.covariance[:, 1:, 1:], np.conj(shapes), w, optimize=True).real
+    cross = np.einsum("gbk,bk,b->g", shapes, rows.covariance[:, 1:, 0], w, optimize=True).real
+    normal = ((columns * w) @ np.conj(columns.T)).real
+    right = ((columns * w) @ np.conj(rows.torque)).real
+    size = np.sqrt(np.diag(normal))
+    share = np.linalg.eigvals(np.linalg.pinv(normal / np.outer(size, size), hermitian=True) @ (noise / np.outer(size, size)))
+    if not share.real.max() < 0.5:
+        return fit
+    gains = np.linalg.solve(normal - noise, right - cross)
+    return replace(fit, gains=gains, impedance=_impedance(rows, fit.shape, gains))
 
 
 def _impedance(rows: _Rows, shape: Array, gains: Array) -> Complex:
