@@ -40,9 +40,8 @@ _LONGEST = 0.05  # [s] no delay is longer
 _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
 
 
-# Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn;
-# and more where the motion of the others was taken out, by inertias that a fit over all of the band knows to a few per cent.
-HELD_STILL, TAKEN_OUT = 0.008, 0.025
+# Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn.
+HELD_STILL = 0.003
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ def relative_acceleration(measured: Measured, response: FrequencyResponse | None
 
     By default that of the plant, with the other joints held where they are not.
     """
-    response = response or measured.held or measured.plant
+    response = response or (measured.held.response if measured.held else measured.plant)
     return response.times(np.asarray(1.0 / _rigid(measured, response.frequency)))
 
 
@@ -129,8 +128,7 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
                  inertia, _friction_below(relative, level), fit.misfit, _left(fit, part),
-                 (float(part.frequency[0]), float(part.frequency[-1])), fit,
-                 HELD_STILL if measured.held is None else TAKEN_OUT)
+                 (float(part.frequency[0]), float(part.frequency[-1])), fit)
 
 
 def _fitted(part: FrequencyResponse) -> Rational:
@@ -208,19 +206,29 @@ def _is_trace(mode: Mode) -> bool:
 
 
 def _moving(measured: Measured, part: FrequencyResponse, fit: Rational) -> list[tuple[Mode, Mode]]:
-    """Each mode as the fit has it, and as uncertain as its movement along the turn makes it: what parts scatter beyond noise."""
-    modes = fit.modes()
+    """Each mode as the fit has it, and as uncertain as the coupling and its movement along the turn make it."""
+    modes = wider = fit.modes()
     along = along_turn(measured, part.frequency)
-    if along is None or not modes:
-        return [(m, m) for m in modes]
-    relative = along.response / _rigid(measured, part.frequency)
-    seen = scattered(fit, part.frequency, relative, part.variance).modes()
+    if along is not None and modes:
+        wider = _wider(wider, _scattered(measured, part, fit, along.response), modes, along.noise)
+    if measured.held is not None and modes:
+        inside = np.isin(measured.held.response.frequency, part.frequency)
+        wider = _wider(wider, _scattered(measured, part, fit, measured.held.draws[:, inside]), modes, 0.0)
+    return list(zip(modes, wider, strict=True))
 
-    def wider(mean: Known, one: Known) -> Known:
-        return Known(mean.value, float(np.sqrt(mean.std**2 + max(one.std**2 - along.noise * mean.std**2, 0.0))))
 
-    return [(m, replace(m, frequency=wider(m.frequency, s.frequency), damping=wider(m.damping, s.damping)))
-            for m, s in zip(modes, seen, strict=True)]
+def _scattered(measured: Measured, part: FrequencyResponse, fit: Rational, responses: Complex) -> tuple[Mode, ...]:
+    """The modes of the fit with the deviations of those of `responses` u → q (parts, bins)."""
+    return scattered(fit, part.frequency, responses / _rigid(measured, part.frequency), part.variance).modes()
+
+
+def _wider(modes: tuple[Mode, ...], parts: tuple[Mode, ...], mean: tuple[Mode, ...], noise: float) -> tuple[Mode, ...]:
+    """With what `parts` scatter beyond `noise` times the variance of the mean."""
+    def wider(now: Known, part: Known, mean: Known) -> Known:
+        return Known(now.value, float(np.sqrt(now.std**2 + max(part.std**2 - noise * mean.std**2, 0.0))))
+
+    return tuple(replace(m, frequency=wider(m.frequency, p.frequency, k.frequency), damping=wider(m.damping, p.damping, k.damping))
+                 for m, p, k in zip(modes, parts, mean, strict=True))
 
 
 def _with_friction(mode: Mode) -> Mode:

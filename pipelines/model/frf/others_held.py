@@ -22,7 +22,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.frf.controller import Complex
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop
 
-__all__ = ["HeldConfig", "others_held"]
+__all__ = ["Held", "HeldConfig", "others_held"]
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class HeldConfig:
         floor: of the torque, what the model leaves out.
         alike: share of the frequency over which that is the same: its bins count as one.
         weighings: times that the variance of the rest is renewed.
+        draws: of the response within what is known of the coupling.
         fewest: bins.
     """
 
@@ -46,7 +47,20 @@ class HeldConfig:
     floor: float = 0.01
     alike: float = 0.15
     weighings: int = 4
+    draws: int = 24
     fewest: int = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """A response with the other joints held, and draws of it within what is known of their inertia."""
+
+    response: FrequencyResponse
+    draws: Complex  # (draws, bins)
+
+    def times(self, factor: Complex) -> Held:
+        """Both times a known `factor` (bins,)."""
+        return Held(self.response.times(factor), self.draws * factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +105,7 @@ class _Fit:
 
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
-                config: HeldConfig | None = None) -> FrequencyResponse | None:
+                config: HeldConfig | None = None) -> Held | None:
     """Return the response from torque to position with the other joints held; None where there are none.
 
     Args:
@@ -110,14 +124,21 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
     rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
                  np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
-    coupling = _unattenuated(rows, _with_modes(rows, config)).impedance[:, 1:]
-    to = np.zeros((len(rigid), 2, len(kept)), dtype=np.complex128)
+    fit = _unattenuated(rows, _with_modes(rows, config))
+    held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
+    couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit, config.draws)]) / rigid[:, None]
+    rest = responses.response[:, torque] - np.einsum("dbk,bk->db", couplings, responses.response[:, list(others)])
+    return Held(held, np.asarray(responses.response[:, position] / rest))
+
+
+def _less(responses: Responses, kept: list[int], coupling: Complex) -> Responses:
+    """Of the torque less `coupling` (bins, others) times the positions of the others, and of the position."""
+    to = np.zeros((len(coupling), 2, len(kept)), dtype=np.complex128)
     to[:, 0, 0], to[:, 1, 1] = 1.0, 1.0
-    to[:, 0, 2:] = -coupling / rigid[:, None]
-    own = responses.covariance[:, kept][:, :, kept]
-    return closed_loop(replace(responses, response=(to @ responses.response[:, kept, None])[..., 0],
-                               covariance=to @ own @ np.conj(np.swapaxes(to, 1, 2)),
-                               coherence=responses.coherence[:, [torque, position]]))
+    to[:, 0, 2:] = -coupling
+    return replace(responses, response=(to @ responses.response[:, kept, None])[..., 0],
+                   covariance=to @ responses.covariance[:, kept][:, :, kept] @ np.conj(np.swapaxes(to, 1, 2)),
+                   coherence=responses.coherence[:, kept[:2]])
 
 
 def _with_modes(rows: _Rows, config: HeldConfig) -> _Fit:
@@ -182,16 +203,31 @@ def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
     """
     shapes, w = np.stack(_shapes(rows, fit.shape)), 0.5 / fit.spread**2  # (gains, bins, joints)
     columns = np.einsum("gbk,bk->gb", shapes, rows.acceleration)
-    noise = np.einsum("gbk,bkl,hbl,b->gh", shapes, rows.covariance[:, 1:, 1:], np.conj(shapes), w, optimize=True).real
-    cross = np.einsum("gbk,bk,b->g", shapes, rows.covariance[:, 1:, 0], w, optimize=True).real
     normal = ((columns * w) @ np.conj(columns.T)).real
-    right = ((columns * w) @ np.conj(rows.torque)).real
-    size = np.sqrt(np.diag(normal))
-    share = np.linalg.eigvals(np.linalg.pinv(normal / np.outer(size, size), hermitian=True) @ (noise / np.outer(size, size)))
-    if not share.real.max() < 0.5:
+    noise = np.einsum("gbk,bkl,hbl,b->gh", shapes, rows.covariance[:, 1:, 1:], np.conj(shapes), w, optimize=True).real
+    if not np.linalg.eigvals(_inverse(normal) @ noise).real.max() < 0.5:
         return fit
-    gains = np.linalg.solve(normal - noise, right - cross)
+    cross = np.einsum("gbk,bk,b->g", shapes, rows.covariance[:, 1:, 0], w, optimize=True).real
+    gains = np.linalg.solve(normal - noise, ((columns * w) @ np.conj(rows.torque)).real - cross)
     return replace(fit, gains=gains, impedance=_impedance(rows, fit.shape, gains))
+
+
+def _drawn(rows: _Rows, fit: _Fit, draws: int) -> list[Complex]:
+    """Impedances (bins, joints) each, within what is known of shape and gains."""
+    step, count = 1e-5, len(fit.shape)
+    steps = step * np.array([1e-3, *np.ones(count - 1)])
+    moved = [(_impedance(rows, fit.shape + one, fit.gains) - fit.impedance) / one.sum() for one in np.diag(steps)]
+    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in (*moved, *_shapes(rows, fit.shape))]) / fit.spread
+    covariance = _inverse((columns @ np.conj(columns.T)).real)
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    about = np.random.default_rng(0).multivariate_normal(np.zeros(len(size)), covariance / np.outer(size, size), draws) * size
+    return [_impedance(rows, fit.shape + one[:count], fit.gains + one[count:]) for one in about]
+
+
+def _inverse(normal: Array) -> Array:
+    """Of a symmetric matrix whose rows have different units."""
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    return np.asarray(np.linalg.pinv(normal / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size))
 
 
 def _impedance(rows: _Rows, shape: Array, gains: Array) -> Complex:

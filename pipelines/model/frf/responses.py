@@ -23,7 +23,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
-from pipelines.model.frf.others_held import others_held
+from pipelines.model.frf.others_held import Held, others_held
 from pipelines.signal.cross_spectra import cross_spectra
 from pipelines.signal.excited_band import ExcitedBand, excited_band
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
@@ -69,7 +69,7 @@ class Measured:
 
     turned: tuple[Turned, ...]  # its logs
     plant: FrequencyResponse  # u → q by Φ_vq/Φ_vu
-    held: FrequencyResponse | None  # the same in the excited band, were the other joints held; None where that is all one
+    held: Held | None  # the same in the excited band, were the other joints held; None where that is all one
     torque_per_input: float | None  # D̂ [kg m^2] under computed torque, 1 under PD; None where they cannot be compared
     aliased: bool  # the input was sampled, not held, and v has power up to half the rate: what lies above has folded back
     excited: ExcitedBand  # where it exists: nothing is fitted, judged or named outside
@@ -151,7 +151,7 @@ def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tup
     return np.interp(frequency, spectra.frequency, density), float(np.median(density[spectra.frequency > 0.45 * rate]))
 
 
-def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None) -> FrequencyResponse | None:
+def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None) -> Held | None:
     """u → q with the other joints held: computed torque leaves them at rest only where nothing gives way."""
     inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
     rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.torque_held), dtype=np.complex128)
