@@ -80,6 +80,16 @@ class Turned:
         return None if forwards is None or backwards is None else 0.5 * (forwards - backwards)
 
     @property
+    def load(self) -> float:
+        """|mean torque of both directions| over its deviation from the mean of each: what gravity leaves; 0 where it is unknown."""
+        sides = [np.concatenate(own) for way in (1, -1) if (own := [s.signals[:, TORQUE] for s in self.stretches if s.direction == way])]
+        if len(sides) < 2:
+            return 0.0
+        means = [float(side.mean()) for side in sides]
+        deviation = float(np.sqrt(np.mean(np.concatenate([side - side.mean() for side in sides]) ** 2)))
+        return abs(0.5 * sum(means)) / max(deviation, 1e-300)
+
+    @property
     def lines(self) -> tuple[int, ...]:
         """Harmonics of the period that v holds; none where it does not repeat."""
         if self.period is None:

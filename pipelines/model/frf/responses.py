@@ -91,6 +91,11 @@ class Measured:
         return self.first.joint
 
     @property
+    def load(self) -> float:
+        """The steady torque less friction over the deviation of the torque, the smallest of the logs; 0 where unknown."""
+        return min(one.load for one in self.turned)
+
+    @property
     def others(self) -> Array:
         """The angles of the held joints (n - 1,) [rad]."""
         return np.delete(self.first.posture, self.joint - 1)
