@@ -85,17 +85,23 @@ class _Fit:
     rest: Array  # real and imaginary parts over their std (2 bins,)
     spread: Array  # that std (bins,)
 
+    ratios: tuple[Array | None, ...] = ()  # b_km / b_jm of each mode (others,); None: found freely
     inside: bool = True  # every frequency and damping lies within its bounds: at one, it is not found
 
     @property
     def cost(self) -> float:
         return max(float(self.rest @ self.rest), 1e-300)
 
-    @property
-    def passive(self) -> bool:
-        """Whether every b_jm² is positive, of a mode that is found."""
-        joints = self.impedance.shape[1]
-        return self.inside and bool((self.gains[joints:-2:joints] > 0.0).all())
+    def passive(self, most: Array) -> bool:
+        """Whether every mode is found and could exist: b_jm² is positive, and no b_km² is more than D_kk, `most` (others,)."""
+        joints, place = len(most) + 1, len(most) + 1
+        for ratio in self.ratios:
+            size = joints if ratio is None else 1
+            own, others = self.gains[place], self.gains[place + 1:place + size]
+            if own <= 0.0 or (others**2 > most[:len(others)] * own).any():
+                return False
+            place += size
+        return self.inside
 
     def description(self, independent: float) -> float:
         """-2 log-likelihood + p log n (Rissanen 1978, Automatica 14)."""
@@ -105,13 +111,14 @@ class _Fit:
 
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
-                config: HeldConfig | None = None) -> Held | None:
+                most: Array | None = None, config: HeldConfig | None = None) -> Held | None:
     """Return the response from torque to position with the other joints held; None where there are none.
 
     Args:
         responses: from v to torque and all positions, in the excited band.
         rigid: position over acceleration (bins,), complex: the double integrator as it was sampled.
         torque, position, others: places among the outputs.
+        most: D_kk of the others at most (others,) [kg m^2], where it is known.
     """
     config = config or HeldConfig()
     if not others or len(responses.frequency) < config.fewest:
@@ -124,7 +131,7 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
     rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
                  np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
-    fit = _unattenuated(rows, _with_modes(rows, config))
+    fit = _unattenuated(rows, _with_modes(rows, np.full(len(others), np.inf) if most is None else most, config))
     held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
     couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit, config.draws)]) / rigid[:, None]
     rest = responses.response[:, torque] - np.einsum("dbk,bk->db", couplings, responses.response[:, list(others)])
@@ -141,7 +148,7 @@ def _less(responses: Responses, kept: list[int], coupling: Complex) -> Responses
                    coherence=responses.coherence[:, kept[:2]])
 
 
-def _with_modes(rows: _Rows, config: HeldConfig) -> _Fit:
+def _with_modes(rows: _Rows, most: Array, config: HeldConfig) -> _Fit:
     """Add modes as long as they shorten the description."""
     plain = np.sqrt(0.5 * (rows.covariance[:, 0, 0].real + rows.floor**2))
     delays = np.arange(-config.delay, config.delay, np.pi / 4.0 / abs(rows.s[-1]))
@@ -151,13 +158,15 @@ def _with_modes(rows: _Rows, config: HeldConfig) -> _Fit:
     shapes = [np.array([w, np.log(z)]) for w in frequencies[1:-1] for z in config.dampings]
     for _ in range(config.modes):
         starts = []
-        for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
-            trials = (_linear(rows, np.concatenate([[delay], known.shape[1:], shape]), spread) for shape in shapes)
-            starts.append(min((one for one in trials if one.passive), key=lambda one: one.cost, default=None))
-        found = [one for one in (_refined(rows, start, config) for start in starts if start is not None) if one.passive]
+        for kind in (known.gains[1:rows.acceleration.shape[1]] / known.gains[0], None):
+            for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
+                trials = (_linear(rows, np.concatenate([[delay], known.shape[1:], shape]), spread, (*known.ratios, kind))
+                          for shape in shapes)
+                starts.append(min((one for one in trials if one.passive(most)), key=lambda one: one.cost, default=None))
+        found = [one for one in (_refined(rows, start, config) for start in starts if start is not None) if one.passive(most)]
         if not found:
             break
-        known = min(found, key=lambda one: one.cost)
+        known = min(found, key=lambda one: one.description(rows.independent))
         if known.description(rows.independent) < best.description(rows.independent):
             best = known
     return best
@@ -171,11 +180,17 @@ def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
     high = np.array([config.delay, *np.tile(np.log([abs(rows.s[-1]), 1.01 * config.dampings[-1]]), modes)])
     fit, mask = start, np.zeros(len(low))
     for _ in range(config.weighings):
-        spread = _spread(rows, fit.impedance)
-        found = least_squares(lambda x, spread=spread: _linear(rows, x, spread).rest, np.clip(fit.shape, low + 1e-9, high - 1e-9),
+        spread, ratios = _spread(rows, fit.impedance), _renewed(rows, fit)
+        found = least_squares(lambda x, spread=spread, ratios=ratios: _linear(rows, x, spread, ratios).rest, np.clip(fit.shape, low + 1e-9, high - 1e-9),
                               bounds=(low, high), x_scale=np.array([1e-4, *np.full(2 * modes, 0.1)]), max_nfev=10)
-        fit, mask = _linear(rows, found.x, spread), found.active_mask
+        fit, mask = _linear(rows, found.x, spread, ratios), found.active_mask
     return replace(fit, inside=not mask[1:].any())
+
+
+def _renewed(rows: _Rows, fit: _Fit) -> tuple[Array | None, ...]:
+    """Of a base that turns as the joint does, b_k / b_j = D_jk / D_jj."""
+    own = fit.gains[1:rows.acceleration.shape[1]] / fit.gains[0]
+    return tuple(None if one is None else own for one in fit.ratios)
 
 
 def _spread(rows: _Rows, impedance: Complex) -> Array:
@@ -185,15 +200,15 @@ def _spread(rows: _Rows, impedance: Complex) -> Array:
     return np.asarray(np.sqrt(0.5 * (variance + rows.floor**2)))
 
 
-def _linear(rows: _Rows, shape: Array, spread: Array) -> _Fit:
+def _linear(rows: _Rows, shape: Array, spread: Array, ratios: tuple[Array | None, ...] = ()) -> _Fit:
     """Least squares of the gains, `spread` (bins,) given."""
-    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in _shapes(rows, shape)], axis=1) / spread[:, None]
+    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in _shapes(rows, shape, ratios)], axis=1) / spread[:, None]
     stacked, target = np.concatenate([columns.real, columns.imag]), rows.torque / spread
     right = np.concatenate([target.real, target.imag])
     size = np.maximum(np.sqrt((stacked**2).sum(axis=0)), 1e-300)
     stacked /= size
     gains = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
-    return _Fit(shape, gains / size, _impedance(rows, shape, gains / size), right - stacked @ gains, spread)
+    return _Fit(shape, gains / size, _impedance(rows, shape, gains / size, ratios), right - stacked @ gains, spread, ratios)
 
 
 def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
@@ -201,7 +216,7 @@ def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
 
     Expected normal equations hold the covariance of the noise; it is known, and taken out (Söderström 2007, Automatica 43, §5.1).
     """
-    shapes, w = np.stack(_shapes(rows, fit.shape)), 0.5 / fit.spread**2  # (gains, bins, joints)
+    shapes, w = np.stack(_shapes(rows, fit.shape, fit.ratios)), 0.5 / fit.spread**2  # (gains, bins, joints)
     columns = np.einsum("gbk,bk->gb", shapes, rows.acceleration)
     normal = ((columns * w) @ np.conj(columns.T)).real
     noise = np.einsum("gbk,bkl,hbl,b->gh", shapes, rows.covariance[:, 1:, 1:], np.conj(shapes), w, optimize=True).real
@@ -209,19 +224,19 @@ def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
         return fit
     cross = np.einsum("gbk,bk,b->g", shapes, rows.covariance[:, 1:, 0], w, optimize=True).real
     gains = np.linalg.solve(normal - noise, ((columns * w) @ np.conj(rows.torque)).real - cross)
-    return replace(fit, gains=gains, impedance=_impedance(rows, fit.shape, gains))
+    return replace(fit, gains=gains, impedance=_impedance(rows, fit.shape, gains, fit.ratios))
 
 
 def _drawn(rows: _Rows, fit: _Fit, draws: int) -> list[Complex]:
     """Impedances (bins, joints) each, within what is known of shape and gains."""
     step, count = 1e-5, len(fit.shape)
     steps = step * np.array([1e-3, *np.ones(count - 1)])
-    moved = [(_impedance(rows, fit.shape + one, fit.gains) - fit.impedance) / one.sum() for one in np.diag(steps)]
-    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in (*moved, *_shapes(rows, fit.shape))]) / fit.spread
+    moved = [(_impedance(rows, fit.shape + one, fit.gains, fit.ratios) - fit.impedance) / one.sum() for one in np.diag(steps)]
+    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in (*moved, *_shapes(rows, fit.shape, fit.ratios))]) / fit.spread
     covariance = _inverse((columns @ np.conj(columns.T)).real)
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     about = np.random.default_rng(0).multivariate_normal(np.zeros(len(size)), covariance / np.outer(size, size), draws) * size
-    return [_impedance(rows, fit.shape + one[:count], fit.gains + one[count:]) for one in about]
+    return [_impedance(rows, fit.shape + one[:count], fit.gains + one[count:], fit.ratios) for one in about]
 
 
 def _inverse(normal: Array) -> Array:
@@ -230,14 +245,16 @@ def _inverse(normal: Array) -> Array:
     return np.asarray(np.linalg.pinv(normal / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size))
 
 
-def _impedance(rows: _Rows, shape: Array, gains: Array) -> Complex:
-    return np.asarray(sum(gain * one for gain, one in zip(gains, _shapes(rows, shape), strict=True)))
+def _impedance(rows: _Rows, shape: Array, gains: Array, ratios: tuple[Array | None, ...]) -> Complex:
+    return np.asarray(sum(gain * one for gain, one in zip(gains, _shapes(rows, shape, ratios), strict=True)))
 
 
-def _shapes(rows: _Rows, shape: Array) -> Sequence[Complex]:
+def _shapes(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> Sequence[Complex]:
     """What each gain multiplies in Z e^(sδ), each (bins, joints)."""
-    s, joints = rows.s, rows.acceleration.shape[1]
+    s, unit = rows.s, np.eye(rows.acceleration.shape[1])
     late = np.exp(shape[0] * s)
-    modes = [late, *(-late * s**2 / (s**2 + 2.0 * np.exp(z + w) * s + np.exp(2.0 * w)) for w, z in shape[1:].reshape(-1, 2))]
-    return [*(one[:, None] * unit for one in modes for unit in np.eye(joints)),
-            *((late / s**power)[:, None] * np.eye(joints)[0] for power in (1, 2))]
+    found = [late[:, None] * one for one in unit]
+    for (w, z), ratio in zip(shape[1:].reshape(-1, 2), ratios, strict=True):
+        mode = -late * s**2 / (s**2 + 2.0 * np.exp(z + w) * s + np.exp(2.0 * w))
+        found += [mode[:, None] * one for one in (unit if ratio is None else [np.concatenate([[1.0], ratio])])]
+    return [*found, *((late / s**power)[:, None] * unit[0] for power in (1, 2))]

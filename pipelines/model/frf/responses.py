@@ -42,6 +42,7 @@ _NO_POWER = 1e-12  # of the strongest bin of the source
 _FOLDED = 0.1  # of the density of v in its band, near half the rate: it goes on beyond
 _COUPLED = 4.0  # [Hz] from where on friction and gravity of the other joints matter less than their inertia
 _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
+_POSTURES = 3.0  # times that the inertia about a joint grows from one posture to another
 _DENSITY = 1.0  # [s] of the segments that show where v has power
 _SMOOTH = 25  # lines over which distortion is compared with noise
 
@@ -116,7 +117,20 @@ def measured_responses(logs: Iterable[ExperimentLog], how: How | None = None) ->
                 break
         else:
             groups.append([turned])
-    return tuple(_measured(tuple(group), how) for group in groups)
+    inertia = {}
+    for group in groups:
+        known = [_roughly(one) for one in group]
+        inertia[group[0].joint] = max(_POSTURES * max(known), inertia.get(group[0].joint, 0.0))
+    return tuple(_measured(tuple(group), how, inertia) for group in groups)
+
+
+def _roughly(turned: Turned) -> float:
+    """The inertia [kg m^2] of the joint from all of a log: torque over acceleration by v, where friction matters little."""
+    spectra = cross_spectra([s.signals[:, [V, TORQUE, POSITION]] for s in turned.stretches], turned.rate,
+                            min(round(_DENSITY * turned.rate), *(len(s.signals) for s in turned.stretches)))
+    inside = (spectra.frequency >= _COUPLED) & (spectra.frequency <= _CONSTANT[0])
+    torque, position = spectra.density[inside, 0, 1], spectra.density[inside, 0, 2]
+    return float(np.median(np.abs(torque) / np.maximum(np.abs(position) * (2.0 * np.pi * spectra.frequency[inside]) ** 2, 1e-300)))
 
 
 def _together(a: Turned, b: Turned) -> bool:
@@ -126,7 +140,7 @@ def _together(a: Turned, b: Turned) -> bool:
     return bool(np.abs(apart).max(initial=0.0) < _SAME_POSTURE)
 
 
-def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
+def _measured(turned: tuple[Turned, ...], how: How, inertia: dict[int, float]) -> Measured:
     first = turned[0]
     stretches = [s for one in turned for s in one.stretches]
     several, distortion, detected = _excited(turned, stretches, how)
@@ -143,7 +157,7 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     aliased = not first.held and bool(len(inside)) and top > _FOLDED * float(np.median(inside))
     compliance = closed_loop(several, POSITION - 1, TORQUE - 1)
     ratio = _torque_per_input(plant, compliance, band)
-    return Measured(turned, plant, _held(several, first, band, ratio), ratio, aliased, band,
+    return Measured(turned, plant, _held(several, first, band, ratio, inertia), ratio, aliased, band,
                     _direct([s.signals for s in stretches], turned, how), both[0], both[1],
                     compliance, sensitivity, _with_reversal(turned, how), distortion, detected)
 
@@ -156,11 +170,13 @@ def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tup
     return np.interp(frequency, spectra.frequency, density), float(np.median(density[spectra.frequency > 0.45 * rate]))
 
 
-def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None) -> Held | None:
+def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None,
+          inertia: dict[int, float]) -> Held | None:
     """u → q with the other joints held: computed torque leaves them at rest only where nothing gives way."""
     inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
     rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.torque_held), dtype=np.complex128)
-    found = others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])))
+    found = others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])),
+                        np.array([inertia.get(k, np.inf) for k in range(1, len(first.posture) + 1) if k != first.joint]))
     if found is None or ratio is None:
         return None
     return found.times(np.asarray(ratio * double_integrator(inside.frequency, first.sample_time, _delay(first), first.held) / rigid))
