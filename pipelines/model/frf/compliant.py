@@ -24,6 +24,7 @@ from pipelines.model.frf.modes import Pair
 
 __all__ = ["Explained", "explain", "predicted"]
 
+_FLOOR = 1e-3  # relative deviation of a frequency, that of every bin of the fit
 
 @dataclass(frozen=True)
 class Explained:
@@ -79,7 +80,10 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     found = [least_squares(rest, start, x_scale="jac") for start in _starts(pairs, inertia, base, joint)]
     best = min(found, key=lambda one: one.cost)
     b, k = _taken(best.x, base, joint)
-    covariance = np.linalg.pinv(best.jac.T @ best.jac)
+    alone = np.array([[np.hypot(f.std / f.value, _FLOOR) for kind in _kinds(own) for f in kind] for own in pairs])
+    weight = (spread / alone).ravel()  # what is left, not what was granted, says how well the numbers are known
+    jac, left = best.jac * weight[:, None], float(((best.fun * weight) ** 2).sum()) / max(measured.size - len(best.x), 1)
+    covariance = np.linalg.pinv(jac.T @ jac) * max(left, 1.0)
     return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()), 2.0 * float(best.cost),
                      measured.size - len(best.x))
 

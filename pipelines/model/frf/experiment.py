@@ -176,14 +176,16 @@ def _even(good: Usable, signals: Array, sample_time: float) -> _Even:
     even = np.full((place[-1] + 1, signals.shape[1]), np.nan)
     even[place] = signals
     inside, recorded_v, filled = np.zeros(len(even), dtype=bool), even[:, V].copy(), 0
+    own = [*range(TORQUE + 1), -2, -1]  # what another joint's encoder lacks is filled, too, but loses nothing of this one
     for run in good.runs:
         at = np.arange(place[run.start], place[run.stop - 1] + 1)
         known = np.isfinite(even[at]).all(axis=1)
         if known.sum() < SHORTEST:
             continue
+        lost = int((~np.isfinite(even[np.ix_(at, own)]).all(axis=1)).sum())
         if not known.all():
             even[at[~known]] = through(at[known], even[at[known]], at[~known])
-        inside[at], filled = True, filled + int((~known).sum())
+        inside[at], filled = True, filled + lost
     return _Even(even, inside, recorded_v, filled / max(int(inside.sum()), 1))
 
 

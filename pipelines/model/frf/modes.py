@@ -41,7 +41,7 @@ _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
 
 
 # Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn.
-HELD_STILL = 0.003
+HELD_STILL = 0.008
 
 
 @dataclass(frozen=True)
