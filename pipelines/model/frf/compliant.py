@@ -57,7 +57,7 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
 
 
 def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: bool, joint: bool,
-            slack: float = 0.008) -> Explained | None:
+            slack: float = 0.008, inertia_std: float = 0.0) -> Explained | None:
     """Springs at the base, in the joint or both, that explain the pairs of every posture best; None where counts differ.
 
     Args:
@@ -65,6 +65,7 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
         inertia: J of each posture [kg m^2].
         slack: relative deviation of a frequency that masses and springs are granted: held joints give way a little, and J is
             averaged over a turn.
+        inertia_std: relative, of all J alike: every mass and stiffness is as uncertain.
     """
     springs = int(base) + int(joint)
     if not pairs or springs == 0 or any(len(own) != springs for own in pairs):
@@ -84,7 +85,8 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     weight = (spread / alone).ravel()  # what is left, not what was granted, says how well the numbers are known
     jac, left = best.jac * weight[:, None], float(((best.fun * weight) ** 2).sum()) / max(measured.size - len(best.x), 1)
     covariance = np.linalg.pinv(jac.T @ jac) * max(left, 1.0)
-    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()), 2.0 * float(best.cost),
+    scaled = np.array([0.0, inertia_std][2 - 2 * base:] + [inertia_std, inertia_std][2 - 2 * joint:])
+    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0) + scaled**2).tolist()), 2.0 * float(best.cost),
                      measured.size - len(best.x))
 
 

@@ -154,26 +154,27 @@ def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
 
 def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str) -> tuple[list[Finding], list[Open]]:
     inertia, slack = [m.inertia.value if m.inertia else float("nan") for m in modes], max(m.slack for m in modes)
+    share = max((m.inertia.std / m.inertia.value for m in modes if m.inertia and m.inertia.value > 0.0), default=0.0)
     if not np.isfinite(inertia).all() or min(inertia) <= 0.0:
         return [], [_open(joint, pairs, "the inertia of the joint could not be measured")]
     if len(pairs[0]) == 1:
-        return _one_spring(joint, pairs, inertia, unit, slack)
+        return _one_spring(joint, pairs, inertia, unit, slack, share)
     if len(pairs[0]) == 2:
-        both = explain(pairs, inertia, True, True, slack)
+        both = explain(pairs, inertia, True, True, slack, share)
         if both is not None and len(pairs) > 1 and _accepted(both) and _moves(inertia):
             words = (f"{_told(pairs, inertia, unit)}. A base and a spring in the joint together explain both pairs in all "
                      f"{len(pairs)} postures (χ² {both.misfit:.3g} for {both.freedom}).")
             return [_as_base(both, pairs, words, joint), _as_joint(joint, both, pairs, inertia, words)], []
         strong = [sorted(own, key=lambda p: -p.rise) for own in pairs]
         if all(own[0].rise > _HEAVY and own[1].rise < _TRACE for own in strong):
-            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack)
+            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack, share)
             return found, [*open_, _open(joint, [[own[1]] for own in strong], "a small pair beside a large one")]
     return [], [_open(joint, pairs, f"{len(pairs[0])} pairs that no base and joint spring explain together")]
 
 
 def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str,
-                slack: float) -> tuple[list[Finding], list[Open]]:
-    base, spring = explain(pairs, inertia, True, False, slack), explain(pairs, inertia, False, True, slack)
+                slack: float, share: float) -> tuple[list[Finding], list[Open]]:
+    base, spring = (explain(pairs, inertia, *which, slack, share) for which in ((True, False), (False, True)))
     assert base is not None
     assert spring is not None
     told = _told(pairs, inertia, unit)

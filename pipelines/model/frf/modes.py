@@ -123,7 +123,8 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     rise = float(np.prod([p.rise for p in pairs])) if pairs else 1.0
     above = Known(level.value * rise, float(np.hypot(level.std * rise, level.value * rise * _rise_std(pairs))))
     ratio = measured.torque_per_input
-    inertia = None if ratio is None else Known(ratio / level.value, abs(ratio) * level.std / level.value**2)
+    inertia = None if ratio is None else Known(ratio / level.value, abs(ratio / level.value) *
+                                               float(np.hypot(level.std / level.value, _level_drawn(measured))))
     smooth = np.arange(_STRAIGHT[0], min(_STRAIGHT[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
@@ -176,6 +177,16 @@ def _level_and_delay(rest: FrequencyResponse) -> tuple[Known, Known]:
     slope, slope_std = _weighted(np.column_stack([-omega, 1.0 / omega]), phase, weight, part.correlated)
     value = float(np.exp(level[0]))
     return Known(value, value * float(level_std[0])), Known(rough + float(slope[0]), float(slope_std[0]))
+
+
+def _level_drawn(measured: Measured) -> float:
+    """Relative std of the level by what is known of the coupling."""
+    if measured.held is None:
+        return 0.0
+    f = measured.held.response.frequency
+    inside = (f >= _STRAIGHT[0]) & (f <= _STRAIGHT[1])
+    ratio = np.abs(measured.held.draws[:, inside] / measured.held.response.response[inside])
+    return float(np.log(ratio).mean(axis=1).std()) if inside.any() else 0.0
 
 
 def _rough_delay(response: Complex, weight: Array, omega: Array) -> float:
