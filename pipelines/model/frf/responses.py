@@ -172,11 +172,15 @@ def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tup
 
 def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None,
           inertia: dict[int, float]) -> Held | None:
-    """u → q with the other joints held: computed torque leaves them at rest only where nothing gives way."""
+    """u → q with the other joints held: computed torque leaves them at rest only where nothing gives way.
+
+    A joint whose inertia no log shows moves less than one before it.
+    """
     inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
     rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.torque_held), dtype=np.complex128)
     found = others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])),
-                        np.array([inertia.get(k, np.inf) for k in range(1, len(first.posture) + 1) if k != first.joint]))
+                        np.array([inertia.get(k, _roughly(first) if k > first.joint else np.inf)
+                                  for k in range(1, len(first.posture) + 1) if k != first.joint]))
     if found is None or ratio is None:
         return None
     return found.times(np.asarray(ratio * double_integrator(inside.frequency, first.sample_time, _delay(first), first.held) / rigid))
