@@ -82,9 +82,10 @@ class Turned:
     @property
     def load(self) -> float:
         """|mean torque of both directions| over its deviation from the mean of each: what gravity leaves; 0 where it is unknown."""
-        sides = [np.concatenate(own) for way in (1, -1) if (own := [s.signals[:, TORQUE] for s in self.stretches if s.direction == way])]
-        if len(sides) < 2:
+        ways = [[s.signals[:, TORQUE] for s in self.stretches if s.direction == way] for way in (1, -1)]
+        if not all(ways):
             return 0.0
+        sides = [np.concatenate(own) for own in ways]
         means = [float(side.mean()) for side in sides]
         deviation = float(np.sqrt(np.mean(np.concatenate([side - side.mean() for side in sides]) ** 2)))
         return abs(0.5 * sum(means)) / max(deviation, 1e-300)

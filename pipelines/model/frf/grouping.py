@@ -112,11 +112,12 @@ def _loaded(found: list[Finding], left: list[Open], loads: Sequence[float]) -> t
     return [one for one in found if one.kind != "joint" or one.joint not in shut], left
 
 
-def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool, held: bool) -> tuple[list[Finding], list[Open]]:
+def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool,
+             held: bool) -> tuple[list[Finding], list[Open]]:
     if (worst := max((m.misfit for m in modes if m.left > _LEFT), default=0.0)) > _UNFITTED:
         return [], [Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
-                         f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. A gap "
-                         "that is crossed, or friction that turns its sign, does so.",
+                         f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. "
+                         "A gap that is crossed, or friction that turns its sign, does so.",
                          "another strength of excitation and a faster turn; else longer")]
     if (early := advance(modes, sample_time, held)) is not None:
         return [], [_early(joint, modes, early)]

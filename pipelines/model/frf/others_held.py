@@ -6,8 +6,9 @@ a_k are accelerations and D is the mass matrix; friction and gravity of the join
 with all joints locked: the arm on its base, and each link on the spring that its motor turns it with. They are the poles of all
 Z_jk alike, and their residues are of rank one (Ewins 2000, Modal Testing, §2.4; Craig, Bampton 1968, AIAA J. 6, p. 1313). The
 other joints are held by their controllers, and above the band of those they swing freely: the inertia at joint j then falls from
-D_jj towards 1 / (D⁻¹)_jj, which looks like a heavily damped mode. Their motion is in the log, as noisy as it is read: Z is found
-by maximum likelihood, |τ_j - Σ Z_jk a_k|² over its own variance (Pintelon, Schoukens 2012, System Identification, §9.11).
+D_jj towards 1 / (D⁻¹)_jj, which looks like a heavily damped mode. Their motion is in the log, as noisy as it is read: the least
+squares of τ_j - Σ Z_jk a_k are weighted by its own variance, renewed with Z, and the noise of a_k is taken out at the end
+(Pintelon, Schoukens 2012, System Identification, §9.11).
 """
 
 from __future__ import annotations
@@ -173,16 +174,19 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig) -> _Fit:
 
 
 def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
-    """Delay, frequencies and dampings by variable projection (Golub, Pereyra 1973, SIAM J. Numer. Anal. 10, p. 413), the
-    variance of the rest from the impedance found before."""
+    """Refine delay, frequencies and dampings by variable projection (Golub, Pereyra 1973, SIAM J. Numer. Anal. 10, p. 413).
+
+    The variance of the rest is that of the impedance found before.
+    """
     modes = len(start.shape) // 2
     low = np.array([-config.delay, *np.tile(np.log([abs(rows.s[0]), 1e-3]), modes)])
     high = np.array([config.delay, *np.tile(np.log([abs(rows.s[-1]), 1.01 * config.dampings[-1]]), modes)])
     fit, mask = start, np.zeros(len(low))
     for _ in range(config.weighings):
         spread, ratios = _spread(rows, fit.impedance), _renewed(rows, fit)
-        found = least_squares(lambda x, spread=spread, ratios=ratios: _linear(rows, x, spread, ratios).rest, np.clip(fit.shape, low + 1e-9, high - 1e-9),
-                              bounds=(low, high), x_scale=np.array([1e-4, *np.full(2 * modes, 0.1)]), max_nfev=10)
+        found = least_squares(lambda x, spread=spread, ratios=ratios: _linear(rows, x, spread, ratios).rest,
+                              np.clip(fit.shape, low + 1e-9, high - 1e-9), bounds=(low, high),
+                              x_scale=np.array([1e-4, *np.full(2 * modes, 0.1)]), max_nfev=10)
         fit, mask = _linear(rows, found.x, spread, ratios), found.active_mask
     return replace(fit, inside=not mask[1:].any())
 
@@ -232,7 +236,8 @@ def _drawn(rows: _Rows, fit: _Fit, draws: int) -> list[Complex]:
     step, count = 1e-5, len(fit.shape)
     steps = step * np.array([1e-3, *np.ones(count - 1)])
     moved = [(_impedance(rows, fit.shape + one, fit.gains, fit.ratios) - fit.impedance) / one.sum() for one in np.diag(steps)]
-    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in (*moved, *_shapes(rows, fit.shape, fit.ratios))]) / fit.spread
+    every = (*moved, *_shapes(rows, fit.shape, fit.ratios))
+    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in every]) / fit.spread
     covariance = _inverse((columns @ np.conj(columns.T)).real)
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     about = np.random.default_rng(0).multivariate_normal(np.zeros(len(size)), covariance / np.outer(size, size), draws) * size

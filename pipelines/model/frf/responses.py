@@ -117,7 +117,7 @@ def measured_responses(logs: Iterable[ExperimentLog], how: How | None = None) ->
                 break
         else:
             groups.append([turned])
-    inertia = {}
+    inertia: dict[int, float] = {}
     for group in groups:
         known = [_roughly(one) for one in group]
         inertia[group[0].joint] = max(_POSTURES * max(known), inertia.get(group[0].joint, 0.0))
@@ -183,11 +183,9 @@ def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | N
                                   for k in range(1, len(first.posture) + 1) if k != first.joint]))
     if found is None or ratio is None:
         return None
-    return found.times(np.asarray(ratio * double_integrator(inside.frequency, first.sample_time, _delay(first), first.held) / rigid))
-
-
-def _delay(first: Turned) -> int:
-    return loop_delay(first.controller, first.quantity)[1]
+    _, delay = loop_delay(first.controller, first.quantity)
+    own = double_integrator(inside.frequency, first.sample_time, delay, first.held)
+    return found.times(np.asarray(ratio * own / rigid))
 
 
 def _torque_per_input(plant: FrequencyResponse, compliance: FrequencyResponse, band: ExcitedBand) -> float | None:
