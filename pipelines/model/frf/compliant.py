@@ -16,8 +16,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
+from pipelines.fit.bounded import least_squares
 from pipelines.fit.rational import Known
 from pipelines.log.experiment import Array
 from pipelines.model.frf.modes import Pair
@@ -78,15 +78,15 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
         rows = [np.concatenate(predicted(j, b, k)) for j in inertia]
         return _known(((np.log(rows) - measured) / spread).ravel())
 
-    found = [least_squares(rest, start, x_scale="jac") for start in _starts(pairs, inertia, base, joint)]
-    best = min(found, key=lambda one: one.cost)
+    found = [least_squares(rest, start) for start in _starts(pairs, inertia, base, joint)]
+    best = min(found, key=lambda one: float(one.rest @ one.rest))
     b, k = _taken(best.x, base, joint)
     alone = np.array([[np.hypot(f.std / f.value, _FLOOR) for kind in _kinds(own) for f in kind] for own in pairs])
     weight = (spread / alone).ravel()  # what is left, not what was granted, says how well the numbers are known
-    jac, left = best.jac * weight[:, None], float(((best.fun * weight) ** 2).sum()) / max(measured.size - len(best.x), 1)
+    jac, left = best.slope * weight[:, None], float(((best.rest * weight) ** 2).sum()) / max(measured.size - len(best.x), 1)
     covariance = np.linalg.pinv(jac.T @ jac) * max(left, 1.0)
     scaled = np.array([0.0, inertia_std][2 - 2 * base:] + [inertia_std, inertia_std][2 - 2 * joint:])
-    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0) + scaled**2).tolist()), 2.0 * float(best.cost),
+    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0) + scaled**2).tolist()), float(best.rest @ best.rest),
                      measured.size - len(best.x))
 
 

@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
 
+from pipelines.fit.bounded import least_squares
 from pipelines.log.experiment import Array
 from pipelines.model.frf.controller import Complex
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop
@@ -181,13 +181,16 @@ def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
     modes = len(start.shape) // 2
     low = np.array([-config.delay, *np.tile(np.log([abs(rows.s[0]), 1e-3]), modes)])
     high = np.array([config.delay, *np.tile(np.log([abs(rows.s[-1]), 1.01 * config.dampings[-1]]), modes)])
-    fit, mask = start, np.zeros(len(low))
+    fit, mask = start, np.zeros(len(low), dtype=bool)
     for _ in range(config.weighings):
         spread, ratios = _spread(rows, fit.impedance), _renewed(rows, fit)
-        found = least_squares(lambda x, spread=spread, ratios=ratios: _linear(rows, x, spread, ratios).rest,
-                              np.clip(fit.shape, low + 1e-9, high - 1e-9), bounds=(low, high),
-                              x_scale=np.array([1e-4, *np.full(2 * modes, 0.1)]), max_nfev=10)
-        fit, mask = _linear(rows, found.x, spread, ratios), found.active_mask
+
+        def rest(x: Array, spread: Array = spread, ratios: tuple[Array | None, ...] = ratios) -> Array:
+            return _linear(rows, x, spread, ratios).rest
+
+        found = least_squares(rest, np.clip(fit.shape, low + 1e-9, high - 1e-9), low, high,
+                              np.array([1e-4, *np.full(2 * modes, 0.1)]), 10)
+        fit, mask = _linear(rows, found.x, spread, ratios), found.at_bound
     return replace(fit, inside=not mask[1:].any())
 
 
