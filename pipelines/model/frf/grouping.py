@@ -19,6 +19,7 @@ _HEAVY = 2.0  # rise above which what drops out outweighs the rest: no base does
 _LIGHT = 0.5  # of the arm's inertia: no base weighs less
 FLAT = 1.15  # a ratio of magnitudes below it is flat
 _SPAN = 4.0  # highest over lowest frequency, of a band in which a joint without a mode is called rigid
+_LOST = 0.5  # of the band that v drives: where most of it is not known, nothing is called rigid
 _DELAY = 0.15  # of the sample time: the smallest delay worth a word
 _SURE = 5.0  # standard deviations of it
 _NEAR = 0.03  # two joints show the same base within such a share of its frequency
@@ -291,6 +292,11 @@ def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
         return Open(joint, None, ("joint_elasticity", "base_resonance"),
                     f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
                     "stronger excitation, to lower and higher frequencies")
+    if (lost := max(m.lost for m in modes)) > _LOST:
+        return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
+                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but {100.0 * lost:.2g} % of the band that v drives "
+                    "gives no response that is known: noise hides it, or the plant is not linear there.",
+                    "stronger excitation; and another strength, should the response change with it")
     if flat < FLAT:
         traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]
         beside = f" A pair that nearly cancels leaves a trace at {_many(traces)} Hz: base or another joint." if traces else ""
