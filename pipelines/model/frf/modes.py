@@ -75,7 +75,7 @@ class Modes:
     left: float  # rms of what it leaves, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
-    lost: float  # share of the band that v drives in which the response is not known
+    lost: float = 0.0  # share of the band that v drives in which the response is not known
     slack: float = HELD_STILL  # relative deviation of a frequency that masses and springs are granted
 
 
