@@ -16,6 +16,7 @@ of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -96,7 +97,8 @@ class Rational:
         """Complex pairs whose frequency lies in the band of the fit, or up to `beyond` times its upper end."""
         found = [self._mode(k) for k in range(self.zeros + self.poles)]
         inside = [m for m in found if m is not None and self.band[0] <= m.frequency.value <= beyond * self.band[1]]
-        marked = [Mode(m.kind, m.frequency, m.damping, not any(_same(m, o) for o in inside if o.kind != m.kind)) for m in inside]
+        cancelled = _cancelled(inside)
+        marked = [Mode(m.kind, m.frequency, m.damping, i not in cancelled) for i, m in enumerate(inside)]
         return tuple(sorted(marked, key=lambda m: m.frequency.value))
 
     def _mode(self, section: int) -> Mode | None:
@@ -136,9 +138,17 @@ def product(parameters: Array, s: Complex, zeros: int, sign: float) -> tuple[Com
     return np.asarray(value), np.asarray(sections)
 
 
-def _same(m: Mode, other: Mode) -> bool:
-    """Whether frequency and damping of both agree within two standard deviations of the difference."""
-    def near(x: Known, y: Known) -> bool:
-        return abs(x.value - y.value) <= _CANCELS * float(np.hypot(x.std, y.std))
+def _cancelled(modes: Sequence[Mode]) -> set[int]:
+    """Places of the modes that one of the other kind takes away, the nearest first, each at most one."""
+    gone: set[int] = set()
+    near = sorted((_apart(m, o), i, k) for i, m in enumerate(modes) for k, o in enumerate(modes[:i]) if o.kind != m.kind)
+    for apart, i, k in near:
+        if apart <= _CANCELS and not gone & {i, k}:
+            gone |= {i, k}
+    return gone
 
-    return near(m.frequency, other.frequency) and near(m.damping, other.damping)
+
+def _apart(m: Mode, other: Mode) -> float:
+    """The larger difference of frequency and damping, in standard deviations of it."""
+    return max(abs(x.value - y.value) / max(float(np.hypot(x.std, y.std)), 1e-300)
+               for x, y in ((m.frequency, other.frequency), (m.damping, other.damping)))

@@ -53,7 +53,9 @@ def _verdict(sure: Sequence[Classified], unsure: Sequence[Undecided], doctor: Se
     if rigid:
         words.append(f"Joint{'s' * (len(rigid) > 1)} {', '.join(rigid)}: rigid in the band.")
     if unsure:
-        words.append(f"{len(unsure)} mode{'s' * (len(unsure) > 1)} could be more than one thing; what to record is listed.")
+        modes = sum(one.frequency is not None for one in unsure)
+        what = f"{modes} mode{'s' * (modes > 1)}" if modes == len(unsure) else f"{len(unsure)} finding{'s' * (len(unsure) > 1)}"
+        words.append(f"{what} could be more than one thing; what to record is listed.")
     return " ".join([*gates, *words]) or "Nothing was measured."
 
 

@@ -47,6 +47,7 @@ class ExcitedBand:
     """Where responses exist, lowest interval first; none where the excitation says nothing."""
 
     intervals: tuple[tuple[float, float], ...]  # [Hz]
+    driven: tuple[float, float] = (0.0, 0.0)  # [Hz] from the lowest to the highest frequency where v has power
 
     def holds(self, frequency: Array) -> npt.NDArray[np.bool_]:
         """Return a mask of the `frequency` [Hz] (any shape) that lie in an interval."""
@@ -74,9 +75,11 @@ def excited_band(responses: Responses, density: Array, config: BandConfig | None
     first = np.searchsorted(f, f * (1.0 - config.around))
     last = np.searchsorted(f, f * (1.0 + config.around), side="right")
     usual = np.array([np.median(known[a:b]) for a, b in zip(first, last, strict=True)])
-    good = np.flatnonzero((density > config.power * float(density @ density) / total) & (usual >= config.known))
+    powered = density > config.power * float(density @ density) / total
+    driven = (float(f[powered][0]), float(f[powered][-1]))
+    good = np.flatnonzero(powered & (usual >= config.known))
     if not len(good):
-        return ExcitedBand(())
+        return ExcitedBand((), driven)
     widest = np.maximum(config.hole[0] * float(np.median(np.diff(f))), config.hole[1] * f[good[:-1]])
     parts = np.split(good, np.flatnonzero(np.diff(f[good]) > widest) + 1)
-    return ExcitedBand(tuple((float(f[p[0]]), float(f[p[-1]])) for p in parts if len(p) >= config.fewest))
+    return ExcitedBand(tuple((float(f[p[0]]), float(f[p[-1]])) for p in parts if len(p) >= config.fewest), driven)

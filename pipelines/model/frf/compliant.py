@@ -12,21 +12,19 @@ other joints held. Resonances are the modes under no torque, antiresonances thos
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.fit.bounded import least_squares
 from pipelines.fit.rational import Known
 from pipelines.log.experiment import Array
 from pipelines.model.frf.modes import Pair
 
 __all__ = ["Explained", "explain", "predicted"]
 
-Rest = Callable[[Array], Array]
-
-_STEPS = 100
-
+_FLOOR = 1e-3  # relative deviation of a frequency, that of every bin of the fit
 
 @dataclass(frozen=True)
 class Explained:
@@ -46,7 +44,7 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
     link = inertia - motor
     kept = [i for i, there in enumerate((base is not None, True, joint is not None)) if there]
     locked = [i for i in kept if i != 1]
-    if link <= 0.0 or motor <= 0.0 or i_b <= 0.0:
+    if not np.isfinite([f_b**2 * i_b, k, link]).all() or min(link, motor, i_b) <= 0.0:
         return np.full(len(locked), np.nan), np.full(len(locked), np.nan)
     mass = np.array([[i_b + inertia, inertia, link], [inertia, inertia, link], [link, link, link]])
     spring = np.diag([i_b * (2.0 * np.pi * f_b) ** 2, 0.0, k])
@@ -59,7 +57,7 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
 
 
 def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: bool, joint: bool,
-            slack: float = 0.008) -> Explained | None:
+            slack: float = 0.008, inertia_std: float = 0.0) -> Explained | None:
     """Springs at the base, in the joint or both, that explain the pairs of every posture best; None where counts differ.
 
     Args:
@@ -67,6 +65,7 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
         inertia: J of each posture [kg m^2].
         slack: relative deviation of a frequency that masses and springs are granted: held joints give way a little, and J is
             averaged over a turn.
+        inertia_std: relative, of all J alike: every mass and stiffness is as uncertain.
     """
     springs = int(base) + int(joint)
     if not pairs or springs == 0 or any(len(own) != springs for own in pairs):
@@ -77,14 +76,18 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     def rest(theta: Array) -> Array:
         b, k = _taken(theta, base, joint)
         rows = [np.concatenate(predicted(j, b, k)) for j in inertia]
-        return np.asarray(((np.log(rows) - measured) / spread).ravel())
+        return _known(((np.log(rows) - measured) / spread).ravel())
 
-    found = [_smallest(rest, start) for start in _starts(pairs, inertia, base, joint)]
-    theta, cost, slope = min(found, key=lambda one: one[1])
-    b, k = _taken(theta, base, joint)
-    with np.errstate(all="ignore"):
-        covariance = np.linalg.pinv(slope.T @ slope)
-    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()), cost, measured.size - len(theta))
+    found = [least_squares(rest, start) for start in _starts(pairs, inertia, base, joint)]
+    best = min(found, key=lambda one: float(one.rest @ one.rest))
+    b, k = _taken(best.x, base, joint)
+    alone = np.array([[np.hypot(f.std / f.value, _FLOOR) for kind in _kinds(own) for f in kind] for own in pairs])
+    weight = (spread / alone).ravel()  # what is left, not what was granted, says how well the numbers are known
+    jac, left = best.slope * weight[:, None], float(((best.rest * weight) ** 2).sum()) / max(measured.size - len(best.x), 1)
+    covariance = np.linalg.pinv(jac.T @ jac) * max(left, 1.0)
+    scaled = np.array([0.0, inertia_std][2 - 2 * base:] + [inertia_std, inertia_std][2 - 2 * joint:])
+    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0) + scaled**2).tolist()), float(best.rest @ best.rest),
+                     measured.size - len(best.x))
 
 
 def _kinds(own: Sequence[Pair]) -> tuple[list[Known], list[Known]]:
@@ -92,7 +95,8 @@ def _kinds(own: Sequence[Pair]) -> tuple[list[Known], list[Known]]:
 
 
 def _taken(theta: Array, base: bool, joint: bool) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
-    values = np.exp(theta).tolist()
+    with np.errstate(over="ignore"):
+        values = np.exp(theta).tolist()
     return (tuple(values[:2]) if base else None), (tuple(values[-2:]) if joint else None)
 
 
@@ -109,33 +113,6 @@ def _starts(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     if base and joint:
         return [np.array(as_base(first[i]) + as_joint(first[1 - i])) for i in (0, 1)]
     return [np.array(as_base(first[0]) if base else as_joint(first[0]))]
-
-
-def _smallest(rest: Rest, start: Array) -> tuple[Array, float, Array]:
-    """Levenberg-Marquardt with differences: the place, the sum of squares, the Jacobian there."""
-    theta, damping = start, 1e-3
-    now = _known(rest(theta))
-    slope = _slopes(rest, theta, now)
-    for _ in range(_STEPS):
-        normal, gradient = slope.T @ slope, slope.T @ now
-        step = np.linalg.solve(normal + damping * np.diag(np.diag(normal) + 1e-12), gradient)
-        tried = _known(rest(theta - step))
-        if tried @ tried < now @ now:
-            small = now @ now - tried @ tried < 1e-10 * (now @ now)
-            theta, now, damping = theta - step, tried, max(damping / 5.0, 1e-12)
-            slope = _slopes(rest, theta, now)
-            if small:
-                break
-        else:
-            damping *= 5.0
-            if damping > 1e12:
-                break
-    return theta, float(now @ now), slope
-
-
-def _slopes(rest: Rest, theta: Array, now: Array) -> Array:
-    h = 1e-6
-    return np.column_stack([(_known(rest(theta + h * unit)) - now) / h for unit in np.eye(len(theta))])
 
 
 def _known(values: Array) -> Array:

@@ -66,6 +66,7 @@ class Turned:
     left_out: float  # share of the samples
     filled: float  # share of the samples that were lost, and filled alike in all channels
     held: bool  # the input is held from one sample to the next; False: sampled at some instant between two, as position is
+    torque_held: bool  # the same of the torque
     mean_input: tuple[float | None, float | None]  # of the input, forwards and backwards: what friction and load leave
 
     @property
@@ -77,6 +78,17 @@ class Turned:
         """Half of what the mean input differs between the directions: friction that nothing compensated."""
         forwards, backwards = self.mean_input
         return None if forwards is None or backwards is None else 0.5 * (forwards - backwards)
+
+    @property
+    def load(self) -> float:
+        """|mean torque of both directions| over its deviation from the mean of each: what gravity leaves; 0 where it is unknown."""
+        ways = [[s.signals[:, TORQUE] for s in self.stretches if s.direction == way] for way in (1, -1)]
+        if not all(ways):
+            return 0.0
+        sides = [np.concatenate(own) for own in ways]
+        means = [float(side.mean()) for side in sides]
+        deviation = float(np.sqrt(np.mean(np.concatenate([side - side.mean() for side in sides]) ** 2)))
+        return abs(0.5 * sum(means)) / max(deviation, 1e-300)
 
     @property
     def lines(self) -> tuple[int, ...]:
@@ -140,7 +152,8 @@ def turned_joint(log: ExperimentLog) -> Turned:
     return Turned(log.name, joint, posture, log.sample_time, quantity, log.controller,
                   log.robot.joints[j].revolute, top if top > _STILL else 0.0, _swing(stretches, log.sample_time),
                   excitation_period(even.recorded_v, log.period, log.sample_time), stretches, signals, 1.0 - kept / len(signals),
-                  even.filled, quantity == "r" or log.torque != "measured", (_mean(stretches, 1), _mean(stretches, -1)))
+                  even.filled, quantity == "r" or log.torque != "measured", log.torque != "measured",
+                  (_mean(stretches, 1), _mean(stretches, -1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,14 +177,16 @@ def _even(good: Usable, signals: Array, sample_time: float) -> _Even:
     even = np.full((place[-1] + 1, signals.shape[1]), np.nan)
     even[place] = signals
     inside, recorded_v, filled = np.zeros(len(even), dtype=bool), even[:, V].copy(), 0
+    own = [*range(TORQUE + 1), -2, -1]  # what another joint's encoder lacks is filled, too, but loses nothing of this one
     for run in good.runs:
         at = np.arange(place[run.start], place[run.stop - 1] + 1)
         known = np.isfinite(even[at]).all(axis=1)
         if known.sum() < SHORTEST:
             continue
+        lost = int((~np.isfinite(even[np.ix_(at, own)]).all(axis=1)).sum())
         if not known.all():
             even[at[~known]] = through(at[known], even[at[known]], at[~known])
-        inside[at], filled = True, filled + int((~known).sum())
+        inside[at], filled = True, filled + lost
     return _Even(even, inside, recorded_v, filled / max(int(inside.sum()), 1))
 
 

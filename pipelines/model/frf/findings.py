@@ -83,7 +83,8 @@ def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tupl
     for joint in sorted({one.measured.joint for one in seen}):
         own = [one for one in seen if one.measured.joint == joint]
         turned = own[0].measured.first
-        found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute, turned.held)
+        found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute, turned.held,
+                                  [one.measured.load for one in own])
         sure += found
         unsure += left
     return Findings(seen, tuple(one for one in measured if not tells(one, band)), *seen_elsewhere(sure, unsure))

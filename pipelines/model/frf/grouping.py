@@ -18,10 +18,8 @@ _FITS = 4.0  # χ² per number, beyond which an explanation is none
 _HEAVY = 2.0  # rise above which what drops out outweighs the rest: no base does
 _LIGHT = 0.5  # of the arm's inertia: no base weighs less
 FLAT = 1.15  # a ratio of magnitudes below it is flat
-# Damping ratio beyond which a mode is no mere spring: structures and gears have a few hundredths. A gap that is crossed answers
-# like a spring that swallows energy (its describing function: Gelb & Vander Velde 1968, ch. 2).
-_SPRING = 0.15
 _SPAN = 4.0  # highest over lowest frequency, of a band in which a joint without a mode is called rigid
+_LOST = 0.5  # of the band that v drives: where most of it is not known, nothing is called rigid
 _DELAY = 0.15  # of the sample time: the smallest delay worth a word
 _SURE = 5.0  # standard deviations of it
 _NEAR = 0.03  # two joints show the same base within such a share of its frequency
@@ -29,6 +27,24 @@ _UNFITTED = 10.0  # misfit beyond which no mode of the fit is believed
 _LEFT = 0.02  # of the response, what it may leave all the same: encoder steps that repeat are in no variance
 _TRACE = 1.3  # rise of a pair that may be only a trace of what another joint, or the base, does
 _LOCKED = 0.1  # of the frequency at which a link swings against its locked motor: where it takes the motion of other joints away
+
+
+@dataclass(frozen=True)
+class LoadConfig:
+    """When a spring in a joint may be the contact of a gap.
+
+    A gap shows as such only where the load on the joint changes sign; under a steady load its teeth stay in contact, and it answers
+    as a linear spring does, damped by that contact.
+
+    Attributes:
+        closed: deviations of the torque by which its mean, less friction, keeps the load on one side: a normal one is beyond for
+            one sample in 44, and the describing function of a gap moves by no more.
+        contact: damping ratio that teeth in contact have at least, .03 to .17 (Kasuba, Evans 1981, ASME J. Mech. Des. 103); shafts
+            have .005 to .075 (Lin, Huston, Coy 1988, NASA TM-100180).
+    """
+
+    closed: float = 2.0
+    contact: float = 0.03
 
 
 @dataclass(frozen=True)
@@ -64,19 +80,46 @@ def advance(modes: Sequence[Modes], sample_time: float, held: bool = True) -> Kn
     return mean if mean is not None and mean.value < 0.0 else None
 
 
-def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True,
-                held: bool = True) -> tuple[list[Finding], list[Open]]:
+def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True, held: bool = True,
+                loads: Sequence[float] = ()) -> tuple[list[Finding], list[Open]]:
     """What the responses of one joint (1-based), one a posture, say together.
 
     Args:
         sample_time: [s].
         revolute: whether it turns.
         held: whether its input is held from one sample to the next; if it was measured, nobody knows when within a sample.
+        loads: mean torque less friction over its deviation, of each posture.
     """
+    found, left = _grouped(joint, modes, sample_time, revolute, held)
+    return _loaded(found, left, loads)
+
+
+def _loaded(found: list[Finding], left: list[Open], loads: Sequence[float]) -> tuple[list[Finding], list[Open]]:
+    """A gap answers as a spring does wherever it stays closed, and on average where it is crossed (its describing function: Gelb,
+    Vander Velde 1968, ch. 2): no open question leaves it out, and no spring under a steady load that is damped as teeth are."""
+    config = LoadConfig()
+    left = [replace(one, candidates=(*one.candidates, "backlash"))
+            if "joint_elasticity" in one.candidates and "backlash" not in one.candidates else one for one in left]
+    if not loads or min(abs(load) for load in loads) < config.closed:
+        return found, left
+    for one in found:
+        if one.kind == "joint" and one.damping is not None and one.damping.value + 2.0 * one.damping.std > config.contact:
+            assert one.joint is not None
+            left.append(Open(one.joint, one.frequency, ("joint_elasticity", "backlash"),
+                             f"{one.evidence} But the load on the joint never changes its sign, and a damping ratio of "
+                             f"{one.damping.value:.2g} is that of teeth in contact as well: a gap would stay closed.",
+                             f"joint {one.joint} in a posture without load by gravity, or excited until its torque changes sign"))
+    shut = {one.joint for one in left if one.candidates == ("joint_elasticity", "backlash")}
+    return [one for one in found if one.kind != "joint" or one.joint not in shut], left
+
+
+def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool,
+             held: bool) -> tuple[list[Finding], list[Open]]:
     if (worst := max((m.misfit for m in modes if m.left > _LEFT), default=0.0)) > _UNFITTED:
-        return [], [Open(joint, None, ("joint_elasticity", "base_resonance"),
-                         f"No rational function explains the response: what it leaves has {worst:.3g} times the variance of noise.",
-                         "weaker excitation or a faster turn, should friction have turned its sign; else longer")]
+        return [], [Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
+                         f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. "
+                         "A gap that is crossed, or friction that turns its sign, does so.",
+                         "another strength of excitation and a faster turn; else longer")]
     if (early := advance(modes, sample_time, held)) is not None:
         return [], [_early(joint, modes, early)]
     delays, unclear = _delay(joint, modes, sample_time, held)
@@ -113,31 +156,27 @@ def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
 
 def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str) -> tuple[list[Finding], list[Open]]:
     inertia, slack = [m.inertia.value if m.inertia else float("nan") for m in modes], max(m.slack for m in modes)
+    share = max((m.inertia.std / m.inertia.value for m in modes if m.inertia and m.inertia.value > 0.0), default=0.0)
     if not np.isfinite(inertia).all() or min(inertia) <= 0.0:
         return [], [_open(joint, pairs, "the inertia of the joint could not be measured")]
     if len(pairs[0]) == 1:
-        return _one_spring(joint, pairs, inertia, unit, slack)
+        return _one_spring(joint, pairs, inertia, unit, slack, share)
     if len(pairs[0]) == 2:
-        both = explain(pairs, inertia, True, True, slack)
+        both = explain(pairs, inertia, True, True, slack, share)
         if both is not None and len(pairs) > 1 and _accepted(both) and _moves(inertia):
             words = (f"{_told(pairs, inertia, unit)}. A base and a spring in the joint together explain both pairs in all "
                      f"{len(pairs)} postures (χ² {both.misfit:.3g} for {both.freedom}).")
             return [_as_base(both, pairs, words, joint), _as_joint(joint, both, pairs, inertia, words)], []
         strong = [sorted(own, key=lambda p: -p.rise) for own in pairs]
         if all(own[0].rise > _HEAVY and own[1].rise < _TRACE for own in strong):
-            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack)
+            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack, share)
             return found, [*open_, _open(joint, [[own[1]] for own in strong], "a small pair beside a large one")]
     return [], [_open(joint, pairs, f"{len(pairs[0])} pairs that no base and joint spring explain together")]
 
 
 def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str,
-                slack: float) -> tuple[list[Finding], list[Open]]:
-    damping = float(np.mean([max(p.antiresonance.damping.value, p.resonance.damping.value) for own in pairs for p in own]))
-    if damping > _SPRING:
-        why = f"{_told(pairs, inertia, unit)}; a damping ratio of {damping:.2g} is that of a gap which is crossed, or of friction"
-        return [], [replace(_open(joint, pairs, why), candidates=("backlash", "joint_elasticity", "base_resonance"),
-                            experiment=f"joint {joint} excited half as strongly: a gap answers otherwise then, a spring does not")]
-    base, spring = explain(pairs, inertia, True, False, slack), explain(pairs, inertia, False, True, slack)
+                slack: float, share: float) -> tuple[list[Finding], list[Open]]:
+    base, spring = (explain(pairs, inertia, *which, slack, share) for which in ((True, False), (False, True)))
     assert base is not None
     assert spring is not None
     told = _told(pairs, inertia, unit)
@@ -236,7 +275,7 @@ def _delay(joint: int, modes: Sequence[Modes], sample_time: float, held: bool) -
     mean = _late(modes, sample_time, held)
     if mean is None:
         return [], []
-    each = ", ".join(f"{1e3 * m.delay.value:.3g}" for m in modes)
+    each = f"{1e3 * mean.value:.3g} ± {2e3 * mean.std:.2g}"
     flat = max(m.flat for m in modes)
     if flat < FLAT:
         words = (f"Beside its modes the magnitude is flat within {100.0 * (flat - 1.0):.2g} % and the phase falls in proportion to "
@@ -253,6 +292,11 @@ def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
         return Open(joint, None, ("joint_elasticity", "base_resonance"),
                     f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
                     "stronger excitation, to lower and higher frequencies")
+    if (lost := max(m.lost for m in modes)) > _LOST:
+        return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
+                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but {100.0 * lost:.2g} % of the band that v drives "
+                    "gives no response that is known: noise hides it, or the plant is not linear there.",
+                    "stronger excitation; and another strength, should the response change with it")
     if flat < FLAT:
         traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]
         beside = f" A pair that nearly cancels leaves a trace at {_many(traces)} Hz: base or another joint." if traces else ""

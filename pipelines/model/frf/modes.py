@@ -31,20 +31,17 @@ _SURE = 0.05  # relative std of a frequency that is known at all
 # Relative std of a damping beside noise: the slope of friction, the joint's and that of held joints, depends on how far the speed
 # swings. On the bench, with swings of a tenth of the turn, it changes damping by 2 to 6 %.
 _BY_FRICTION = 0.03
-_CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
 _FLOOR = 1e-3  # relative deviation that every bin has at least
 _FEWEST = 12  # bins
-_NARROW = 0.25  # of the resolution, the least width 2 ζ f of a mode
 _STUCK = 3.0  # misfit that a search which found the modes hardly leaves
 _SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
 _LONGEST = 0.05  # [s] no delay is longer
 _FRICTION = 0.1  # of the magnitude, what friction has to change to be said
 
 
-# Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn;
-# and more where the motion of the others was taken out, by inertias that a fit over all of the band knows to a few per cent.
-HELD_STILL, TAKEN_OUT = 0.008, 0.025
+# Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn.
+HELD_STILL = 0.008
 
 
 @dataclass(frozen=True)
@@ -78,6 +75,7 @@ class Modes:
     left: float  # rms of what it leaves, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
+    lost: float = 0.0  # share of the band that v drives in which the response is not known
     slack: float = HELD_STILL  # relative deviation of a frequency that masses and springs are granted
 
 
@@ -86,7 +84,7 @@ def relative_acceleration(measured: Measured, response: FrequencyResponse | None
 
     By default that of the plant, with the other joints held where they are not.
     """
-    response = response or measured.held or measured.plant
+    response = response or (measured.held.response if measured.held else measured.plant)
     return response.times(np.asarray(1.0 / _rigid(measured, response.frequency)))
 
 
@@ -118,19 +116,29 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     relative = relative.where(measured.excited.holds(relative.frequency))
     fit = _fitted(part)
     moving = [(m, to) for m, to in _moving(measured, part, fit) if measured.excited.holds(np.array(m.frequency.value))]
-    modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m, part.resolution))
-    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m, part.resolution))
+    modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m))
+    traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m))
     pairs, single = _paired(modes)
     rest = relative.times(1.0 / _carried(modes, relative.frequency))
     level, delay = _level_and_delay(rest)
     rise = float(np.prod([p.rise for p in pairs])) if pairs else 1.0
     above = Known(level.value * rise, float(np.hypot(level.std * rise, level.value * rise * _rise_std(pairs))))
+    ratio = measured.torque_per_input
+    inertia = None if ratio is None else Known(ratio / level.value, abs(ratio / level.value) *
+                                               float(np.hypot(level.std / level.value, _level_drawn(measured))))
     smooth = np.arange(_STRAIGHT[0], min(_STRAIGHT[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
-                 _inertia(measured, level), _friction_below(relative, level), fit.misfit, _left(fit, part),
-                 (float(part.frequency[0]), float(part.frequency[-1])), fit,
-                 HELD_STILL if measured.held is None else TAKEN_OUT)
+                 inertia, _friction_below(relative, level), fit.misfit, _left(fit, part),
+                 (float(part.frequency[0]), float(part.frequency[-1])), fit, _lost(measured, band))
+
+
+def _lost(measured: Measured, band: tuple[float, float]) -> float:
+    """Of what v drives of `band` [Hz], the share in which its responses are not known."""
+    low, high = measured.excited.driven
+    low, high = max(low, band[0]), min(high, band[1], _OF_RATE * measured.first.rate)
+    known = sum(max(min(b, high) - max(a, low), 0.0) for a, b in measured.excited.intervals)
+    return 1.0 - known / max(high - low, 1e-9)
 
 
 def _fitted(part: FrequencyResponse) -> Rational:
@@ -180,6 +188,16 @@ def _level_and_delay(rest: FrequencyResponse) -> tuple[Known, Known]:
     return Known(value, value * float(level_std[0])), Known(rough + float(slope[0]), float(slope_std[0]))
 
 
+def _level_drawn(measured: Measured) -> float:
+    """Relative std of the level by what is known of the coupling."""
+    if measured.held is None:
+        return 0.0
+    f = measured.held.response.frequency
+    inside = (f >= _STRAIGHT[0]) & (f <= _STRAIGHT[1])
+    ratio = np.abs(measured.held.draws[:, inside] / measured.held.response.response[inside])
+    return float(np.log(ratio).mean(axis=1).std()) if inside.any() else 0.0
+
+
 def _rough_delay(response: Complex, weight: Array, omega: Array) -> float:
     """The delay [s] that lays all phases on zero best: no phase has to be unwrapped then."""
     tried = np.arange(-_LONGEST, _LONGEST, 0.5 / float(omega.max()))
@@ -197,30 +215,40 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
     return np.asarray(found), np.sqrt(np.diag(inverse) * correlated * max(misfit, 1.0))
 
 
-def _is_mode(mode: Mode, resolution: float) -> bool:
-    """One that is known, and not narrower than what the spectrum resolves."""
+def _is_mode(mode: Mode) -> bool:
+    """One that is known."""
     f, damping = mode.frequency, mode.damping.value
-    return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value and 2.0 * damping * f.value > _NARROW * resolution
+    return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value
 
 
-def _is_trace(mode: Mode, resolution: float) -> bool:
-    return _is_mode(replace(mode, distinct=True), resolution) and mode.damping.value > _SEEN * mode.damping.std
+def _is_trace(mode: Mode) -> bool:
+    return _is_mode(replace(mode, distinct=True)) and mode.damping.value > _SEEN * mode.damping.std
 
 
 def _moving(measured: Measured, part: FrequencyResponse, fit: Rational) -> list[tuple[Mode, Mode]]:
-    """Each mode as the fit has it, and as uncertain as its movement along the turn makes it: what parts scatter beyond noise."""
-    modes = fit.modes()
+    """Each mode as the fit has it, and as uncertain as the coupling and its movement along the turn make it."""
+    modes = wider = fit.modes()
     along = along_turn(measured, part.frequency)
-    if along is None or not modes:
-        return [(m, m) for m in modes]
-    relative = along.response / _rigid(measured, part.frequency)
-    seen = scattered(fit, part.frequency, relative, part.variance).modes()
+    if along is not None and modes:
+        wider = _wider(wider, _scattered(measured, part, fit, along.response), modes, along.noise)
+    if measured.held is not None and modes:
+        inside = np.isin(measured.held.response.frequency, part.frequency)
+        wider = _wider(wider, _scattered(measured, part, fit, measured.held.draws[:, inside]), modes, 0.0)
+    return list(zip(modes, wider, strict=True))
 
-    def wider(mean: Known, one: Known) -> Known:
-        return Known(mean.value, float(np.sqrt(mean.std**2 + max(one.std**2 - along.noise * mean.std**2, 0.0))))
 
-    return [(m, replace(m, frequency=wider(m.frequency, s.frequency), damping=wider(m.damping, s.damping)))
-            for m, s in zip(modes, seen, strict=True)]
+def _scattered(measured: Measured, part: FrequencyResponse, fit: Rational, responses: Complex) -> tuple[Mode, ...]:
+    """The modes of the fit with the deviations of those of `responses` u → q (parts, bins)."""
+    return scattered(fit, part.frequency, responses / _rigid(measured, part.frequency), part.variance).modes()
+
+
+def _wider(modes: tuple[Mode, ...], parts: tuple[Mode, ...], mean: tuple[Mode, ...], noise: float) -> tuple[Mode, ...]:
+    """With what `parts` scatter beyond `noise` times the variance of the mean."""
+    def wider(now: Known, part: Known, mean: Known) -> Known:
+        return Known(now.value, float(np.sqrt(now.std**2 + max(part.std**2 - noise * mean.std**2, 0.0))))
+
+    return tuple(replace(m, frequency=wider(m.frequency, p.frequency, k.frequency), damping=wider(m.damping, p.damping, k.damping))
+                 for m, p, k in zip(modes, parts, mean, strict=True))
 
 
 def _with_friction(mode: Mode) -> Mode:
@@ -247,21 +275,6 @@ def _rise_std(pairs: tuple[Pair, ...]) -> float:
     """Relative, of the product of all rises."""
     parts = [2.0 * f.std / f.value for p in pairs for f in (p.antiresonance.frequency, p.resonance.frequency)]
     return float(np.sqrt(np.sum(np.square(parts))))
-
-
-def _inertia(measured: Measured, level: Known) -> Known | None:
-    """u/τ is one number per joint, D̂ or 1: the inertia is that over the level."""
-    torque, plant = (one.where(measured.excited.holds(one.frequency)).within(*_CONSTANT)
-                     for one in (measured.compliance, measured.plant))
-    if not len(torque.frequency) or len(torque.frequency) != len(plant.frequency):
-        return None
-    ratio = plant.response / torque.response  # τ/u
-    weight = np.abs(torque.response) ** 2 / np.maximum(torque.variance, 1e-300)
-    order = np.argsort(ratio.real)
-    middle = np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum())
-    torque_per_input = float(ratio.real[order][min(int(middle), len(order) - 1)])
-    value = torque_per_input / level.value
-    return Known(value, abs(value) * level.std / abs(level.value))
 
 
 def _friction_below(relative: FrequencyResponse, level: Known) -> float:

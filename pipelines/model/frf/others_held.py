@@ -1,25 +1,29 @@
 """Take the motion of the other joints out of a response: what the joint would answer were they held.
 
-    τ_j = Z_jj(s) a_j + F(s) Σ_k D_jk a_k,    Z_jj(s) = D_jj + Σ_m (c_m + d_m s) / (1 + b_m s + a_m s²) + friction, gravity
+    τ_j = Σ_k Z_jk(s) e^(sδ) a_k,    Z_jk(s) = D_jk - Σ_m b_jm b_km s² / (s² + 2 ζ_m ω_m s + ω_m²)
 
-a_k are accelerations and D is the mass matrix. Compliance makes the poles of the dynamic stiffness Z (Ewins 2000, Modal
-Testing, §2.4): a base those of Z_jj alone (F = 1), a spring in the joint those of all that its link carries (F = 1 over its
-section). The other joints are held by their controllers, and above the band of those they swing freely: the inertia at joint j
-then falls from D_jj towards 1 / (D⁻¹)_jj, which looks like a heavily damped mode. Their motion is in the log; with it D_jk is
-found by least squares over frequency, linear once the poles are given.
+a_k are accelerations and D is the mass matrix; friction and gravity of the joint add to Z_jj. The modes m are those of the arm
+with all joints locked: the arm on its base, and each link on the spring that its motor turns it with. They are the poles of all
+Z_jk alike, and their residues are of rank one (Ewins 2000, Modal Testing, §2.4; Craig, Bampton 1968, AIAA J. 6, p. 1313). The
+other joints are held by their controllers, and above the band of those they swing freely: the inertia at joint j then falls from
+D_jj towards 1 / (D⁻¹)_jj, which looks like a heavily damped mode. Their motion is in the log, as noisy as it is read: the least
+squares of τ_j - Σ Z_jk a_k are weighted by its own variance, renewed with Z, and the noise of a_k is taken out at the end
+(Pintelon, Schoukens 2012, System Identification, §9.11).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.fit.bounded import least_squares
 from pipelines.log.experiment import Array
 from pipelines.model.frf.controller import Complex
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop
 
-__all__ = ["HeldConfig", "others_held"]
+__all__ = ["Held", "HeldConfig", "others_held"]
 
 
 @dataclass(frozen=True)
@@ -27,29 +31,37 @@ class HeldConfig:
     """How Z is found.
 
     Attributes:
-        poles: pairs of them at most: a base and a joint.
-        frequencies, dampings: tried for each pair, the best of which is refined up to the largest damping.
-        gain: of the squares that are left, the share that a further pair of poles may leave at most. Errors of the model are
-            alike over many bins: statistics of independent bins would let it follow them. True modes leave a tenth.
-        floor: of the torque, what the model leaves out in every bin.
+        modes: at most: a base and a spring in two joints.
+        frequencies, dampings: tried for each mode; the last damping is the largest.
+        delay: [s] the largest.
+        floor: of the torque, what the model leaves out.
+        alike: share of the frequency over which that is the same: its bins count as one.
+        weighings: times that the variance of the rest is renewed.
+        draws: of the response within what is known of the coupling.
         fewest: bins.
     """
 
-    poles: int = 2
+    modes: int = 3
     frequencies: int = 60
     dampings: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
-    gain: float = 1.0 / 3.0
+    delay: float = 0.02
     floor: float = 0.01
+    alike: float = 0.15
+    weighings: int = 4
+    draws: int = 24
     fewest: int = 20
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
-    """Least squares with some poles."""
+class Held:
+    """A response with the other joints held, and draws of it within what is known of their inertia."""
 
-    sections: tuple[Complex, ...]  # 1 + b s + a s² (bins,) of each pair of poles
-    coupling: Complex  # F D_jk (bins, other joints)
-    cost: float  # weighted sum of squares
+    response: FrequencyResponse
+    draws: Complex  # (draws, bins)
+
+    def times(self, factor: Complex) -> Held:
+        """Both times a known `factor` (bins,)."""
+        return Held(self.response.times(factor), self.draws * factor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,84 +70,199 @@ class _Rows:
 
     torque: Complex  # (bins,)
     acceleration: Complex  # a_j, then those of the others (bins, joints)
-    weight: Array  # 1 / std of a part of the rest (bins,)
+    covariance: Complex  # of torque and accelerations (bins, 1 + joints, 1 + joints)
+    floor: Array  # std that the torque has at least (bins,)
     s: Complex  # jω (bins,)
+    independent: float  # bins that count
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Z with some modes."""
+
+    shape: Array  # δ [s], then log ω [rad/s] and log ζ of each mode (1 + 2 modes,)
+    gains: Array  # D_jk, b_jm b_km of each mode, friction and gravity of joint j (joints (1 + modes) + 2,)
+    impedance: Complex  # Z_jk e^(sδ) (bins, joints)
+    rest: Array  # real and imaginary parts over their std (2 bins,)
+    spread: Array  # that std (bins,)
+
+    ratios: tuple[Array | None, ...] = ()  # b_km / b_jm of each mode (others,); None: found freely
+    inside: bool = True  # every frequency and damping lies within its bounds: at one, it is not found
+
+    @property
+    def cost(self) -> float:
+        return max(float(self.rest @ self.rest), 1e-300)
+
+    def passive(self, most: Array) -> bool:
+        """Whether every mode is found and could exist: b_jm² is positive, and no b_km² is more than D_kk, `most` (others,)."""
+        joints, place = len(most) + 1, len(most) + 1
+        for ratio in self.ratios:
+            size = joints if ratio is None else 1
+            own, others = self.gains[place], self.gains[place + 1:place + size]
+            if own <= 0.0 or (others**2 > most[:len(others)] * own).any():
+                return False
+            place += size
+        return self.inside
+
+    def description(self, independent: float) -> float:
+        """-2 log-likelihood + p log n (Rissanen 1978, Automatica 14)."""
+        share = 2.0 * independent / len(self.rest)
+        return float(share * (self.cost + 4.0 * np.log(self.spread).sum())
+                     + (len(self.shape) + len(self.gains)) * np.log(2.0 * independent))
 
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
-                config: HeldConfig | None = None) -> FrequencyResponse | None:
-    """The response from torque to position with the other joints held; None where their motion does not matter.
+                most: Array | None = None, config: HeldConfig | None = None) -> Held | None:
+    """Return the response from torque to position with the other joints held; None where there are none.
 
     Args:
         responses: from v to torque and all positions, in the excited band.
         rigid: position over acceleration (bins,), complex: the double integrator as it was sampled.
         torque, position, others: places among the outputs.
+        most: D_kk of the others at most (others,) [kg m^2], where it is known.
     """
     config = config or HeldConfig()
     if not others or len(responses.frequency) < config.fewest:
         return None
-    s = np.asarray(2j * np.pi * responses.frequency)
-    target = responses.response[:, torque]
-    own = responses.covariance[:, torque, torque].real + (config.floor * np.abs(target)) ** 2
-    rows = _Rows(target, responses.response[:, [position, *others]] / rigid[:, None], 1.0 / np.sqrt(0.5 * own), s)
-    first = _least_squares(rows, (), None)
-    to = _taking(responses, first.coupling, rigid, torque, position, others)
-    left = np.einsum("ba,bac,bc->b", to[:, 0], responses.covariance, np.conj(to[:, 0])).real + (config.floor * np.abs(target)) ** 2
-    rows = replace(rows, weight=1.0 / np.sqrt(0.5 * left))
-    coupled = _with_poles(rows, config)
-    to = _taking(responses, coupled.coupling, rigid, torque, position, others)
-    return closed_loop(replace(responses, response=(to @ responses.response[:, :, None])[..., 0],
-                               covariance=to @ responses.covariance @ np.conj(np.swapaxes(to, 1, 2)),
-                               coherence=responses.coherence[:, [torque, position]]))
+    kept = [torque, position, *others]
+    scale = np.stack([np.ones_like(rigid), *(1.0 / rigid for _ in kept[1:])], axis=1)
+    values = responses.response[:, kept] * scale
+    covariance = responses.covariance[:, kept][:, :, kept] * scale[:, :, None] * np.conj(scale[:, None, :])
+    f = responses.frequency
+    alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
+    rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
+                 np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
+    fit = _unattenuated(rows, _with_modes(rows, np.full(len(others), np.inf) if most is None else most, config))
+    held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
+    couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit, config.draws)]) / rigid[:, None]
+    rest = responses.response[:, torque] - np.einsum("dbk,bk->db", couplings, responses.response[:, list(others)])
+    return Held(held, np.asarray(responses.response[:, position] / rest))
 
 
-def _taking(responses: Responses, coupling: Complex, rigid: Complex, torque: int, position: int,
-            others: tuple[int, ...]) -> Complex:
-    """From all outputs to the torque less that of the other joints, and the position (bins, 2, outputs)."""
-    to = np.zeros((len(rigid), 2, responses.response.shape[1]), dtype=np.complex128)
-    to[:, 0, torque], to[:, 1, position] = 1.0, 1.0
-    to[:, 0, list(others)] = -coupling / rigid[:, None]
-    return to
+def _less(responses: Responses, kept: list[int], coupling: Complex) -> Responses:
+    """Of the torque less `coupling` (bins, others) times the positions of the others, and of the position."""
+    to = np.zeros((len(coupling), 2, len(kept)), dtype=np.complex128)
+    to[:, 0, 0], to[:, 1, 1] = 1.0, 1.0
+    to[:, 0, 2:] = -coupling
+    return replace(responses, response=(to @ responses.response[:, kept, None])[..., 0],
+                   covariance=to @ responses.covariance[:, kept][:, :, kept] @ np.conj(np.swapaxes(to, 1, 2)),
+                   coherence=responses.coherence[:, kept[:2]])
 
 
-def _with_poles(rows: _Rows, config: HeldConfig) -> _Fit:
-    """Add pairs of poles as long as each explains most of the residual."""
-    best = _least_squares(rows, (), None)
-    for number in range(config.poles):
-        if best.cost <= 2.0 * len(rows.s):  # explained to within `floor` and noise (Morozov's discrepancy principle)
+def _with_modes(rows: _Rows, most: Array, config: HeldConfig) -> _Fit:
+    """Add modes as long as they shorten the description."""
+    plain = np.sqrt(0.5 * (rows.covariance[:, 0, 0].real + rows.floor**2))
+    delays = np.arange(-config.delay, config.delay, np.pi / 4.0 / abs(rows.s[-1]))
+    rigid = [_linear(rows, np.array([delay]), plain) for delay in (0.0, *delays)]
+    best = known = _refined(rows, min(rigid, key=lambda one: one.cost), config)
+    frequencies = np.log(np.geomspace(abs(rows.s[0]), abs(rows.s[-1]), config.frequencies))
+    shapes = [np.array([w, np.log(z)]) for w in frequencies[1:-1] for z in config.dampings]
+    for _ in range(config.modes):
+        starts = []
+        for kind in (known.gains[1:rows.acceleration.shape[1]] / known.gains[0], None):
+            for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
+                trials = (_linear(rows, np.concatenate([[delay], known.shape[1:], shape]), spread, (*known.ratios, kind))
+                          for shape in shapes)
+                starts.append(min((one for one in trials if one.passive(most)), key=lambda one: one.cost, default=None))
+        found = [one for one in (_refined(rows, start, config) for start in starts if start is not None) if one.passive(most)]
+        if not found:
             break
-        more = min((_pole_more(rows, best, by, config) for by in (None, *range(number + 1))), key=lambda fit: fit.cost)
-        if more.cost > config.gain * best.cost:
-            break
-        best = more
+        known = min(found, key=lambda one: one.description(rows.independent))
+        if known.description(rows.independent) < best.description(rows.independent):
+            best = known
     return best
 
 
-def _pole_more(rows: _Rows, known: _Fit, filtered: int | None, config: HeldConfig) -> _Fit:
-    """The best pair of poles more: over the whole band, then nearer and nearer to the best."""
-    omega = np.abs(rows.s)
-    frequencies, dampings = np.geomspace(omega[0], omega[-1], config.frequencies), np.array(config.dampings)
-    step, best = np.log(frequencies[1] / frequencies[0]), known
-    for narrower in (0.5, 0.25, 0.125, 0.0625, 0.0312, 0.0156):
-        tried = [(_least_squares(rows, (*known.sections, 1.0 + 2.0 * z * rows.s / w + (rows.s / w) ** 2), filtered), w, z)
-                 for w in frequencies for z in dampings]
-        best, w, z = min(tried, key=lambda one: one[0].cost)
-        frequencies = w * np.exp(narrower * step * np.array([-1.0, 0.0, 1.0]))
-        dampings = np.minimum(z * 2.0 ** (narrower * np.array([-1.0, 0.0, 1.0])), config.dampings[-1])
-    return best
+def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
+    """Refine delay, frequencies and dampings by variable projection (Golub, Pereyra 1973, SIAM J. Numer. Anal. 10, p. 413).
+
+    The variance of the rest is that of the impedance found before.
+    """
+    modes = len(start.shape) // 2
+    low = np.array([-config.delay, *np.tile(np.log([abs(rows.s[0]), 1e-3]), modes)])
+    high = np.array([config.delay, *np.tile(np.log([abs(rows.s[-1]), 1.01 * config.dampings[-1]]), modes)])
+    fit, mask = start, np.zeros(len(low), dtype=bool)
+    for _ in range(config.weighings):
+        spread, ratios = _spread(rows, fit.impedance), _renewed(rows, fit)
+
+        def rest(x: Array, spread: Array = spread, ratios: tuple[Array | None, ...] = ratios) -> Array:
+            return _linear(rows, x, spread, ratios).rest
+
+        found = least_squares(rest, np.clip(fit.shape, low + 1e-9, high - 1e-9), low, high,
+                              np.array([1e-4, *np.full(2 * modes, 0.1)]), 10)
+        fit, mask = _linear(rows, found.x, spread, ratios), found.at_bound
+    return replace(fit, inside=not mask[1:].any())
 
 
-def _least_squares(rows: _Rows, sections: tuple[Complex, ...], filtered: int | None) -> _Fit:
-    """Real coefficients of every column, F = 1 over the section `filtered`."""
-    s, own = rows.s, rows.acceleration[:, :1]
-    through = 1.0 if filtered is None else 1.0 / sections[filtered][:, None]
-    shapes = np.stack([np.ones_like(s), 1.0 / s, 1.0 / s**2, *(part for one in sections for part in (1.0 / one, s / one))], axis=1)
-    columns = np.concatenate([own * shapes, rows.acceleration[:, 1:] * through], axis=1) * rows.weight[:, None]
-    stacked = np.concatenate([columns.real, columns.imag])
-    right = np.concatenate([(rows.torque * rows.weight).real, (rows.torque * rows.weight).imag])
+def _renewed(rows: _Rows, fit: _Fit) -> tuple[Array | None, ...]:
+    """Of a base that turns as the joint does, b_k / b_j = D_jk / D_jj."""
+    own = fit.gains[1:rows.acceleration.shape[1]] / fit.gains[0]
+    return tuple(None if one is None else own for one in fit.ratios)
+
+
+def _spread(rows: _Rows, impedance: Complex) -> Array:
+    """Std of a part of τ_j - Σ Z_jk a_k (bins,)."""
+    to = np.concatenate([np.ones((len(impedance), 1)), -impedance], axis=1)
+    variance = np.einsum("ba,bac,bc->b", to, rows.covariance, np.conj(to)).real
+    return np.asarray(np.sqrt(0.5 * (variance + rows.floor**2)))
+
+
+def _linear(rows: _Rows, shape: Array, spread: Array, ratios: tuple[Array | None, ...] = ()) -> _Fit:
+    """Least squares of the gains, `spread` (bins,) given."""
+    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in _shapes(rows, shape, ratios)], axis=1) / spread[:, None]
+    stacked, target = np.concatenate([columns.real, columns.imag]), rows.torque / spread
+    right = np.concatenate([target.real, target.imag])
     size = np.maximum(np.sqrt((stacked**2).sum(axis=0)), 1e-300)
     stacked /= size
-    solution = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
-    cost = max(float(((right - stacked @ solution) ** 2).sum()), 1e-300)
-    coupling = np.broadcast_to((solution / size)[shapes.shape[1]:] * through, (len(s), rows.acceleration.shape[1] - 1))
-    return _Fit(sections, np.asarray(coupling, dtype=np.complex128), cost)
+    gains = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
+    return _Fit(shape, gains / size, _impedance(rows, shape, gains / size, ratios), right - stacked @ gains, spread, ratios)
+
+
+def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
+    """The gains without what noise of the accelerations takes off them; as they are where that is more than the half.
+
+    Expected normal equations hold the covariance of the noise; it is known, and taken out (Söderström 2007, Automatica 43, §5.1).
+    """
+    shapes, w = np.stack(_shapes(rows, fit.shape, fit.ratios)), 0.5 / fit.spread**2  # (gains, bins, joints)
+    columns = np.einsum("gbk,bk->gb", shapes, rows.acceleration)
+    normal = ((columns * w) @ np.conj(columns.T)).real
+    noise = np.einsum("gbk,bkl,hbl,b->gh", shapes, rows.covariance[:, 1:, 1:], np.conj(shapes), w, optimize=True).real
+    if not np.linalg.eigvals(_inverse(normal) @ noise).real.max() < 0.5:
+        return fit
+    cross = np.einsum("gbk,bk,b->g", shapes, rows.covariance[:, 1:, 0], w, optimize=True).real
+    gains = np.linalg.solve(normal - noise, ((columns * w) @ np.conj(rows.torque)).real - cross)
+    return replace(fit, gains=gains, impedance=_impedance(rows, fit.shape, gains, fit.ratios))
+
+
+def _drawn(rows: _Rows, fit: _Fit, draws: int) -> list[Complex]:
+    """Impedances (bins, joints) each, within what is known of shape and gains."""
+    step, count = 1e-5, len(fit.shape)
+    steps = step * np.array([1e-3, *np.ones(count - 1)])
+    moved = [(_impedance(rows, fit.shape + one, fit.gains, fit.ratios) - fit.impedance) / one.sum() for one in np.diag(steps)]
+    every = (*moved, *_shapes(rows, fit.shape, fit.ratios))
+    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in every]) / fit.spread
+    covariance = _inverse((columns @ np.conj(columns.T)).real)
+    size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    about = np.random.default_rng(0).multivariate_normal(np.zeros(len(size)), covariance / np.outer(size, size), draws) * size
+    return [_impedance(rows, fit.shape + one[:count], fit.gains + one[count:], fit.ratios) for one in about]
+
+
+def _inverse(normal: Array) -> Array:
+    """Of a symmetric matrix whose rows have different units."""
+    size = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    return np.asarray(np.linalg.pinv(normal / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size))
+
+
+def _impedance(rows: _Rows, shape: Array, gains: Array, ratios: tuple[Array | None, ...]) -> Complex:
+    return np.asarray(sum(gain * one for gain, one in zip(gains, _shapes(rows, shape, ratios), strict=True)))
+
+
+def _shapes(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> Sequence[Complex]:
+    """What each gain multiplies in Z e^(sδ), each (bins, joints)."""
+    s, unit = rows.s, np.eye(rows.acceleration.shape[1])
+    late = np.exp(shape[0] * s)
+    found = [late[:, None] * one for one in unit]
+    for (w, z), ratio in zip(shape[1:].reshape(-1, 2), ratios, strict=True):
+        mode = -late * s**2 / (s**2 + 2.0 * np.exp(z + w) * s + np.exp(2.0 * w))
+        found += [mode[:, None] * one for one in (unit if ratio is None else [np.concatenate([[1.0], ratio])])]
+    return [*found, *((late / s**power)[:, None] * unit[0] for power in (1, 2))]

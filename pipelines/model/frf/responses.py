@@ -23,7 +23,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
-from pipelines.model.frf.others_held import others_held
+from pipelines.model.frf.others_held import Held, others_held
 from pipelines.signal.cross_spectra import cross_spectra
 from pipelines.signal.excited_band import ExcitedBand, excited_band
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
@@ -41,6 +41,8 @@ _SEGMENTS = 4  # at least, for Welch's coherence and variance
 _NO_POWER = 1e-12  # of the strongest bin of the source
 _FOLDED = 0.1  # of the density of v in its band, near half the rate: it goes on beyond
 _COUPLED = 4.0  # [Hz] from where on friction and gravity of the other joints matter less than their inertia
+_CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
+_POSTURES = 3.0  # times that the inertia about a joint grows from one posture to another
 _DENSITY = 1.0  # [s] of the segments that show where v has power
 _SMOOTH = 25  # lines over which distortion is compared with noise
 
@@ -68,7 +70,8 @@ class Measured:
 
     turned: tuple[Turned, ...]  # its logs
     plant: FrequencyResponse  # u → q by Φ_vq/Φ_vu
-    held: FrequencyResponse | None  # the same in the excited band, were the other joints held; None where that is all one
+    held: Held | None  # the same in the excited band, were the other joints held; None where that is all one
+    torque_per_input: float | None  # D̂ [kg m^2] under computed torque, 1 under PD; None where they cannot be compared
     aliased: bool  # the input was sampled, not held, and v has power up to half the rate: what lies above has folded back
     excited: ExcitedBand  # where it exists: nothing is fitted, judged or named outside
     direct: FrequencyResponse
@@ -87,6 +90,11 @@ class Measured:
     @property
     def joint(self) -> int:
         return self.first.joint
+
+    @property
+    def load(self) -> float:
+        """The steady torque less friction over the deviation of the torque, the smallest of the logs; 0 where unknown."""
+        return min(one.load for one in self.turned)
 
     @property
     def others(self) -> Array:
@@ -109,7 +117,20 @@ def measured_responses(logs: Iterable[ExperimentLog], how: How | None = None) ->
                 break
         else:
             groups.append([turned])
-    return tuple(_measured(tuple(group), how) for group in groups)
+    inertia: dict[int, float] = {}
+    for group in groups:
+        known = [_roughly(one) for one in group]
+        inertia[group[0].joint] = max(_POSTURES * max(known), inertia.get(group[0].joint, 0.0))
+    return tuple(_measured(tuple(group), how, inertia) for group in groups)
+
+
+def _roughly(turned: Turned) -> float:
+    """The inertia [kg m^2] of the joint from all of a log: torque over acceleration by v, where friction matters little."""
+    spectra = cross_spectra([s.signals[:, [V, TORQUE, POSITION]] for s in turned.stretches], turned.rate,
+                            min(round(_DENSITY * turned.rate), *(len(s.signals) for s in turned.stretches)))
+    inside = (spectra.frequency >= _COUPLED) & (spectra.frequency <= _CONSTANT[0])
+    torque, position = spectra.density[inside, 0, 1], spectra.density[inside, 0, 2]
+    return float(np.median(np.abs(torque) / np.maximum(np.abs(position) * (2.0 * np.pi * spectra.frequency[inside]) ** 2, 1e-300)))
 
 
 def _together(a: Turned, b: Turned) -> bool:
@@ -119,7 +140,7 @@ def _together(a: Turned, b: Turned) -> bool:
     return bool(np.abs(apart).max(initial=0.0) < _SAME_POSTURE)
 
 
-def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
+def _measured(turned: tuple[Turned, ...], how: How, inertia: dict[int, float]) -> Measured:
     first = turned[0]
     stretches = [s for one in turned for s in one.stretches]
     several, distortion, detected = _excited(turned, stretches, how)
@@ -134,9 +155,11 @@ def _measured(turned: tuple[Turned, ...], how: How) -> Measured:
     band = excited_band(_outputs(several, (INPUT - 1, POSITION - 1)), density)
     inside = density[band.holds(several.frequency)]
     aliased = not first.held and bool(len(inside)) and top > _FOLDED * float(np.median(inside))
-    return Measured(turned, plant, _held(several, first, band), aliased, band,
+    compliance = closed_loop(several, POSITION - 1, TORQUE - 1)
+    ratio = _torque_per_input(plant, compliance, band)
+    return Measured(turned, plant, _held(several, first, band, ratio, inertia), ratio, aliased, band,
                     _direct([s.signals for s in stretches], turned, how), both[0], both[1],
-                    closed_loop(several, POSITION - 1, TORQUE - 1), sensitivity, _with_reversal(turned, how), distortion, detected)
+                    compliance, sensitivity, _with_reversal(turned, how), distortion, detected)
 
 
 def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tuple[Array, float]:
@@ -147,13 +170,34 @@ def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tup
     return np.interp(frequency, spectra.frequency, density), float(np.median(density[spectra.frequency > 0.45 * rate]))
 
 
-def _held(several: Responses, first: Turned, band: ExcitedBand) -> FrequencyResponse | None:
-    """Of a joint whose input is its torque; computed torque uncouples the joints."""
-    if first.quantity != "tau":
-        return None
+def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None,
+          inertia: dict[int, float]) -> Held | None:
+    """u → q with the other joints held: computed torque leaves them at rest only where nothing gives way.
+
+    A joint whose inertia no log shows moves less than one before it.
+    """
     inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
-    rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.held), dtype=np.complex128)
-    return others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])))
+    rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.torque_held), dtype=np.complex128)
+    found = others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])),
+                        np.array([inertia.get(k, _roughly(first) if k > first.joint else np.inf)
+                                  for k in range(1, len(first.posture) + 1) if k != first.joint]))
+    if found is None or ratio is None:
+        return None
+    _, delay = loop_delay(first.controller, first.quantity)
+    own = double_integrator(inside.frequency, first.sample_time, delay, first.held)
+    return found.times(np.asarray(ratio * own / rigid))
+
+
+def _torque_per_input(plant: FrequencyResponse, compliance: FrequencyResponse, band: ExcitedBand) -> float | None:
+    """τ/u, one number per joint, D̂ or 1: the median, weighted by what is known."""
+    torque, whole = (one.where(band.holds(one.frequency)).within(*_CONSTANT) for one in (compliance, plant))
+    if not len(torque.frequency) or len(torque.frequency) != len(whole.frequency):
+        return None
+    ratio = (whole.response / torque.response).real
+    weight = np.abs(torque.response) ** 2 / np.maximum(torque.variance, 1e-300)
+    order = np.argsort(ratio)
+    middle = np.searchsorted(np.cumsum(weight[order]), 0.5 * weight.sum())
+    return float(ratio[order][min(int(middle), len(order) - 1)])
 
 
 def _outputs(several: Responses, which: tuple[int, ...]) -> Responses:

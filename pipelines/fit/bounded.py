@@ -1,0 +1,39 @@
+"""Minimise a sum of squares within bounds, by a trust region (Branch, Coleman, Li 1999, SIAM J. Sci. Comput. 21, p. 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+__all__ = ["Minimum", "least_squares"]
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Where the sum of squares is smallest."""
+
+    x: Array  # (parameters,)
+    rest: Array  # (rows,)
+    slope: Array  # (rows, parameters)
+    at_bound: npt.NDArray[np.bool_]  # (parameters,)
+
+
+def least_squares(rest: Callable[[Array], Array], start: Array, low: Array | float = -np.inf, high: Array | float = np.inf,
+                  scale: Array | None = None, steps: int | None = None) -> Minimum:
+    """Return the minimum next to `start`.
+
+    Args:
+        rest: parameters (parameters,) to residuals (rows,).
+        low, high: bounds of the parameters.
+        scale: their characteristic sizes; None: by the slopes.
+        steps: evaluations at most.
+    """
+    from scipy import optimize
+
+    found = optimize.least_squares(rest, start, bounds=(low, high), x_scale="jac" if scale is None else scale, max_nfev=steps)
+    return Minimum(found.x, found.fun, found.jac, np.asarray(found.active_mask != 0))
