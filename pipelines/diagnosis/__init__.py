@@ -1,1 +1,1 @@
-"""Diagnosis as one Gaussian model: y = N b + D s + X θ + e, one prior, one decision."""
+"""Diagnose a session by one Gaussian model, y = N b + D s + X θ + e, and one decision."""

@@ -73,10 +73,10 @@ class Dictionary:
         """Return every candidate, with its columns over the reference and the later rows."""
         found = _families(dataset)
         plain = _unnamed(dataset, config)
-        groups: list[Group] = []
         tables = []
         for rows in (dataset.reference, dataset.later):
-            groups, parts = [], []
+            groups: list[Group] = []
+            parts: list[Table] = []
             for family in found.values():
                 if not family.event:
                     _lay(rows, family, dataset.arm, groups, parts)
@@ -100,7 +100,8 @@ def _families(dataset: Dataset) -> dict[Key, Family]:
     for family in families(dataset.model.columns.laws, motion, dataset.arm):
         shapes = family.shapes
         if family.cause == "viscous_drift":  # a joint that is warm stays warm in the next log
-            shapes = tuple(replace(shape, since=dataset.session_start) for shape in shapes)
+            shapes = tuple(replace(shape, since=dataset.session_start)  # type: ignore[call-arg]
+                           for shape in shapes)
         found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
     payload = find_effect("payload")()
     shapes = tuple(payload.shapes(dataset.later.data.logs[0].motion, dataset.arm))
@@ -128,7 +129,7 @@ Make = Callable[[Motion], Array]  # (samples, k) on one joint
 def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
     """Return the shapes without a name: of each joint splines of q, dq and torque, and ripple."""
     motions = [one.motion for rows in (dataset.reference, dataset.later) for one in rows.data.logs]
-    nominal, found = dataset.model.nominal, {}
+    nominal, found = dataset.model.nominal, dict[Key, Make]()
 
     def signal(kind: str, motion: Motion, j: int) -> Array:
         values = nominal.torque(motion) if kind == "tau" else getattr(motion, kind)
@@ -145,7 +146,8 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
     def ripple(order: int, j: int) -> Make:
         def make(motion: Motion) -> Array:
             angle = order * motion.q[:, j]
-            return signal("tau", motion, j)[:, None] * np.stack([np.sin(angle), np.cos(angle)], 1)
+            waves = np.stack([np.sin(angle), np.cos(angle)], 1)
+            return np.asarray(signal("tau", motion, j)[:, None] * waves)
         return make
 
     for j in range(dataset.later.n_joints):

@@ -92,7 +92,7 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """What is diagnosed, and what is known of the machine from before."""
+    """The rows that are diagnosed, and the reference rows of the same machine."""
 
     model: Exact  # nominal, as the reference has it
     reference: Rows

@@ -27,10 +27,10 @@ class Decision:
 def decide(later: Later, selection: Selection, baseline: Baseline, config: DiagnosisConfig) -> Decision:
     """Return the verdict by significance and goodness of fit."""
     rows = later.rows.count
-    first, last = selection.start.losses.sum() / rows, selection.end.losses.sum() / rows
+    first, last = selection.start.rss / rows, selection.end.rss / rows
     explained = (first - last) / max(first - baseline.usual_fit, 1e-9)
     largest = float(selection.end.mean_squares.max())
-    fits = last <= baseline.worst_fit and largest < config.excess * max(1.0, baseline.usual_fit)
+    fits = last <= baseline.worst_fit or largest < config.excess * max(1.0, baseline.usual_fit)
     if selection.causes and (fits or explained > 0.5):
         sets = selection.causes[0].alternatives
         told = "cause" if not sets else "unknown"

@@ -63,7 +63,7 @@ def event_threshold(dataset: Dataset, dictionary: Dictionary, prior: Prior, conf
     """
     rows = dataset.reference
     info, moment = prior.precision + sum(prior.grams), sum(prior.moments)
-    mean = np.linalg.solve(info, moment)
+    mean = np.asarray(np.linalg.solve(info, moment), dtype=np.float64)
     table = prior.table(rows.nominal, dictionary.reference)
     residual = tuple(y * prior.noise**-0.5 - t for y, t in zip(rows.y, table.times(mean), strict=True))
     found = best_window(rows, dictionary, dataset.arm, residual, prior.noise)

@@ -1,4 +1,4 @@
-"""What is known of a healthy machine: variance components, and the posterior of the reference.
+"""Prior of a healthy machine: variance components, and the posterior of the reference.
 
     prior = reference_prior(dataset, dictionary, config)
     prior.of(parts)                        information of the numbers of later logs
@@ -71,10 +71,10 @@ def reference_prior(dataset: Dataset, dictionary: Dictionary, config: DiagnosisC
     columns = dictionary.standing()
     table = Table.stacked([rows.nominal.scaled(1.0 / scale), dictionary.reference.take(columns)])
     parts = _halves(dataset)
-    grams = [table.gram(table, part) for part in parts]
-    moments = [table.moments(rows.y, part) for part in parts]
+    grams = np.array([table.gram(table, part) for part in parts])
+    moments = np.array([table.moments(rows.y, part) for part in parts])
     power = sum(float(y @ y) for y in rows.y)
-    tau, noise = _components(sum(grams), sum(moments), power, rows.count, groups, len(scale), config)
+    tau, noise = _components(grams.sum(axis=0), moments.sum(axis=0), power, rows.count, groups, len(scale), config)
     n_nominal = len(scale)
     keep = np.flatnonzero(np.r_[np.ones(n_nominal, bool), tau.variance > _LEAST_VARIANCE])
     precision = np.diag(np.r_[tau.flat, tau.mean_square / tau.variance][keep])
@@ -99,7 +99,7 @@ def _components(gram: Array, moment: Array, power: float, rows: int, groups: lis
     family = np.concatenate([np.full(g.width, names.index(_family(g))) for g in groups])
     mean_square = np.maximum(np.diag(gram)[n_nominal:] / rows, 1e-30)
     flat = _FLAT * np.diag(gram)[:n_nominal]
-    noise, tau = 1.0, np.full(len(own), 1e-2)
+    noise, tau = 1.0, np.full(len(own), 1e-2)  # where EM begins
     per_group, per_family = np.bincount(own), np.bincount(family)
     for _ in range(config.em_rounds):
         precision = np.r_[flat, mean_square / tau]
@@ -110,13 +110,13 @@ def _components(gram: Array, moment: Array, power: float, rows: int, groups: lis
         of_family = np.bincount(family, energy) / per_family
         pooled = np.bincount(own, energy)[own] + config.variance_prior * of_family[family]
         tau = np.maximum(pooled / (per_group[own] + config.variance_prior), 1e-12)
-        rss = power - 2.0 * mean @ moment + mean @ gram @ mean
+        rss = power - 2.0 * float(mean @ moment) + float(mean @ gram @ mean)
         noise = rss / (rows - len(gram) + float(spread @ precision))
-    return _Components(flat, mean_square, tau), float(noise)
+    return _Components(flat, mean_square, tau), noise
 
 
 def _family(group: Group) -> tuple[str, int | None]:
-    """Return the key that shares a variance: of a ripple the joint, whatever its order."""
+    """Return the key that shares a variance: of a ripple its joint, of any order."""
     return (group.key[0].split()[0], group.key[1])
 
 

@@ -145,7 +145,7 @@ class Later:
         info = self._information(state.info, more)
         gradient = np.r_[state.moment - state.info @ state.theta + self.base.moments(state.residual),
                          more.moments(state.residual)]
-        step = np.linalg.solve(info, gradient)
+        step = np.asarray(np.linalg.solve(info, gradient), dtype=np.float64)
         torque = Table.stacked([self.base, more]).times(step)
         residual = tuple(r - t for r, t in zip(state.residual, torque, strict=True))
         there = replace(state, theta=state.theta + step[:len(state.theta)], residual=residual, effects=more)
@@ -165,7 +165,8 @@ class Later:
             own = [o[e[b]:e[b + 1]] for o, e in zip(order, edges, strict=True)]
             w = np.concatenate([v[:, rows] for v, rows in zip(whole, own, strict=True)], axis=1)
             r = np.concatenate([v[rows] for v, rows in zip(state.residual, own, strict=True)])
-            error = r + w.T @ np.linalg.solve(np.eye(len(w)) - w @ w.T, w @ r)
+            error = (np.linalg.solve(np.eye(len(r)) - w.T @ w, r) if len(r) < len(w) else
+                     r + w.T @ np.linalg.solve(np.eye(len(w)) - w @ w.T, w @ r))
             out[b] = float(error @ error)
         return out
 

@@ -108,29 +108,32 @@ def baseline(dataset: Dataset, dictionary: Dictionary, prior: Prior, event: floa
     table = prior.table(rows.nominal, dictionary.reference)
     y = tuple(one * unit for one in rows.y)
     parts = prior.parts
-    cross = [table.gram(own_table, part) for part in parts]
-    moments = [own_table.moments(y, part) for part in parts]
+    cross = np.array([table.gram(own_table, part) for part in parts])
+    moments = np.array([own_table.moments(y, part) for part in parts])
     squares = [[own_table.take(g.columns).gram(own_table.take(g.columns), part) for g in groups]
                for part in parts]
     powers = [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
     counts = [sum(int(m.sum()) for m in part) for part in parts]
     families = len({g.key for g in groups})
     excess: dict[str, list[float]] = {"named": [], "compliance": [], "unnamed": []}
-    fits = []
+    fits: list[float] = []
     for before, after in _splits(len(parts)):
         info, moment = prior.of(before)
-        gram, own = sum(prior.grams[k] for k in after), sum(prior.moments[k] for k in after)
+        chosen = list(after)
+        gram = np.sum([prior.grams[k] for k in after], axis=0)
+        own = np.sum([prior.moments[k] for k in after], axis=0)
         mean = np.linalg.solve(info + gram, moment + own)
-        across = sum(cross[k] for k in after)
+        across = cross[chosen].sum(axis=0)
         found = screen(groups, info + gram, across,
-                       [sum(squares[k][i] for k in after) for i in range(len(groups))],
-                       sum(moments[k] for k in after) - across.T @ mean)
+                       [np.sum([squares[k][i] for k in after], axis=0) for i in range(len(groups))],
+                       moments[chosen].sum(axis=0) - across.T @ mean)
         n = sum(counts[k] for k in after)
         for kind, values in excess.items():
             values.append(max((one.gain - float(chi2.isf(config.alpha / families, max(one.freedom, 1)))
                                for key, one in best_of(found).items() if kind_of(key) == kind),
                               default=0.0) / n)
-        fits.append((sum(powers[k] for k in after) - 2.0 * mean @ own + mean @ gram @ mean) / n)
+        left = sum(powers[k] for k in after) - 2.0 * float(mean @ own) + float(mean @ gram @ mean)
+        fits.append(left / n)
     return Baseline(config.alpha, families,
                     {kind: max(0.0, _upper(values, config.alpha)) for kind, values in excess.items()},
                     _upper(fits, config.alpha), float(np.median(fits)), event)

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -62,7 +62,7 @@ class Selection:
 
 @dataclass(frozen=True)
 class _Round:
-    """What one round of the forward selection decided."""
+    """The outcome of one round of the forward selection."""
 
     cause: Cause | None
     state: State | None
@@ -91,7 +91,7 @@ def select(later: Later, baseline: Baseline, responses: Sequence[Acting], config
 
 def _round(later: Later, start: State, state: State, causes: Sequence[Cause], baseline: Baseline,
            responses: Sequence[Acting], config: DiagnosisConfig) -> _Round:
-    """Return the cause that explains most of what `state` leaves, or why there is none."""
+    """Return the cause that explains most of the residual of `state`, or why none is selected."""
     best = best_of(later.screened(state))
     relevant = config.relevance**2 * (start.losses.sum() - state.losses.sum())
     taken = {cause.key for cause in causes}
@@ -101,20 +101,20 @@ def _round(later: Later, start: State, state: State, causes: Sequence[Cause], ba
     tried = [one for one in tried if one.gain > relevant and one.state.losses.sum() < state.losses.sum()]
     others = _unnamed(later, state, significant, bool(responses))
     if not tried:
-        return _Round(None, None, f"follows {_told(next(iter(others)))}" if others else "")
+        return _Round(None, None, f"follows {_place(next(iter(others)))}" if others else "")
     rows, size = later.block_rows, np.log(later.rows.count)
     scores = {one.key: log_scores(one.state.losses, rows) + _event_price(one.key, later) for one in tried}
     free = {key: log_scores(other.losses, rows) for key, other in others.items()}
     kept = confidence_set(scores | free, config)
     named = [key for key in kept if key in scores]
     if not named:
-        return _Round(None, None, f"{_told(kept[0])} predicts better than {_told(min(scores, key=lambda k: scores[k].sum()))}")
+        return _Round(None, None, f"{_place(kept[0])} predicts better than {_place(min(scores, key=lambda k: scores[k].sum()))}")
     before = log_scores(state.losses, rows)
     numbers = {one.key: one.numbers for one in tried}
     pick = min(named, key=lambda key: scores[key].sum() + numbers[key] * size)  # BIC
     pays = confidence_set({"with": scores[pick], "without": before}, config)
     if "without" in pays and not _event(later, pick):
-        return _Round(None, None, f"{_told(pick)} does not pay on blocks that it was not fitted to")
+        return _Round(None, None, f"{_place(pick)} does not pay on blocks that it was not fitted to")
     cause = Cause(pick, tuple(key for key in named if key != pick), _probability(pick, scores | free))
     chosen = next(one for one in tried if one.key == pick)
     return _Round(cause, _other_form(later, state, chosen))
@@ -145,21 +145,27 @@ def _refitted(later: Later, state: State, significant: dict[Key, Screened], base
 def _candidate(later: Later, state: State, key: Key, gain: float, effect: Effect, amplitudes: Array,
                log: int | None = None, held: tuple[str, ...] = ()) -> Candidate | None:
     """Return the cause refitted; None where the fit fails: a failing candidate costs itself alone."""
-    width = sum(not q.shape for q in effect.parameters) if effect.fixed_amplitudes is None else 0
-    start = np.zeros(max(width, len(amplitudes)))
+    start = np.zeros(max(len(amplitudes), _width(later, effect)))
     start[:len(amplitudes)] = amplitudes
+    info, moment = later.freed(state, effect)
     try:
-        model = state.model.with_effect(effect, start[:width] if width else amplitudes, log=log, held=held)
-        info, moment = later.freed(state, effect)
-        fitted = later.fit(model, state.theta, info, moment)
-    except (np.linalg.LinAlgError, ValueError, FloatingPointError):
+        fitted = later.fit(state.model.with_effect(effect, start, log=log, held=held), state.theta, info, moment)
+    except np.linalg.LinAlgError:
         return None
     numbers = fitted.model.effects[-1].count + (_EVENT_FREEDOM if log is not None else 0)
     return Candidate(key, gain, fitted, numbers)
 
 
+def _width(later: Later, effect: Effect) -> int:
+    """Return how many amplitudes the effect has, in the form that is refitted."""
+    first = later.rows.data.logs[0].motion
+    some = replace(first, t=first.t[:8], q=first.q[:8], dq=first.dq[:8], ddq=first.ddq[:8],
+                   tau=None if first.tau is None else first.tau[:8])
+    return int(effect.columns(some, later.dataset.arm).shape[2])
+
+
 def _unnamed(later: Later, state: State, significant: dict[Key, Screened], responses: bool) -> dict[Key, State]:
-    """Return what has no name: the best smooth function or ripple, and what gives way without responses."""
+    """Return the best shape without a name, and, without responses, the best compliance."""
     out = {}
     kinds = ("unnamed",) if responses else ("unnamed", "compliance")
     for kind in kinds:
@@ -207,7 +213,7 @@ def _event_price(key: Key, later: Later) -> float:
     """Return what a window that was searched for costs a block, by BIC."""
     if not _event(later, key):
         return 0.0
-    return _EVENT_FREEDOM * np.log(later.rows.count) / len(later.block_rows)
+    return float(_EVENT_FREEDOM * np.log(later.rows.count) / len(later.block_rows))
 
 
 def _probability(pick: Key, scores: dict[Key, Array]) -> float:
@@ -217,5 +223,5 @@ def _probability(pick: Key, scores: dict[Key, Array]) -> float:
     return float(np.exp(-0.5 * (scores[pick].sum() - total.min())) / weight.sum())
 
 
-def _told(key: Key) -> str:
+def _place(key: Key) -> str:
     return key[0] if key[1] is None else f"{key[0]}:{key[1]}"

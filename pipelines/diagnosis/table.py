@@ -20,7 +20,7 @@ Parts = Sequence[npt.NDArray[np.bool_]]
 
 
 def by_joint(x: Array, joint: Indices, n_joints: int) -> tuple[Array, ...]:
-    """Return a signal (…, rows) as one array (…, rows of the joint) for each joint."""
+    """Return a signal (…, rows) split into an array (…, rows of the joint) for each joint."""
     return tuple(np.ascontiguousarray(x[..., joint == j]) for j in range(n_joints))
 
 
