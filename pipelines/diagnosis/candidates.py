@@ -11,7 +11,7 @@ of these predicts better than every cause, the cause is not known.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,9 +69,9 @@ class Dictionary:
     later: Table
 
     @classmethod
-    def of(cls, dataset: Dataset, config: DiagnosisConfig) -> Dictionary:
+    def of(cls, dataset: Dataset, config: DiagnosisConfig, exclude: Sequence[str] = ()) -> Dictionary:
         """Return every candidate, with its columns over the reference and the later rows."""
-        found = _families(dataset)
+        found = _families(dataset, exclude)
         plain = _unnamed(dataset, config)
         tables = []
         for rows in (dataset.reference, dataset.later):
@@ -86,23 +86,25 @@ class Dictionary:
         return cls(tuple(groups), found, *tables)
 
     @property
-    def event(self) -> Family:
-        return next(family for family in self.families.values() if family.event)
+    def event(self) -> Family | None:
+        return next((family for family in self.families.values() if family.event), None)
 
     def standing(self) -> Indices:
         """Return the columns that healthy machines have in small."""
         return np.concatenate([g.columns for g in self.groups if g.standing])
 
 
-def _families(dataset: Dataset) -> dict[Key, Family]:
+def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
     motion = whole_motion(dataset.later.data)
     found = {}
-    for family in families(dataset.model.columns.laws, motion, dataset.arm):
+    for family in families(dataset.model.columns.laws, motion, dataset.arm, exclude):
         shapes = family.shapes
         if family.cause == "viscous_drift":  # a joint that is warm stays warm in the next log
             shapes = tuple(replace(shape, since=dataset.session_start)  # type: ignore[call-arg]
                            for shape in shapes)
         found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
+    if "payload" in exclude:
+        return found
     payload = find_effect("payload")()
     shapes = tuple(payload.shapes(dataset.later.data.logs[0].motion, dataset.arm))
     return found | {("payload", None): Family("payload", None, shapes)}

@@ -29,8 +29,12 @@ class Diagnosis:
     baseline: Baseline
 
 
-def diagnose(logs: Sequence[ExperimentLog], config: DiagnosisConfig | None = None) -> Diagnosis:
+def diagnose(logs: Sequence[ExperimentLog], config: DiagnosisConfig | None = None,
+             exclude: Sequence[str] = ()) -> Diagnosis:
     """Return what has changed since the reference logs.
+
+    Args:
+        exclude: causes that are not considered.
 
     Raises:
         UsageError: S26, no reference logs.
@@ -38,10 +42,10 @@ def diagnose(logs: Sequence[ExperimentLog], config: DiagnosisConfig | None = Non
     """
     config = config or DiagnosisConfig()
     dataset = load(logs, config)
-    dictionary = Dictionary.of(dataset, config)
+    dictionary = Dictionary.of(dataset, config, exclude)
     prior = reference_prior(dataset, dictionary, config)
     later = Later.of(dataset, dictionary, prior, config)
     known = baseline(dataset, dictionary, prior, event_threshold(dataset, dictionary, prior, config), config)
-    responses = compliance(dataset.frf, dataset.model.nominal)
+    responses = compliance(dataset.frf, dataset.model.nominal, exclude)
     found = select(later, known, responses.named if responses else (), config)
     return Diagnosis(decide(later, found, known, config), found, known)

@@ -38,6 +38,8 @@ def best_window(rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence
                 noise: float) -> Window | None:
     """Return the best window on a residual (rows of each joint) in units of the noise."""
     data, best = rows.data, None
+    if dictionary.event is None:
+        return None
     weight = rows.weight * noise**-0.5
     first = 0
     for place, one in enumerate(data.logs):

@@ -3,9 +3,6 @@
     later = Later.of(dataset, dictionary, prior)
     state = later.start(config)
     state = later.fit(state.with_effect(...))
-
-The loss of a block of time predicted from all others is e_b = (I - J_bᵀ P⁻¹ J_b)⁻¹ r_b, exact for a
-linear model; J are the slopes by all numbers, P their information with the prior.
 """
 
 from __future__ import annotations
@@ -14,12 +11,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, cho_solve
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows, moved
 from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.score import block_losses
 from pipelines.diagnosis.screening import Screened, screen
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.model.diagnosis.fitted.exact import Exact
@@ -153,22 +151,8 @@ class Later:
 
     def losses(self, state: State) -> Array:
         """Return the squared error (blocks,) of each block, predicted from all others and the prior."""
-        every = Table.stacked([self.base, state.effects])
-        factor = np.linalg.cholesky(self._information(state.info, state.effects))
-        whole = [solve_triangular(factor, every.dense(j),
-                                  lower=True, check_finite=False) for j in range(self.rows.n_joints)]
-        order = [np.argsort(b, kind="stable") for b in self.block]
-        edges = [np.searchsorted(b[o], np.arange(len(self.block_rows) + 1))
-                 for b, o in zip(self.block, order, strict=True)]
-        out = np.zeros(len(self.block_rows))
-        for b in range(len(out)):
-            own = [o[e[b]:e[b + 1]] for o, e in zip(order, edges, strict=True)]
-            w = np.concatenate([v[:, rows] for v, rows in zip(whole, own, strict=True)], axis=1)
-            r = np.concatenate([v[rows] for v, rows in zip(state.residual, own, strict=True)])
-            error = (np.linalg.solve(np.eye(len(r)) - w.T @ w, r) if len(r) < len(w) else
-                     r + w.T @ np.linalg.solve(np.eye(len(w)) - w @ w.T, w @ r))
-            out[b] = float(error @ error)
-        return out
+        columns = Table.stacked([self.base, state.effects])
+        return block_losses(columns, self._information(state.info, state.effects), state.residual, self.block)
 
     def freed(self, state: State, effect: Effect) -> tuple[Array, Array]:
         """Return the prior free along base parameters that the effect moves by unknown numbers."""
