@@ -15,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
@@ -136,6 +135,8 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
     def signal(kind: str, motion: Motion, j: int) -> Array:
         values = nominal.torque(motion) if kind == "tau" else getattr(motion, kind)
         return np.asarray(values[:, j])
+
+    from scipy.interpolate import BSpline
 
     def spline(kind: str, j: int) -> Make:
         every = np.concatenate([signal(kind, motion, j) for motion in motions])

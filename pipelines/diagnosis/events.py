@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
@@ -63,6 +62,8 @@ def event_threshold(dataset: Dataset, dictionary: Dictionary, prior: Prior, conf
     The largest of m independent windows has a known law; what the reference exceeds it by is the
     over-dispersion of the rows.
     """
+    from scipy.stats import chi2
+
     rows = dataset.reference
     info, moment = prior.precision + sum(prior.grams), sum(prior.moments)
     mean = np.asarray(np.linalg.solve(info, moment), dtype=np.float64)

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
@@ -169,8 +168,7 @@ class Later:
         inner = inner + _FREE * np.trace(inner) * np.eye(len(inner))
         info = state.info - side @ np.linalg.solve(inner, side.T)
         info = 0.5 * (info + info.T)
-        mean = cho_solve(cho_factor(state.info), state.moment)
-        return info, info @ mean
+        return info, info @ np.linalg.solve(state.info, state.moment)
 
     def _information(self, info: Array, effects: Table) -> Array:
         across = self.base.gram(effects)

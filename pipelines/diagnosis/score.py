@@ -15,7 +15,6 @@ from collections.abc import Hashable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.table import Array, Indices, Table
@@ -36,6 +35,8 @@ def block_losses(columns: Table, info: Array, residual: Sequence[Array], block: 
         residual: of each joint's rows.
         block: number of the block, of each joint's rows.
     """
+    from scipy.linalg import solve_triangular
+
     factor = np.linalg.cholesky(info)
     whole = [solve_triangular(factor, columns.dense(j), lower=True, check_finite=False)
              for j in range(len(residual))]

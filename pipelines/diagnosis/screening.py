@@ -15,8 +15,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
-from scipy.stats import chi2
 
 from pipelines.diagnosis.candidates import COMPLIANT, Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
@@ -50,8 +48,7 @@ def screen(groups: Sequence[Group], info: Array, cross: Array, own: Sequence[Arr
         own: C Cᵀ of each group.
         moments: g (columns,).
     """
-    factor = cho_factor(info)
-    solved = cho_solve(factor, cross)
+    solved = np.linalg.solve(info, cross)
     out = []
     for group, square in zip(groups, own, strict=True):
         part = slice(group.first, group.first + group.width)
@@ -75,6 +72,13 @@ def best_of(screened: Iterable[Screened]) -> dict[Key, Screened]:
     return best
 
 
+def chi2_bound(alpha: float, freedom: int) -> float:
+    """Return the value that χ² of as many degrees of freedom exceeds with probability `alpha`."""
+    from scipy.stats import chi2
+
+    return float(chi2.isf(alpha, max(freedom, 1)))
+
+
 def kind_of(key: Key) -> str:
     """Return the class whose maximum is compared: named causes, compliance, shapes without name."""
     if key[0] in COMPLIANT:
@@ -95,8 +99,7 @@ class Baseline:
 
     def threshold(self, kind: str, freedom: int, rows: int) -> float:
         """Return the T_c that a healthy machine exceeds with probability `alpha` in all."""
-        bound = float(chi2.isf(self.alpha / self.families, max(freedom, 1)))
-        return bound + rows * self.bias[kind]
+        return chi2_bound(self.alpha / self.families, freedom) + rows * self.bias[kind]
 
 
 def baseline(dataset: Dataset, dictionary: Dictionary, prior: Prior, event: float,
@@ -129,7 +132,7 @@ def baseline(dataset: Dataset, dictionary: Dictionary, prior: Prior, event: floa
                        moments[chosen].sum(axis=0) - across.T @ mean)
         n = sum(counts[k] for k in after)
         for kind, values in excess.items():
-            values.append(max((one.gain - float(chi2.isf(config.alpha / families, max(one.freedom, 1)))
+            values.append(max((one.gain - chi2_bound(config.alpha / families, one.freedom)
                                for key, one in best_of(found).items() if kind_of(key) == kind),
                               default=0.0) / n)
         left = sum(powers[k] for k in after) - 2.0 * float(mean @ own) + float(mean @ gram @ mean)
