@@ -21,7 +21,7 @@ LAYERS = {
     "pipelines.model.effects": 4,
     "pipelines.model": 5,
     "pipelines.estimation": 6,  # what is checked before any model is fitted
-    "pipelines.model.estimation.result": 7, "pipelines.model.diagnosis": 8,
+    "pipelines.model.estimation.result": 7, "pipelines.model.diagnosis": 8, "pipelines.diagnosis": 9,
     "pipelines.report": 9,
     "pipelines.stage": 10,
     "pipelines.recall": 11,  # what a run may take back of its stages

@@ -21,6 +21,7 @@ class ViscousDrift(Effect):
     """τ = r Fv (1 - e^(-(t - t0)/T)) v: viscous friction Fv at the start of the log, (1 + r) Fv in the end."""
 
     time_constant: float = 15.0  # T [s]
+    since: float | None = None  # [s] clock time at which the session began; None: each log for itself
 
     name = "viscous_drift"
     title = "Viscous friction that drifts"
@@ -35,7 +36,8 @@ class ViscousDrift(Effect):
     twins = ("position_friction", "load_friction")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        left = np.expm1(-(motion.t - motion.t[0]) / self.time_constant)
+        start = motion.t[0] if self.since is None else self.since
+        left = np.expm1(-np.maximum(motion.t - start, 0.0) / self.time_constant)
         return self.on_own_row(arm, -self._viscous(arm) * left * self.own(motion.dq))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:

@@ -1,0 +1,1 @@
+"""Diagnose a session by one Gaussian model, y = N b + D s + X θ + e, and one decision."""

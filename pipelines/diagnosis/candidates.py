@@ -1,0 +1,176 @@
+"""Candidate columns: every cause at every joint in every shape, and shapes without a name.
+
+    dictionary = Dictionary.of(dataset, config)
+    dictionary.groups                      what each run of columns is
+    dictionary.table(rows)                 the columns over some rows
+
+A group is what is screened at once: one shape of one cause at one joint. Groups without a name are
+splines of the position, speed and torque of a joint, and ripple of its drive, of any order: where one
+of these predicts better than every cause, the cause is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import Dataset, Rows
+from pipelines.diagnosis.table import Array, Indices, Table
+from pipelines.model.arm import Arm
+from pipelines.model.diagnosis.screened.candidates import (
+    Family,
+    families,
+    lay_family,
+    whole_motion,
+)
+from pipelines.model.effects import find_effect
+from pipelines.model.rigid.body import Motion
+
+__all__ = ["COMPLIANT", "Dictionary", "Group", "Key"]
+
+Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
+
+COMPLIANT = ("joint_elasticity", "base_resonance")  # rows show the class, responses the cause
+_UNNAMED = ("ripple", "spline")
+_MANY = ("cogging", "ripple")  # of these every shape is a standing column, of others the first
+_NOT_STANDING = ("payload", "torque_saturation", "viscous_drift", "contact")  # no healthy machine has
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns that are screened together."""
+
+    key: Key
+    shape: int  # number of the shape of its family
+    first: int  # column
+    width: int
+    standing: bool  # healthy machines have it in small
+
+    @property
+    def named(self) -> bool:
+        return not self.key[0].startswith(_UNNAMED)
+
+    @property
+    def columns(self) -> Indices:
+        return np.arange(self.first, self.first + self.width)
+
+
+@dataclass(frozen=True, eq=False)
+class Dictionary:
+    """All candidates of a dataset."""
+
+    groups: tuple[Group, ...]
+    families: dict[Key, Family]
+    reference: Table
+    later: Table
+
+    @classmethod
+    def of(cls, dataset: Dataset, config: DiagnosisConfig, exclude: Sequence[str] = ()) -> Dictionary:
+        """Return every candidate, with its columns over the reference and the later rows."""
+        found = _families(dataset, exclude)
+        plain = _unnamed(dataset, config)
+        tables = []
+        for rows in (dataset.reference, dataset.later):
+            groups: list[Group] = []
+            parts: list[Table] = []
+            for family in found.values():
+                if not family.event:
+                    _lay(rows, family, dataset.arm, groups, parts)
+            for key, make in plain.items():
+                _lay_unnamed(rows, key, make, groups, parts)
+            tables.append(Table.stacked(parts))
+        return cls(tuple(groups), found, *tables)
+
+    @property
+    def event(self) -> Family | None:
+        return next((family for family in self.families.values() if family.event), None)
+
+    def standing(self) -> Indices:
+        """Return the columns that healthy machines have in small."""
+        return np.concatenate([g.columns for g in self.groups if g.standing])
+
+
+def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
+    motion = whole_motion(dataset.later.data)
+    found = {}
+    for family in families(dataset.model.columns.laws, motion, dataset.arm, exclude):
+        shapes = family.shapes
+        if family.cause == "viscous_drift":  # a joint that is warm stays warm in the next log
+            shapes = tuple(replace(shape, since=dataset.session_start)  # type: ignore[call-arg]
+                           for shape in shapes)
+        found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
+    if "payload" in exclude:
+        return found
+    payload = find_effect("payload")()
+    shapes = tuple(payload.shapes(dataset.later.data.logs[0].motion, dataset.arm))
+    return found | {("payload", None): Family("payload", None, shapes)}
+
+
+def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[Table]) -> None:
+    seen = sum(part.width for part in parts)
+    for laid in lay_family(rows.data, family, arm):
+        shapes, width, _ = laid.table.shape
+        columns = np.zeros((shapes * width, rows.count))
+        columns[:, laid.rows] = laid.table.reshape(shapes * width, -1)
+        parts.append(rows.table(columns))
+        for k in range(shapes):
+            number = laid.first + k
+            standing = (family.cause not in _NOT_STANDING
+                        and (number == 0 or family.cause in _MANY))
+            groups.append(Group((family.cause, family.joint), number, seen, width, standing))
+            seen += width
+
+
+Make = Callable[[Motion], Array]  # (samples, k) on one joint
+
+
+def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
+    """Return the shapes without a name: of each joint splines of q, dq and torque, and ripple."""
+    motions = [one.motion for rows in (dataset.reference, dataset.later) for one in rows.data.logs]
+    nominal, found = dataset.model.nominal, dict[Key, Make]()
+
+    def signal(kind: str, motion: Motion, j: int) -> Array:
+        values = nominal.torque(motion) if kind == "tau" else getattr(motion, kind)
+        return np.asarray(values[:, j])
+
+    from scipy.interpolate import BSpline
+
+    def spline(kind: str, j: int) -> Make:
+        every = np.concatenate([signal(kind, motion, j) for motion in motions])
+        low, high = float(every.min()), float(every.max())
+        knots = np.r_[[low] * 3, np.linspace(low, high, config.knots - 2), [high] * 3]
+        inside = high - 1e-9 * (high - low)
+        return lambda motion: np.asarray(BSpline.design_matrix(
+            np.clip(signal(kind, motion, j), low, inside), knots, 3).toarray())
+
+    def ripple(order: int, j: int) -> Make:
+        def make(motion: Motion) -> Array:
+            angle = order * motion.q[:, j]
+            waves = np.stack([np.sin(angle), np.cos(angle)], 1)
+            return np.asarray(signal("tau", motion, j)[:, None] * waves)
+        return make
+
+    for j in range(dataset.later.n_joints):
+        for kind in ("q", "dq", "tau"):
+            found[f"spline of {kind}", j + 1] = spline(kind, j)
+        for order in range(1, config.ripple_orders + 1):
+            found[f"ripple {order}", j + 1] = ripple(order, j)
+    return found
+
+
+def _lay_unnamed(rows: Rows, key: Key, make: Make, groups: list[Group], parts: list[Table]) -> None:
+    j = (key[1] or 1) - 1
+
+    def on_joint(motion: Motion) -> Array:
+        own = make(motion)
+        out = np.zeros((len(own), rows.n_joints, own.shape[1]))
+        out[:, j] = own
+        return out
+
+    part = rows.table(rows.data.lay(on_joint))
+    first = sum(one.width for one in parts)
+    groups.append(Group(key, 0, first, part.width, key[0].startswith("ripple")))
+    parts.append(part)

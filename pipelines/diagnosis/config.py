@@ -1,0 +1,30 @@
+"""Numbers that decide a diagnosis, each with its meaning and its source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["DiagnosisConfig"]
+
+
+@dataclass(frozen=True)
+class DiagnosisConfig:
+    """All deciding numbers of the diagnosis; `benchmarks.diagnosis` varies each by ½ and 2."""
+
+    cutoff_hz: float = 25.0  # zero-phase low-pass of all rows: above it quantised positions dominate
+    alpha: float = 0.01  # family-wise error of screening, all candidates together
+    set_alpha: float = 0.05  # of the model confidence set (Hansen, Lunde & Nason 2011)
+    block: float = 1.0  # [s] blocks of the predictive score, longer than the low-pass remembers
+    blocks_together: int = 3  # length of the moving blocks of the bootstrap, in blocks
+    resamples: int = 400  # of the bootstrap
+    friction_drift: float = 0.3  # relative std of friction between sessions
+    relevance: float = 0.02  # share of the first cause's effect that a further cause must reach
+    variance_prior: float = 2.0  # pseudo-observations by which a variance is shrunk to its family's
+    em_rounds: int = 8  # of the variance components; more change them by less than a tenth
+    refits: int = 4  # candidates that are refitted exactly in a round
+    promising: float = 0.3  # of the best screening gain, from which a candidate is refitted
+    causes: int = 4  # most causes in one session
+    ripple_orders: int = 24  # [1/rev] of torque-proportional ripple in the standing dictionary
+    knots: int = 10  # of the splines without a name
+    event_candidates: int = 600  # windows that a search for a contact compares
+    excess: float = 1.5  # mean square residual of a joint over the baseline's, from which it is too large

@@ -1,0 +1,51 @@
+"""The whole way: dataset → prior → candidates → baseline → selection → decision."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pipelines.diagnosis.candidates import Dictionary
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import load
+from pipelines.diagnosis.decision import Decision, decide
+from pipelines.diagnosis.events import event_threshold
+from pipelines.diagnosis.prior import reference_prior
+from pipelines.diagnosis.refit import Later
+from pipelines.diagnosis.screening import Baseline, baseline
+from pipelines.diagnosis.selection import Selection, select
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.given.compliance import compliance
+
+__all__ = ["Diagnosis", "diagnose"]
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """Everything that was computed."""
+
+    decision: Decision
+    selection: Selection
+    baseline: Baseline
+
+
+def diagnose(logs: Sequence[ExperimentLog], config: DiagnosisConfig | None = None,
+             exclude: Sequence[str] = ()) -> Diagnosis:
+    """Return what has changed since the reference logs.
+
+    Args:
+        exclude: causes that are not considered.
+
+    Raises:
+        UsageError: S26, no reference logs.
+        InputRejected: logs that give no rows.
+    """
+    config = config or DiagnosisConfig()
+    dataset = load(logs, config)
+    dictionary = Dictionary.of(dataset, config, exclude)
+    prior = reference_prior(dataset, dictionary, config)
+    later = Later.of(dataset, dictionary, prior, config)
+    known = baseline(dataset, dictionary, prior, event_threshold(dataset, dictionary, prior, config), config)
+    responses = compliance(dataset.frf, dataset.model.nominal, exclude)
+    found = select(later, known, responses.named if responses else (), config)
+    return Diagnosis(decide(later, found, known, config), found, known)

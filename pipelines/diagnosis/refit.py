@@ -1,0 +1,196 @@
+"""Exact fits to the later rows: Gauss-Newton under the prior, and the block-wise predictive score.
+
+    later = Later.of(dataset, dictionary, prior)
+    state = later.start(config)
+    state = later.fit(state.with_effect(...))
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.diagnosis.candidates import Dictionary
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import Dataset, Rows, moved
+from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.score import block_losses
+from pipelines.diagnosis.screening import Screened, screen
+from pipelines.diagnosis.table import Array, Indices, Table
+from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.effects.base import Effect
+
+__all__ = ["Later", "State"]
+
+_RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
+_STEPS = 7  # numerics: of Gauss-Newton
+_SHARES = (1.0, 0.4, 0.1)  # numerics: of a step that is tried
+_SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
+_FREE = 1e-6  # numerics: of the information along a direction that is freed
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A model, its numbers, and what it leaves."""
+
+    model: Exact
+    theta: Array  # nominal and standing numbers, scaled
+    info: Array  # prior information A
+    moment: Array  # A m
+    residual: tuple[Array, ...]  # of each joint, in units of the noise
+    effects: Table  # slopes by the numbers of the effects, of unit length
+    losses: Array  # (blocks,) squared error of each block, predicted from all others
+
+    @property
+    def rss(self) -> float:
+        return sum(float(r @ r) for r in self.residual)
+
+    @property
+    def mean_squares(self) -> Array:
+        """(joints,)"""
+        return np.array([float(np.mean(r**2)) for r in self.residual])
+
+
+@dataclass(frozen=True, eq=False)
+class Later:
+    """The later rows beside the prior."""
+
+    rows: Rows
+    dictionary: Dictionary
+    prior: Prior
+    dataset: Dataset
+    base: Table  # B = [N D]
+    candidates: Table  # C
+    gram: Array  # B Bᵀ
+    cross: Array  # B Cᵀ
+    squares: tuple[Array, ...]  # C Cᵀ of each group
+    block: tuple[Indices, ...]  # of each joint's rows
+
+    @classmethod
+    def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig) -> Later:
+        rows, unit = dataset.later, prior.noise**-0.5
+        base = prior.table(rows.nominal, dictionary.later)
+        table = dictionary.later.scaled(np.full(dictionary.later.width, unit))
+        squares = []
+        for group in dictionary.groups:
+            own = table.take(group.columns)
+            squares.append(own.gram(own))
+        return cls(rows, dictionary, prior, dataset, base, table, base.gram(base), base.gram(table),
+                   tuple(squares), rows.blocks(config.block))
+
+    @cached_property
+    def block_rows(self) -> Array:
+        """(blocks,) rows of each, of all joints."""
+        count = 1 + max(int(b.max()) for b in self.block if len(b))
+        return np.asarray(sum(np.bincount(b, minlength=count) for b in self.block), dtype=np.float64)
+
+    @cached_property
+    def y(self) -> tuple[Array, ...]:
+        return tuple(v * self.prior.noise**-0.5 for v in self.rows.y)
+
+    def start(self) -> State:
+        """Return the nominal model, fitted under the prior alone."""
+        info, moment = self.prior.of(range(len(self.prior.parts)))
+        theta = np.zeros(self.base.width)
+        model = self.dataset.model
+        theta[:len(model.beta)] = model.beta * self.prior.scale[:len(model.beta)]
+        return self.fit(model, theta, info, moment)
+
+    def fit(self, model: Exact, theta: Array, info: Array, moment: Array, steps: int = _STEPS) -> State:
+        """Return the model with all its numbers fitted; those of effects have no prior."""
+        residual = self._residual(model, theta)
+        now = self._cost(residual, theta, info, moment)
+        for _ in range(steps):
+            slopes, names = self._slopes(model)
+            size = _unit(slopes.norms)
+            unit = slopes.scaled(1.0 / size)
+            gradient = np.r_[moment - info @ theta + self.base.moments(residual), unit.moments(residual)]
+            step = np.linalg.solve(self._information(info, unit), gradient)
+            before = now
+            for share in _SHARES:
+                base, more = share * step[:len(theta)], share * step[len(theta):] / size
+                own = base[:self.prior.n_nominal] / self.prior.scale
+                tried = moved(model, own, self.dataset.law_names, more, names)
+                left = self._residual(tried, theta + base)
+                cost = self._cost(left, theta + base, info, moment)
+                if np.isfinite(cost) and cost <= now:
+                    model, theta, residual, now = tried, theta + base, left, cost
+                    break
+            gained = before - now
+            linear = all(one.effect.adds and not one.free_shapes for one in model.effects)
+            if gained < 2.0 + _SETTLED * now or linear:
+                break
+        slopes, _ = self._slopes(model)
+        effects = slopes.scaled(1.0 / _unit(slopes.norms))
+        state = State(model, theta, info, moment, residual, effects, np.zeros(0))
+        return replace(state, losses=self.losses(state))
+
+    def screened(self, state: State) -> list[Screened]:
+        """Return T_c of every candidate on what the state leaves."""
+        both = Table.stacked([self.base, state.effects])
+        cross = np.concatenate([self.cross, state.effects.gram(self.candidates)])
+        info = self._information(state.info, state.effects)
+        assert len(info) == both.width
+        return screen(self.dictionary.groups, info, cross, self.squares,
+                      self.candidates.moments(state.residual))
+
+    def with_columns(self, state: State, columns: Table) -> State:
+        """Return the state with further columns, fitted linearly."""
+        more = Table.stacked([state.effects, columns.scaled(1.0 / _unit(columns.norms))])
+        info = self._information(state.info, more)
+        gradient = np.r_[state.moment - state.info @ state.theta + self.base.moments(state.residual),
+                         more.moments(state.residual)]
+        step = np.asarray(np.linalg.solve(info, gradient), dtype=np.float64)
+        torque = Table.stacked([self.base, more]).times(step)
+        residual = tuple(r - t for r, t in zip(state.residual, torque, strict=True))
+        there = replace(state, theta=state.theta + step[:len(state.theta)], residual=residual, effects=more)
+        return replace(there, losses=self.losses(there))
+
+    def losses(self, state: State) -> Array:
+        """Return the squared error (blocks,) of each block, predicted from all others and the prior."""
+        columns = Table.stacked([self.base, state.effects])
+        return block_losses(columns, self._information(state.info, state.effects), state.residual, self.block)
+
+    def freed(self, state: State, effect: Effect) -> tuple[Array, Array]:
+        """Return the prior free along base parameters that the effect moves by unknown numbers."""
+        directions = effect.moving(self.dataset.arm)
+        if directions is None or not directions.shape[1]:
+            return state.info, state.moment
+        kept = list(self.dataset.model.columns.kept)
+        along = np.zeros((len(state.info), directions.shape[1]))
+        along[:len(kept)] = directions[kept] * self.prior.scale[:len(kept), None]
+        along = along[:, np.linalg.norm(along, axis=0) > 0.0]
+        along = along / np.linalg.norm(along, axis=0)
+        side = state.info @ along
+        inner = along.T @ side
+        inner = inner + _FREE * np.trace(inner) * np.eye(len(inner))
+        info = state.info - side @ np.linalg.solve(inner, side.T)
+        info = 0.5 * (info + info.T)
+        return info, info @ np.linalg.solve(state.info, state.moment)
+
+    def _information(self, info: Array, effects: Table) -> Array:
+        across = self.base.gram(effects)
+        own = effects.gram(effects) + _RIDGE * np.eye(effects.width)
+        return np.block([[info + self.gram, across], [across.T, own]])
+
+    def _slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
+        if not model.effects:
+            return self.base.take(np.zeros(0, dtype=np.intp)), []
+        slopes, names = self.rows.slopes(model)
+        return slopes.scaled(np.full(slopes.width, self.prior.noise**-0.5)), names
+
+    def _residual(self, model: Exact, theta: Array) -> tuple[Array, ...]:
+        standing = theta.copy()
+        standing[:self.prior.n_nominal] = 0.0
+        torque, unit = self.rows.torque(model), self.prior.noise**-0.5
+        return tuple(y - unit * t - s for y, t, s in
+                     zip(self.y, torque, self.base.times(standing), strict=True))
+
+    def _cost(self, residual: tuple[Array, ...], theta: Array, info: Array, moment: Array) -> float:
+        return float(sum(r @ r for r in residual) + theta @ info @ theta - 2.0 * moment @ theta)
+
+
+def _unit(lengths: Array) -> Array:
+    return np.where(lengths > 0.0, lengths, 1.0)

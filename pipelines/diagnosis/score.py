@@ -1,0 +1,80 @@
+"""Compare models by how they predict blocks of time: the model confidence set.
+
+    block_losses(columns, info, residual, block)   of each block, predicted from all others
+    log_scores(losses, rows)            of each block, its noise level unknown
+    confidence_set({key: scores})       the models that the data do not tell from the best
+
+A block predicted from all others leaves e_b = (I - J_bᵀ P⁻¹ J_b)⁻¹ r_b, exact for a linear model: J are
+the slopes by all numbers, P their information with the prior, r the residual of the fit to all rows.
+Hansen, Lunde & Nason 2011, statistic T_max, with a moving-block bootstrap (Künsch 1989).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.table import Array, Indices, Table
+
+__all__ = ["block_losses", "confidence_set", "log_scores"]
+
+K = TypeVar("K", bound=Hashable)
+
+_SEED = 1
+
+
+def block_losses(columns: Table, info: Array, residual: Sequence[Array], block: Sequence[Indices]) -> Array:
+    """Return the squared error (blocks,) of each block of rows, predicted from all other blocks.
+
+    Args:
+        columns: J, slopes by the k numbers.
+        info: P (k, k), of all rows and the prior.
+        residual: of each joint's rows.
+        block: number of the block, of each joint's rows.
+    """
+    from scipy.linalg import solve_triangular
+
+    factor = np.linalg.cholesky(info)
+    whole = [solve_triangular(factor, columns.dense(j), lower=True, check_finite=False)
+             for j in range(len(residual))]
+    count = 1 + max(int(b.max()) for b in block if len(b))
+    order = [np.argsort(b, kind="stable") for b in block]
+    edges = [np.searchsorted(b[o], np.arange(count + 1)) for b, o in zip(block, order, strict=True)]
+    out = np.zeros(count)
+    for b in range(count):
+        own = [o[e[b]:e[b + 1]] for o, e in zip(order, edges, strict=True)]
+        w = np.concatenate([v[:, rows] for v, rows in zip(whole, own, strict=True)], axis=1)
+        r = np.concatenate([v[rows] for v, rows in zip(residual, own, strict=True)])
+        error = (np.linalg.solve(np.eye(len(r)) - w.T @ w, r) if len(r) < len(w) else
+                 r + w.T @ np.linalg.solve(np.eye(len(w)) - w @ w.T, w @ r))
+        out[b] = float(error @ error)
+    return out
+
+
+def log_scores(losses: Array, rows: Array) -> Array:
+    """Return n_b ln(loss_b / n_b): minus twice the log likelihood of a block of unknown noise."""
+    return np.asarray(rows * np.log(np.maximum(losses, 1e-9) / rows))
+
+
+def confidence_set(scores: Mapping[K, Array], config: DiagnosisConfig) -> list[K]:
+    """Return the models whose scores (blocks,), smaller is better, may be those of the best."""
+    keys = list(scores)
+    table = np.array([scores[key] for key in keys])
+    blocks, length = table.shape[1], min(config.blocks_together, table.shape[1])
+    rng = np.random.default_rng(_SEED)
+    starts = rng.integers(0, blocks, (config.resamples, -(-blocks // length)))
+    drawn = (starts[:, :, None] + np.arange(length)).reshape(config.resamples, -1)[:, :blocks] % blocks
+    resampled, mean = table[:, drawn].mean(axis=2), table.mean(axis=1)
+    alive = list(range(len(keys)))
+    while len(alive) > 1:
+        distance = mean[alive] - mean[alive].mean()
+        spread = resampled[alive] - resampled[alive].mean(axis=0) - distance[:, None]
+        std = np.sqrt(np.mean(spread**2, axis=1)) + 1e-12
+        t = distance / std
+        if np.mean((spread / std[:, None]).max(axis=0) > t.max()) >= config.set_alpha:
+            break
+        alive.pop(int(np.argmax(t)))
+    return [keys[k] for k in alive]

@@ -1,0 +1,157 @@
+"""Screening by the generalised likelihood ratio, and what it is where nothing has changed.
+
+    T_c = gᵀ H⁻¹ g,  H = C Cᵀ - C Bᵀ P⁻¹ B Cᵀ,  P = A + B Bᵀ,  g = C r
+
+with the prior information A, the columns B of nominal and standing numbers, the columns C of a
+candidate and the residual r (Frisch & Waugh 1933, Lovell 1963, with a prior). One family-wise error
+for all candidates. Where nothing has changed, between parts of the reference, T_c exceeds the χ²
+bound by what models leave everywhere; that grows with the number of rows as the noise does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from pipelines.diagnosis.candidates import COMPLIANT, Dictionary, Group, Key
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import Dataset
+from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.table import Array
+
+__all__ = ["Baseline", "Screened", "baseline", "best_of", "screen"]
+
+_VISIBLE = 1e-6  # numerics: eigenvalue of H in unit columns, below which a direction is absorbed
+_SPLITS = 6  # of the reference into two
+
+
+@dataclass(frozen=True)
+class Screened:
+    """The best shape of a cause at a joint."""
+
+    group: Group
+    gain: float  # T_c
+    freedom: int
+    amplitudes: Array
+
+
+def screen(groups: Sequence[Group], info: Array, cross: Array, own: Sequence[Array],
+           moments: Array) -> list[Screened]:
+    """Return T_c of every group.
+
+    Args:
+        info: P (k, k).
+        cross: B Cᵀ (k, columns).
+        own: C Cᵀ of each group.
+        moments: g (columns,).
+    """
+    solved = np.linalg.solve(info, cross)
+    out = []
+    for group, square in zip(groups, own, strict=True):
+        part = slice(group.first, group.first + group.width)
+        left = square - cross[:, part].T @ solved[:, part]
+        unit = np.sqrt(np.maximum(np.diag(square), 1e-300))
+        values, vectors = np.linalg.eigh(left / unit / unit[:, None])
+        seen = values > _VISIBLE
+        z = vectors[:, seen].T @ (moments[part] / unit)
+        amplitudes = (vectors[:, seen] @ (z / values[seen])) / unit
+        out.append(Screened(group, float(np.sum(z**2 / values[seen])), int(seen.sum()), amplitudes))
+    return out
+
+
+def best_of(screened: Iterable[Screened]) -> dict[Key, Screened]:
+    """Return the best shape of each cause at each joint."""
+    best: dict[Key, Screened] = {}
+    for one in screened:
+        key = one.group.key
+        if key not in best or one.gain > best[key].gain:
+            best[key] = one
+    return best
+
+
+def chi2_bound(alpha: float, freedom: int) -> float:
+    """Return the value that χ² of as many degrees of freedom exceeds with probability `alpha`."""
+    from scipy.stats import chi2
+
+    return float(chi2.isf(alpha, max(freedom, 1)))
+
+
+def kind_of(key: Key) -> str:
+    """Return the class whose maximum is compared: named causes, compliance, shapes without name."""
+    if key[0] in COMPLIANT:
+        return "compliance"
+    return "unnamed" if key[0].startswith(("ripple", "spline")) else "named"
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Screening and residual of a healthy machine, from splits of its reference logs."""
+
+    alpha: float
+    families: int  # causes at joints, that are compared at once
+    bias: dict[str, float]  # of each class, a row: what T_c exceeds its χ² bound by
+    worst_fit: float  # mean square residual of a row, that a healthy session exceeds rarely
+    usual_fit: float
+    event: float  # gain that a contact has to exceed
+
+    def threshold(self, kind: str, freedom: int, rows: int) -> float:
+        """Return the T_c that a healthy machine exceeds with probability `alpha` in all."""
+        return chi2_bound(self.alpha / self.families, freedom) + rows * self.bias[kind]
+
+
+def baseline(dataset: Dataset, dictionary: Dictionary, prior: Prior, event: float,
+             config: DiagnosisConfig) -> Baseline:
+    """Return what screening and residual are between parts of the reference."""
+    rows, groups = dataset.reference, dictionary.groups
+    unit = prior.noise**-0.5
+    own_table = dictionary.reference.scaled(np.full(dictionary.reference.width, unit))
+    table = prior.table(rows.nominal, dictionary.reference)
+    y = tuple(one * unit for one in rows.y)
+    parts = prior.parts
+    cross = np.array([table.gram(own_table, part) for part in parts])
+    moments = np.array([own_table.moments(y, part) for part in parts])
+    squares = [[own_table.take(g.columns).gram(own_table.take(g.columns), part) for g in groups]
+               for part in parts]
+    powers = [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
+    counts = [sum(int(m.sum()) for m in part) for part in parts]
+    families = len({g.key for g in groups})
+    excess: dict[str, list[float]] = {"named": [], "compliance": [], "unnamed": []}
+    fits: list[float] = []
+    for before, after in _splits(len(parts)):
+        info, moment = prior.of(before)
+        chosen = list(after)
+        gram = np.sum([prior.grams[k] for k in after], axis=0)
+        own = np.sum([prior.moments[k] for k in after], axis=0)
+        mean = np.linalg.solve(info + gram, moment + own)
+        across = cross[chosen].sum(axis=0)
+        found = screen(groups, info + gram, across,
+                       [np.sum([squares[k][i] for k in after], axis=0) for i in range(len(groups))],
+                       moments[chosen].sum(axis=0) - across.T @ mean)
+        n = sum(counts[k] for k in after)
+        for kind, values in excess.items():
+            values.append(max((one.gain - chi2_bound(config.alpha / families, one.freedom)
+                               for key, one in best_of(found).items() if kind_of(key) == kind),
+                              default=0.0) / n)
+        left = sum(powers[k] for k in after) - 2.0 * float(mean @ own) + float(mean @ gram @ mean)
+        fits.append(left / n)
+    return Baseline(config.alpha, families,
+                    {kind: max(0.0, _upper(values, config.alpha)) for kind, values in excess.items()},
+                    _upper(fits, config.alpha), float(np.median(fits)), event)
+
+
+def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Return splits of the parts into two, half of them each."""
+    every = range(parts)
+    out = [(half, tuple(k for k in every if k not in half)) for half in combinations(every, parts // 2)]
+    step = max(1, len(out) // _SPLITS)
+    return out[::step][:_SPLITS]
+
+
+def _upper(values: Sequence[float], alpha: float) -> float:
+    """Return the upper `alpha` point of a Gumbel law fitted to maxima by its moments."""
+    x = np.asarray(values)
+    scale = max(float(x.std(ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12) if len(x) > 1 else 1e-12
+    return float(x.mean() - np.euler_gamma * scale - scale * np.log(-np.log1p(-alpha)))
