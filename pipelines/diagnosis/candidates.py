@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -26,17 +27,14 @@ from pipelines.model.diagnosis.screened.candidates import (
     lay_family,
     whole_motion,
 )
-from pipelines.model.effects import find_effect
+from pipelines.model.effects import all_effects
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["COMPLIANT", "Dictionary", "Group", "Key"]
+__all__ = ["Dictionary", "Group", "Key", "Kind"]
 
 Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
-COMPLIANT = ("joint_elasticity", "base_resonance")  # rows show the class, responses the cause
-_UNNAMED = ("ripple", "spline")
-_MANY = ("cogging", "ripple")  # of these every shape is a standing column, of others the first
-_NOT_STANDING = ("payload", "torque_saturation", "viscous_drift", "contact")  # no healthy machine has
+Kind = Literal["named", "compliance", "unnamed"]  # of compliance rows show the class, responses the cause
 
 
 @dataclass(frozen=True)
@@ -48,10 +46,7 @@ class Group:
     first: int  # column
     width: int
     standing: bool  # healthy machines have it in small
-
-    @property
-    def named(self) -> bool:
-        return not self.key[0].startswith(_UNNAMED)
+    kind: Kind
 
     @property
     def columns(self) -> Indices:
@@ -98,19 +93,22 @@ def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
     found = {}
     for family in families(dataset.model.columns.laws, motion, dataset.arm, exclude):
         shapes = family.shapes
-        if family.cause == "viscous_drift":  # a joint that is warm stays warm in the next log
+        if hasattr(shapes[0], "since"):  # a joint that is warm stays warm in the next log
             shapes = tuple(replace(shape, since=dataset.session_start)  # type: ignore[call-arg]
                            for shape in shapes)
         found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
-    if "payload" in exclude:
-        return found
-    payload = find_effect("payload")()
-    shapes = tuple(payload.shapes(dataset.later.data.logs[0].motion, dataset.arm))
-    return found | {("payload", None): Family("payload", None, shapes)}
+    for kind in all_effects():  # what base parameters absorb without a reference
+        if kind.evidence == "base parameters" and kind.name not in exclude:
+            for effect in kind.everywhere(dataset.arm.robot.revolute):
+                shapes = tuple(effect.shapes(dataset.later.data.logs[0].motion, dataset.arm))
+                found[kind.name, effect.joint] = Family(kind.name, effect.joint, shapes)
+    return found
 
 
 def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[Table]) -> None:
     seen = sum(part.width for part in parts)
+    compliant = family.shapes[0].evidence == "frequency responses"
+    kind: Kind = "compliance" if compliant else "named"
     for laid in lay_family(rows.data, family, arm):
         shapes, width, _ = laid.table.shape
         columns = np.zeros((shapes * width, rows.count))
@@ -118,10 +116,15 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
         parts.append(rows.table(columns))
         for k in range(shapes):
             number = laid.first + k
-            standing = (family.cause not in _NOT_STANDING
-                        and (number == 0 or family.cause in _MANY))
-            groups.append(Group((family.cause, family.joint), number, seen, width, standing))
+            groups.append(Group((family.cause, family.joint), number, seen, width,
+                                _standing(family, number), kind))
             seen += width
+
+
+def _standing(family: Family, number: int) -> bool:
+    """Return whether healthy machines have shape `number` of a family in small."""
+    healthy = family.shapes[0].healthy
+    return healthy == "every shape" or (healthy == "first shape" and number == 0)
 
 
 Make = Callable[[Motion], Array]  # (samples, k) on one joint
@@ -172,5 +175,5 @@ def _lay_unnamed(rows: Rows, key: Key, make: Make, groups: list[Group], parts: l
 
     part = rows.table(rows.data.lay(on_joint))
     first = sum(one.width for one in parts)
-    groups.append(Group(key, 0, first, part.width, key[0].startswith("ripple")))
+    groups.append(Group(key, 0, first, part.width, key[0].startswith("ripple"), "unnamed"))
     parts.append(part)

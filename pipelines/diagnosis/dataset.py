@@ -18,7 +18,7 @@ import numpy as np
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.table import Array, Indices, Table, by_joint
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
@@ -116,12 +116,12 @@ def load(logs: Sequence[ExperimentLog], config: DiagnosisConfig) -> Dataset:
     """Return the rows of the logs, by their roles.
 
     Raises:
-        UsageError: S26, no log of role "reference".
-        InputRejected: as `prepare`, logs that give no rows.
+        InputRejected: S01, no log of role "reference";
+            and as `prepare`, logs that give no rows.
     """
     roles = Logs.by_role(logs)
     if not roles.reference:
-        raise UsageError("S26", "no log of role 'reference'", remedy="record the arm before, or name "
+        raise InputRejected("S01", "no log of role 'reference'", remedy="record the arm before, or name "
                          "an earlier recording with that role")
     ready = prepare(roles, DiagnosisSettings(cutoff_hz=config.cutoff_hz))
     assert ready.reference is not None

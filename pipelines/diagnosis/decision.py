@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.screening import Baseline, best_of, kind_of
+from pipelines.diagnosis.screening import Baseline, best_of
 from pipelines.diagnosis.selection import Cause, Selection
 
 __all__ = ["Decision", "decide"]
@@ -38,7 +38,7 @@ def decide(later: Later, selection: Selection, baseline: Baseline, config: Diagn
     if selection.causes:
         return Decision("unknown", f"{selection.causes[0].key[0]} explains {explained:.0%} of the excess residual",
                         (), explained)
-    unnamed = [one for key, one in best_of(later.screened(selection.end)).items() if kind_of(key) == "unnamed"]
+    unnamed = [one for one in best_of(later.screened(selection.end)).values() if one.group.kind == "unnamed"]
     free = any(one.gain > baseline.threshold("unnamed", one.freedom, rows) for one in unnamed)
     if selection.stopped or not fits or free:
         what = selection.stopped or (f"the residual is {last:.2f} of the noise, {baseline.worst_fit:.2f} in the reference"

@@ -37,8 +37,7 @@ def diagnose(logs: Sequence[ExperimentLog], config: DiagnosisConfig | None = Non
         exclude: causes that are not considered.
 
     Raises:
-        UsageError: S26, no reference logs.
-        InputRejected: logs that give no rows.
+        InputRejected: S01, no reference logs; logs that give no rows.
     """
     config = config or DiagnosisConfig()
     dataset = load(logs, config)

@@ -16,7 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import COMPLIANT, Dictionary, Group, Key
+from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
@@ -79,13 +79,6 @@ def chi2_bound(alpha: float, freedom: int) -> float:
     return float(chi2.isf(alpha, max(freedom, 1)))
 
 
-def kind_of(key: Key) -> str:
-    """Return the class whose maximum is compared: named causes, compliance, shapes without name."""
-    if key[0] in COMPLIANT:
-        return "compliance"
-    return "unnamed" if key[0].startswith(("ripple", "spline")) else "named"
-
-
 @dataclass(frozen=True)
 class Baseline:
     """Screening and residual of a healthy machine, from splits of its reference logs."""
@@ -133,7 +126,7 @@ def baseline(dataset: Dataset, dictionary: Dictionary, prior: Prior, event: floa
         n = sum(counts[k] for k in after)
         for kind, values in excess.items():
             values.append(max((one.gain - chi2_bound(config.alpha / families, one.freedom)
-                               for key, one in best_of(found).items() if kind_of(key) == kind),
+                               for one in best_of(found).values() if one.group.kind == kind),
                               default=0.0) / n)
         left = sum(powers[k] for k in after) - 2.0 * float(mean @ own) + float(mean @ gram @ mean)
         fits.append(left / n)

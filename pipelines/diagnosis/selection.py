@@ -17,7 +17,7 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.events import best_window
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores
-from pipelines.diagnosis.screening import Baseline, Screened, best_of, kind_of
+from pipelines.diagnosis.screening import Baseline, Screened, best_of
 from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
@@ -96,7 +96,7 @@ def _round(later: Later, start: State, state: State, causes: Sequence[Cause], ba
     relevant = config.relevance**2 * (start.losses.sum() - state.losses.sum())
     taken = {cause.key for cause in causes}
     significant = {key: one for key, one in best.items() if key not in taken and one.gain > relevant
-                   and one.gain > baseline.threshold(kind_of(key), one.freedom, later.rows.count)}
+                   and one.gain > baseline.threshold(one.group.kind, one.freedom, later.rows.count)}
     tried = _refitted(later, state, significant, baseline, responses, config)
     tried = [one for one in tried if one.gain > relevant and one.state.losses.sum() < state.losses.sum()]
     others = _unnamed(later, state, significant, bool(responses))
@@ -123,12 +123,12 @@ def _round(later: Later, start: State, state: State, causes: Sequence[Cause], ba
 def _refitted(later: Later, state: State, significant: dict[Key, Screened], baseline: Baseline,
               responses: Sequence[Acting], config: DiagnosisConfig) -> list[Candidate]:
     """Return the most promising causes with all their numbers fitted exactly."""
-    named = sorted((one for key, one in significant.items() if kind_of(key) == "named"),
+    named = sorted((one for one in significant.values() if one.group.kind == "named"),
                    key=lambda one: -one.gain)[:config.refits]
     out = []
     touch = best_window(later.rows, later.dictionary, later.dataset.arm, state.residual, later.prior.noise)
     if touch is not None and touch.gain > baseline.event:
-        out.append(_candidate(later, state, ("contact", None), touch.gain, touch.effect, touch.amplitudes,
+        out.append(_candidate(later, state, (touch.effect.name, None), touch.gain, touch.effect, touch.amplitudes,
                               log=touch.log))
     top = max([one.gain for one in named], default=0.0)
     for one in named:
@@ -169,7 +169,7 @@ def _unnamed(later: Later, state: State, significant: dict[Key, Screened], respo
     out = {}
     kinds = ("unnamed",) if responses else ("unnamed", "compliance")
     for kind in kinds:
-        own = [one for key, one in significant.items() if kind_of(key) == kind]
+        own = [one for one in significant.values() if one.group.kind == kind]
         if own:
             one = max(own, key=lambda s: s.gain - s.freedom * np.log(later.rows.count))
             out[one.group.key] = later.with_columns(state, later.candidates.take(one.group.columns))

@@ -44,7 +44,7 @@ def test_screening_is_what_an_exact_refit_with_the_candidate_gains(rng: np.rando
     together, both = _least_cost(np.concatenate([base, more]), y, wide)
     b, c = (Table.of(x, joint, _JOINTS) for x in (base, more))
     residual = by_joint(y - base.T @ theta, joint, _JOINTS)
-    (found,) = screen([Group(("spring", 3), 0, 0, _MORE, True)], info + b.gram(b), b.gram(c), [c.gram(c)],
+    (found,) = screen([Group(("spring", 3), 0, 0, _MORE, True, "named")], info + b.gram(b), b.gram(c), [c.gram(c)],
                       c.moments(residual))
     assert found.gain == pytest.approx(cost - together)
     assert found.amplitudes == pytest.approx(both[_KNOWN:])

@@ -41,6 +41,7 @@ class Cogging(Effect):
     fewest: float = 0.0  # k at least: with fewer waves in the travel it could be any curve
 
     name = "cogging"
+    healthy = "every shape"
     title = "Cogging"
     parameters = (
         Quantity("order", "1/rev", 0.25, 1000.0, "waves in one turn of the joint", shape=True),

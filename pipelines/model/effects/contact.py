@@ -33,6 +33,7 @@ class Contact(Effect):
     duration: float = 0.2  # D [s]
 
     name = "contact"
+    healthy = "never"
     title = "A touch at the tip"
     scope = "arm"
     parameters = (

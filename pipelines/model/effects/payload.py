@@ -28,6 +28,7 @@ class Payload(Effect):
     extended: bool = True  # with its six moments of inertia
 
     name = "payload"
+    healthy = "never"
     title = "A load at the tip"
     scope = "arm"
     parameters = (

@@ -28,6 +28,7 @@ class TorqueSaturation(Effect):
     limit: float = 10.0  # L [N m]
 
     name = "torque_saturation"
+    healthy = "never"
     title = "Torque that is clipped"
     parameters = (
         Quantity("limit", "N m", 1e-3, 1e5, "largest torque that comes out", shape=True),

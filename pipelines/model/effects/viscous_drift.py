@@ -24,6 +24,7 @@ class ViscousDrift(Effect):
     since: float | None = None  # [s] clock time at which the session began; None: each log for itself
 
     name = "viscous_drift"
+    healthy = "never"
     title = "Viscous friction that drifts"
     parameters = (
         Quantity("relative_change", "1", -1.0, 10.0, "of viscous friction, from the start of the log to the end of the drift"),
