@@ -1,6 +1,6 @@
 """`rrrid diagnose` on sealed cases: machines, joints, strengths and experiments drawn from the test bench.
 
-A dozen short ones, without their detection limits; and as `slow` the whole campaign, some 650 cases of 52 s, whose table it
+Half a dozen short ones, without their detection limits; and as `slow` the whole campaign, some 650 cases of 52 s, whose table it
 prints (pytest -s). The same by hand, in parts that can be interrupted: python -m benchmarks.hidden_effects all --out FOLDER
 """
 
@@ -18,7 +18,7 @@ from benchmarks.hidden_effects.score import Score
 from benchmarks.hidden_effects.table import rows, table
 
 SEED = 30
-DOZEN = {"single": 6, "healthy": 2, "outside": 1, "invisible": 1, "payload": 1, "standing": 1}  # cases of each family
+DOZEN = {"single": 2, "healthy": 1, "outside": 1, "payload": 1, "standing": 1}  # cases of each family
 
 
 def dozen() -> list[SealedCase]:
@@ -40,9 +40,8 @@ def test_no_cause_is_named_that_is_not_there(scores: list[Score]) -> None:
 
 
 def test_single_causes_are_named_at_their_joint(scores: list[Score]) -> None:
-    """Five of six: twelve seconds to fit are few."""
     single = [one for one in scores if one.family == "single"]
-    assert sum(one.right for one in single) >= len(single) - 1, [(one.truth, one.verdict, one.named) for one in single]
+    assert all(one.right for one in single), [(one.truth, one.verdict, one.named) for one in single]
 
 
 @pytest.mark.parametrize("family", [name for name in DOZEN if name != "single"])

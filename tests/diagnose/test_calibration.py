@@ -57,6 +57,7 @@ def again(place: Path) -> Outcome[diagnose.Result]:
     return asked(place / "logs", place / "again", calibration=str(place / "first"))
 
 
+@pytest.mark.slow
 def test_stored_thresholds_give_the_same_answer(place: Path, again: Outcome[diagnose.Result]) -> None:
     """Every figure and every series, the origin apart; and the calibration is handed on as it is."""
     first, second = (json.loads((place / name / "result.json").read_text()) for name in ("first", "again"))
@@ -126,6 +127,7 @@ def test_one_of_an_older_version_knows_causes_of_the_whole_arm_alone(place: Path
     assert {name for (name, _), alike in same.items() if not alike} == {"encoder_eccentricity"}
 
 
+@pytest.mark.slow
 def test_other_logs_of_the_arm_need_no_twin(place: Path, tmp_path: Path) -> None:
     """A fault found with the thresholds of other logs: torque offset at joint 3, where the calibrated arm had cogging."""
     folder = written(tmp_path / "logs", session("torque_offset", 3))
@@ -133,6 +135,7 @@ def test_other_logs_of_the_arm_need_no_twin(place: Path, tmp_path: Path) -> None
     assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 3)]
 
 
+@pytest.mark.slow
 def test_with_reference_logs_what_chance_gives_is_stored(tmp_path: Path) -> None:
     """The same answer again; and it is refused where there are none."""
     logs = session("cogging", 2)

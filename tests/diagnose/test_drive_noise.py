@@ -12,6 +12,7 @@ from pipelines.model.diagnosis.diagnose import diagnose
 from tests.diagnose.sessions import but
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sample_time", "cutoff_hz"), [
     (4e-3, None), *(pytest.param(1e-3, hz, marks=pytest.mark.slow) for hz in (20.0, None))])
 def test_the_floor_is_what_an_arm_in_order_leaves_however_narrow_the_low_pass(sample_time: float, cutoff_hz: float | None) -> None:

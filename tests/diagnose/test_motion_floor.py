@@ -34,6 +34,7 @@ def asked(logs: tuple[ExperimentLog, ...]) -> Diagnosis:
     return diagnose(Logs.by_role(logs), few)
 
 
+@pytest.mark.slow
 def test_a_healthy_arm_leaves_of_held_out_logs_what_the_simulated_one_does() -> None:
     """Within a third at every joint, although its motion is another one than that of the logs that were fitted."""
     found = asked(recorded())
@@ -42,6 +43,7 @@ def test_a_healthy_arm_leaves_of_held_out_logs_what_the_simulated_one_does() -> 
     np.testing.assert_allclose(found.residual_rms.validate / found.held_out_floor, 1.0, rtol=0.33)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [0, 2])
 def test_reference_logs_do_without_a_twin(times: int) -> None:
     """The noise of the drives then comes of the reference logs: a short one, or many, of which one replica each says as much."""

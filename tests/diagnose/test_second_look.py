@@ -53,6 +53,7 @@ def diagnosed(ripple: float, waves: float, seed: int) -> Diagnosis:
         replicas=4, most=2, without=but("cogging", "encoder_eccentricity", "torque_offset"), evidence=False, limits=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("waves", "seed"), [(90.0, 4), pytest.param(90.0, 5, marks=pytest.mark.slow)])
 def test_a_ripple_below_slow_noise_is_named_at_a_second_look(waves: float, seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """As large as the wander, but quicker. What it brings is told in newton metres of the rows as they are: on the held-out log

@@ -92,6 +92,7 @@ def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagn
     assert section.text[0].count("% of the residual") == min(5, len({(one.cause, one.joint) for one in ledger if one.gain > 0.0}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cause", "joint"), [("torque_offset", 3), ("quadratic_drag", 1)])
 def test_other_causes_have_other_names(cause: str, joint: int, tmp_path: Path) -> None:
     found = asked(written(tmp_path / "logs", session(cause, joint)), tmp_path / "out").result

@@ -18,6 +18,7 @@ def diagnosed(cause: str = "", joint: int | None = None) -> Diagnosis:
     return diagnose(Logs.by_role(session(cause, joint, 4.0, 3)), settings)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cause", "joint"), [
     ("encoder_eccentricity", 1),  # 1.4 times the floor: within what an arm in order may leave, but no noise
     ("cogging", 3)])  # a line along the angle had passed for noise of the drive, and the floor stood high

@@ -74,6 +74,7 @@ def errors() -> tuple[Array, Array]:
     return np.array(before), np.array(after)
 
 
+@pytest.mark.slow
 def test_the_wrist_is_fitted_too_sharp_and_put_right(errors: tuple[Array, Array]) -> None:
     """Its drive is the least noisy of all, and what is left of it the smallest."""
     before, after = (one[:, 2] for one in errors)
@@ -86,6 +87,7 @@ def test_of_the_arm_as_a_whole_less_is_wrong(errors: tuple[Array, Array]) -> Non
     assert after < 0.7 * before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lag", [0.0, 0.02])
 def test_the_noise_of_a_run_moves_next_to_nothing(lag: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """Amplifiers of ten times the noise: what the rigid body's numbers differ by from one run to the next is half at most of what
@@ -130,6 +132,7 @@ def test_logs_that_no_controller_is_known_of_leave_nothing() -> None:
     assert smoothed_away(done.model.arm, np.zeros(3), done.data, prepared, 0) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "missing"), [("q", 3), ("tau", 60), ("q", 600), *(
     pytest.param(name, missing, marks=pytest.mark.slow) for name, missing in product(["q", "tau"], [20, 200]))])
 def test_a_log_with_a_hole_is_run_with_the_hole(name: str, missing: int) -> None:

@@ -36,6 +36,7 @@ def diagnosed(logs: tuple[ExperimentLog, ...], *causes: str) -> Diagnosis:
     return diagnose(Logs.by_role(logs), DiagnosisSettings(replicas=4, most=1, without=but(*causes), evidence=False, limits=False))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_torque_scale_of_one_of_two_joints_is_told_of_neither(planar: tuple[ExperimentLog, ...], joint: int) -> None:
     """Another name that explains it as well would be wrong half of the time; what would tell is said."""
@@ -49,6 +50,7 @@ def test_a_torque_scale_of_one_of_two_joints_is_told_of_neither(planar: tuple[Ex
     assert f"at joint {joint} (gain_error -0.09" in found.reason
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joint", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_reference_logs_tell_at_which_joint_it_is(planar: tuple[ExperimentLog, ...], joint: int) -> None:
     """Masses are what they were: those of the other joint would have had to grow by a tenth."""

@@ -59,6 +59,7 @@ def test_panda_is_predicted_as_published(shared: Path) -> None:
     assert any({"mx2", "torque_offset:2:offset"} <= set(group) for group in found.not_separated)
 
 
+@pytest.mark.slow
 def test_kr300_rests_do_not_spoil_the_fit(shared: Path) -> None:
     """Each log held out once; 22 % where its rests are fitted. Short logs separate no offset from gravity."""
     found = kr300(shared / "real")

@@ -51,6 +51,7 @@ def test_limits_stand_on_the_last_look_as_if_all_had_been_fitted_again(monkeypat
     assert own.screened is whole.screened
 
 
+@pytest.mark.slow
 def test_it_is_the_same_with_one_process_and_with_two(monkeypatch: pytest.MonkeyPatch) -> None:
     """Findings, limits, and what is stored for the next time: of every cause, though the limits ask of most of them elsewhere."""
     one, two = (diagnosed(there, monkeypatch) for there in (False, True))

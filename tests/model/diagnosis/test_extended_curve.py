@@ -21,6 +21,7 @@ def waving(motion: Motion, rooted: bool) -> Array:
     return wave(motion) + rooted * np.array(COULOMB) * (x / np.sqrt(1.0 + x**2) - np.tanh(x))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rooted", [True, False])
 def test_an_extension_fits_the_curve_where_that_leaves_less(rooted: bool) -> None:
     def logs(load: bool) -> Logs:

@@ -38,6 +38,7 @@ def slide(seed: int, role: str, load: Load) -> ExperimentLog:
     return ExperimentLog(f"slide-{seed}", "free", role, "measured", "slide", 1.0 / _RATE, SLIDE, signals, torque="measured")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cause", "number", "size", "load"), [
     ("torque_offset", "offset", -32.0, lambda q, v: np.full_like(q, -32.0)),
     ("asymmetric_friction", "coulomb_difference", 50.0, lambda q, v: 25.0 * np.abs(np.tanh(v / 1e-3))),

@@ -34,6 +34,7 @@ def test_what_acts_once_is_found_once() -> None:
     assert orders({7.0: 0.05}, Wanted(Cogging(joint=1))) == [7.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("starts", [(7.0, 12.0), (12.0, 7.0)])
 def test_two_starts_at_one_place_are_two(starts: tuple[float, ...]) -> None:
     """The last of them does not take the place of the others; what nobody named there is not looked for."""

@@ -37,6 +37,7 @@ def noise(log: ExperimentLog) -> tuple[Array, Array]:
     return found.white, fit.rms
 
 
+@pytest.mark.slow
 def test_what_repeats_is_no_noise() -> None:
     """A joint that bends over 30 mrad before it slides leaves eighty times the noise, and as much in each period: told of its
     period, the log has a third of the noise that is told of it without. Joints in order have the same, told or not."""
@@ -50,6 +51,7 @@ def test_what_repeats_is_no_noise() -> None:
     assert (told[order] <= untold[order]).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [11, 12])
 def test_the_period_of_an_arm_in_order_says_nothing_new(seed: int) -> None:
     log = recorded(draw_machine(seed, "fault"))

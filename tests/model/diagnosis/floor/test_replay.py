@@ -53,6 +53,7 @@ def test_what_cannot_be_put_back_is_refused() -> None:
             experiment_of(one)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [20, 400])
 def test_an_arm_in_order_whose_recorder_lost_samples_is_in_order(samples: int) -> None:
     """Without a twin, one percent of a residual passes for a ripple of the drive."""
@@ -62,6 +63,7 @@ def test_an_arm_in_order_whose_recorder_lost_samples_is_in_order(samples: int) -
     assert (found.floor_origin, found.verdict) == ("twin", "nothing-wrong")
 
 
+@pytest.mark.slow
 def test_samples_lost_here_and_there_are_no_alarm() -> None:
     fitted, judging = session()
     found = diagnose(Logs((dropped(fitted, lambda k: k % 97 != 96),), (judging,)),

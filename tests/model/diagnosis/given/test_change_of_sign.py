@@ -54,6 +54,7 @@ def case_with(curve: Callable[[Array], Array]) -> Case:
                 families(columns.laws, whole_motion(prepared.data), model.arm, without), None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("curve", [
     pytest.param(lambda x: x / np.sqrt(1.0 + x**2), id="root"),
     pytest.param(lambda x: 2.0 / np.pi * np.arctan(x), id="arc tangent"),
@@ -63,6 +64,7 @@ def test_no_law_of_friction_is_found_in_another_change_of_sign(curve: Callable[[
     assert search(case_with(curve), 2).steps[0].best is None
 
 
+@pytest.mark.slow
 def test_concave_friction_is_still_found_beside_it() -> None:
     """A fifth of the dry friction levels off over 0.3 rad/s, thirty times the speed over which the rest changes its sign; how fast
     is told to two fifths, for a gradual change of sign passes for a part of it."""
@@ -193,6 +195,7 @@ def test_a_law_that_bends_where_dry_friction_changes_its_sign_is_asked_again(spe
     assert wrong_law_of(cast("Diagnosis", found)) is asked
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stored", [None, cast("Calibration", SimpleNamespace(conditions=SimpleNamespace(laws=())))])
 def test_stored_thresholds_are_for_the_other_curve_as_well(stored: Calibration | None, monkeypatch: pytest.MonkeyPatch) -> None:
     """An arm in order whose friction changes its sign by an arc tangent is in order with and without --calibration."""
@@ -208,6 +211,7 @@ def test_stored_thresholds_are_for_the_other_curve_as_well(stored: Calibration |
     assert [calibration for _, calibration in asked] == [stored, stored]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("loose", "plain", "asked", "verdict"), [
     (told("cause", ("cogging:1",)), None, [True], "cause"),  # nothing that the laws as they are find could hold
     (told("cause", ("cogging:1", "stribeck:1")), told("nothing-wrong", ()), [True, False], "nothing-wrong"),

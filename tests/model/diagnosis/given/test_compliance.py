@@ -41,6 +41,7 @@ def test_without_responses_what_gives_way_is_not_testable() -> None:
     assert all("no frf log" in one.reason and one.record for one in told.values())
 
 
+@pytest.mark.slow
 def test_a_gap_is_told_from_a_spring_by_responses_alone() -> None:
     """Without them, and beside a spring, it has no name; where they show a rigid arm it has."""
     sprung = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm())
@@ -63,6 +64,7 @@ def test_responses_of_no_use_are_said() -> None:
     assert "frequency responses are of no use" in found.open
 
 
+@pytest.mark.slow
 def test_a_cause_left_out_is_not_named() -> None:
     found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm(), ("base_resonance",))
     assert found is not None

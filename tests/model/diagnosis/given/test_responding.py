@@ -63,6 +63,7 @@ def test_a_soft_base_is_worth_something_on_held_out_logs_and_enters_the_model() 
     assert found.after_rms.validate[0] == pytest.approx(gain.validate_torque_rms.after[0], rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("told")
 def test_what_does_harm_to_the_model_is_told_once() -> None:
     """Responses name a soft base where motion shows a firm one: a finding, with why the model goes without it."""
@@ -90,6 +91,7 @@ def test_the_extension_takes_the_responses_numbers() -> None:
     assert np.all(found.after.validate <= 1.05 * found.before.validate)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("told")
 @pytest.mark.parametrize(("before", "news"), [("base_resonance", False), ("", True)])
 def test_without_responses_of_the_reference_its_motion_tells_whether_the_base_was_soft(before: str, news: bool) -> None:

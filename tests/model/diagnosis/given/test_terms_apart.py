@@ -79,6 +79,7 @@ def sampled(samples: Path, *names: str) -> Logs:
     return Logs.by_role([open_log(samples / name).log for name in names])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cogging", [False, True])
 def test_of_three_sigmoids_one_is_left_where_friction_has_one(cogging: bool) -> None:
     """Coulomb and viscous friction come out right at every joint, and what is left is what their own law leaves, waves or none."""
@@ -106,6 +107,7 @@ def test_of_three_sigmoids_two_are_left_where_friction_has_two() -> None:
         assert (law["w1"], law["w2"]) == (pytest.approx(100.0, rel=0.1), pytest.approx(12.0, rel=0.1))
 
 
+@pytest.mark.slow
 def test_three_sigmoids_that_are_told_apart_stay(samples: Path) -> None:
     """A machine of three: its sharpnesses 120, 60 and 12 within their uncertainty where nothing is wrong. At joint 2 something is,
     and blurs them: by these logs alone two are left of them, and beside logs of the time before all three stay."""
@@ -155,6 +157,7 @@ def test_merged_terms_are_said() -> None:
     assert not any(unclear(plain, place) for place in range(len(plain.model.columns.laws)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("std", "words"), [
     ((0.05, 0.6, 0.2), "w1 = 70 ± 4 s/rad and w2 = 60 s/rad (known to a factor of 1.8 only) may be one"),
     ((1.1, 0.1, 0.1), "w1 = 70 s/rad (known to a factor of 3 only)"), ((400.0, 0.1, 0.1), "w1 = 70 s/rad (not determined)")])
@@ -180,6 +183,7 @@ def three_at(w1: float, w2: float, w3: float, std: tuple[float, ...]) -> Refined
     return replace(done, model=replace(done.model, columns=replace(done.model.columns, laws=laws)), known=known)
 
 
+@pytest.mark.slow
 def test_the_time_before_says_what_friction_was() -> None:
     """Coulomb and viscous then, and a second sigmoid at joint 2 since: as part of the law it would be nothing wrong. The reason is
     that of the logs that have decided. Where they do not drive the joint, those of now decide."""
@@ -229,6 +233,7 @@ def test_a_calibration_is_taken_with_its_own_laws(samples: Path) -> None:
     assert [(one.cause, one.joint) for one in again.findings] == [("cogging", 2)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("stored", "wanted"), [
     (("coulomb:1", "viscous:1", "two_sigmoid:2", "three_sigmoid:3"), [[Coulomb, Viscous], [TwoSigmoid], [ThreeSigmoid]]),
     (("stribeck:1", "stribeck:2", "stribeck:3"), [[Coulomb, Viscous]] * 3)])
@@ -255,6 +260,7 @@ def test_a_narrower_look_still_says_so() -> None:
     assert narrowed(told, 10.0, [0.0] * 3).fewer == told.fewer != ()
 
 
+@pytest.mark.slow
 def test_cogging_is_accepted_with_its_numbers_beside_a_law_of_three_sigmoids() -> None:
     """0.1 N m, eleven waves a turn, on a machine whose friction has one sigmoid; the result says what law it was fitted beside."""
     found = extend(simple(True), (Wanted(Cogging(2)),), SETTINGS, synthetic_arm())

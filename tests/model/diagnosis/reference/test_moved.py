@@ -206,6 +206,7 @@ def test_the_model_of_a_longer_link_is_as_right_as_one_fitted_after_it() -> None
     assert after < 1.1 * plain < 0.8 * before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mass", [-0.05, pytest.param(0.05, marks=pytest.mark.slow), 0.1])
 def test_a_load_at_the_elbow_is_no_longer_link(mass: float) -> None:
     """Masses that nobody knows explain .98 of what it moves, and ten numbers of a load all of it."""

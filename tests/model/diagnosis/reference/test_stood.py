@@ -212,6 +212,7 @@ def test_a_floor_of_nothing_multiplies_nothing() -> None:
     assert _times(np.array([2.0, 0.0]), np.array([1.0, 0.0])).tolist() == [4.0, 1.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("now", "named"), [(1.0, []), (1.4, [("quadratic_drag", 2)]), (2.0, [("quadratic_drag", 2)])])
 def test_what_stood_and_has_grown_has_changed(now: float, named: list[tuple[str, int]]) -> None:
     """By what it has grown."""

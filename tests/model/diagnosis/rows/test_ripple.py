@@ -94,6 +94,7 @@ def test_rows_that_are_cleared_are_so_in_torque_and_columns_alike(prepared: Prep
     assert there.clear(np.zeros((3, 2, 0)), own[:0]).shape == (3, 2, 0)  # of a cause that acts at no joint
 
 
+@pytest.mark.slow
 def test_numbers_of_a_rippling_drive_fit_motion_farther_out() -> None:
     """Twelve arms whose drives ripple by a thousandth, over 8 s: the torque of four other motions, without noise or ripple, is told
     with less error than by rows weighed alike at joint 2, which carries the arm, and with no more at the others; where nothing

@@ -107,6 +107,7 @@ def test_rows_that_do_not_count_are_no_neighbours(data: Data) -> None:
     np.testing.assert_array_equal(whole, masked)
 
 
+@pytest.mark.slow
 def test_torque_and_columns_pass_alike(data: Data) -> None:
     """What is laid in whitened rows is what whitening makes of what is laid: of the arm's torque, and of the columns of every cause
     that is screened, one joint's or all."""

@@ -69,6 +69,7 @@ def gate(seen: dict[str, Screened], passed: str, refused: frozenset[int] = froze
     return Gate(every, _bounds([one.family for one in every], np.ones(3)), (seen[passed],), refused)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("load", "misreads", "truth", "other"), [
     (None, True, "encoder_eccentricity", "spring"), (pulled, False, "spring", "torque_offset")])
 def test_the_greater_cause_is_taken_whichever_passed(load: Callable[[Motion], Array] | None, misreads: bool, truth: str,

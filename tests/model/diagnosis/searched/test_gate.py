@@ -42,6 +42,7 @@ def of_three_sigmoids(samples: Path) -> tuple[Case, Refined, list[Screened]]:
     return case, now, screen(case.data, now.fit, every, case.arms(now.model))
 
 
+@pytest.mark.slow
 def test_every_joint_of_three_sigmoids_has_its_hump(samples: Path) -> None:
     """Recorded without a controller, and so without a floor: what takes nine tenths of a joint is not left without a name."""
     logs = Logs.by_role([open_log(path).log for path in _logs(samples)])

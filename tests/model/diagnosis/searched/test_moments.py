@@ -85,6 +85,7 @@ def only(causes: tuple[str, ...], logs: Logs) -> Case:
     return Case(prepared.data, prepared.judge, model, fit.weight, every, None)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("clocks", [(0.0, 0.0, 0.0), (0.0, 300.0, 1e4)])
 def test_a_touch_that_comes_again_in_every_log_is_one_whatever_their_clocks_say(clocks: tuple[float, float, float]) -> None:
     """Three seconds after the start of each: held-out time confirms it, so that it belongs to none of them."""

@@ -16,6 +16,7 @@ from pipelines.model.diagnosis.searched.unnameable import unnameable
 from tests.model.diagnosis.arms import hidden, wave
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("there", "nameable", "told"), [(True, (), True), (False, (), False), (True, ("residual",), False)])
 def test_what_the_held_out_logs_do_not_have_gives_no_way(there: bool, nameable: tuple[str, ...], told: bool) -> None:
     """Ripple stands for something that gives way: with no name for it, it counts where the held-out logs have it too."""

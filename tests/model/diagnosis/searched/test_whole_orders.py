@@ -47,6 +47,7 @@ def test_stops_at_330_degrees_leave_every_wave_its_whole_order(mean: float) -> N
     assert sorted(orders(searched({7.0: 0.05, 12.0: 0.014, 28.0: 0.03}, 3, mean))) == [7.0, 12.0, 28.0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mean", [0.575, 0.597, 0.65])
 @pytest.mark.parametrize("order", [6.8, 8.25, 12.37])
 def test_behind_a_gear_an_order_is_what_it_is(order: float, mean: float) -> None:

@@ -71,6 +71,7 @@ def named(number: int, cause: str, joint: int, part: float, without: tuple[str, 
     return (cause, joint) in [(one.cause, one.joint) for one in found.findings]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("cause", "joint"), [pytest.param("cogging", 2, marks=pytest.mark.slow), ("torque_offset", 3)])
 def test_above_its_limit_a_cause_is_found(cause: str, joint: int) -> None:
     """With and against what the arm in order leaves."""
@@ -79,6 +80,7 @@ def test_above_its_limit_a_cause_is_found(cause: str, joint: int) -> None:
     assert named(7, cause, joint, -1.5, FEW)
 
 
+@pytest.mark.slow
 def test_well_below_its_limit_it_is_not() -> None:
     """The limit covers both signs: at 0.7 of it the worse one is not found."""
     assert not all(named(7, "torque_offset", 3, part, FEW) for part in (0.7, -0.7))

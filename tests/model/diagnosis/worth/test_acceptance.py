@@ -188,6 +188,7 @@ def test_no_held_out_log_may_get_worse_by_more_than_a_tenth() -> None:
     assert "second" in worse_log(data, large, np.where(first | (data.joint == 0), 1.0, 2.0) * large)
 
 
+@pytest.mark.slow
 def test_all_joints_together_tell_what_no_single_one_does(monkeypatch: pytest.MonkeyPatch) -> None:
     """A cause of an eighth of the noise at each of three joints, one of them ten times as loud: surely told in most of 100 draws,
     by its joint alone in half as many; two models that are equally wrong are told apart in no more than one in twenty."""

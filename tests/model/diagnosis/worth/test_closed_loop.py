@@ -40,6 +40,7 @@ def alone(arm: Arm, log: ExperimentLog, first: ExperimentLog) -> np.ndarray:
     return simulate(arm, part, step=choose_step(Plant.of(arm), other)).q[0]
 
 
+@pytest.mark.slow
 def test_each_arm_moves_in_each_log_as_by_itself(arm: Arm, prepared: Prepared) -> None:
     """One without arrays, log by log; one whose drive is late, which takes arrays, in both logs at once; between them one that
     cannot be simulated; and what was measured beside them."""
