@@ -7,8 +7,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 REPO = Path(__file__).resolve().parents[1]
 
 # The layers from the bottom up (design.md). The longest prefix that fits decides.
@@ -217,4 +215,4 @@ def test_every_module_says_what_it_is() -> None:
     """The docstring's first line is the title: reports and `--help` reuse it."""
     firsts = {module: (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
               for module, path in MODULES.items()}
-    assert [module for module, first in firsts.items() if len(first) <= 15 or "." not in first and not first.endswith(":")] == []
+    assert [module for module, first in firsts.items() if len(first) <= 15 or ("." not in first and not first.endswith(":"))] == []
