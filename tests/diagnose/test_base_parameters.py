@@ -20,12 +20,14 @@ def since(cause: str, joint: int | None) -> Diagnosis:
     return diagnose(Logs.by_role((*healthy_again(session()), *session(cause, joint))), _FEW)
 
 
+@pytest.mark.slow
 def test_a_drive_that_pulls_less_is_no_payload() -> None:
     """Its scale is one number; in the base parameters of its row it looks as if links had grown lighter."""
     found = since("torque_gain", 2)
     assert [(one.cause, one.joint) for one in found.findings] == [("torque_gain", 2)]
 
 
+@pytest.mark.slow
 def test_a_payload_is_one() -> None:
     """Half a kilogram at the tip, within 3 %."""
     found = since("payload", None)
@@ -33,6 +35,7 @@ def test_a_payload_is_one() -> None:
     assert found.findings[0].parameters["mass"].value == pytest.approx(0.5, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_longer_link_is_no_payload_beside() -> None:
     """Twelve millimetres; the masses beyond sit elsewhere then, and base parameters move as if some weight were gone."""
     few = replace(_FEW, without=but("link_length", "payload"))

@@ -70,6 +70,7 @@ def test_stored_thresholds_give_the_same_answer(place: Path, again: Outcome[diag
     assert any("An earlier diagnosis has stored them" in text for text in said)
 
 
+@pytest.mark.slow
 def test_a_cause_of_the_whole_arm_may_be_left_out_later(place: Path, again: Outcome[diagnose.Result]) -> None:
     """The others are held against what they were held against with it."""
     fewer = asked(place / "logs", place / "fewer", calibration=str(place / "first"), without=(*FEW, "gravity_tilt"))
@@ -109,6 +110,7 @@ def test_reading_gives_back_what_was_written(place: Path, tmp_path: Path) -> Non
     assert [(one.place, one.joint) for one in made.wide.causes] == [("", None), *own]
 
 
+@pytest.mark.slow
 def test_one_of_an_older_version_knows_causes_of_the_whole_arm_alone(place: Path, again: Outcome[diagnose.Result],
                                                                      tmp_path: Path) -> None:
     """It is read, and the others are held against what grows with the weight of their joint, as they were then."""
@@ -149,6 +151,7 @@ def test_with_reference_logs_what_chance_gives_is_stored(tmp_path: Path) -> None
         asked(written(tmp_path / "alone", logs), tmp_path / "out", calibration=str(tmp_path / "first"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("changed", "words"), [
     ({"robot": "0" * 64}, "another robot"), ({"controllers": ("0" * 64,)}, "another controller"),
     ({"experiments": ("free",)}, "experiments excitation"), ({"sample_time": 2e-3}, "sampled every 1 ms"),
@@ -170,6 +173,7 @@ def test_a_cause_that_it_does_not_know_is_asked_to_be_left_out(place: Path, tmp_
         asked(place / "logs", tmp_path / "out", without=but("cogging", "quadratic_drag"), calibration=str(place / "first"))
 
 
+@pytest.mark.slow
 def test_a_run_takes_it_as_diagnose_does(place: Path, again: Outcome[diagnose.Result], tmp_path: Path) -> None:
     """The same causes against the same thresholds, and no twin; taken back as long as the file is the same, and refused in an
     output folder of its own."""
@@ -247,6 +251,7 @@ def test_what_is_no_calibration_is_rejected(spoil: Any, code: str, words: str, p
     assert refused.value.code == code
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("of", "name"), [
     ("wide", "weight"), ("wide", "model"), ("wide", "left"), ("wide", "usual"), ("wide", "rest"), ("wide", "longer"),
     ("cause", "columns"), ("cause", "model"), ("cause", "left"), ("conditions", "speed"),

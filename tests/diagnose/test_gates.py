@@ -51,6 +51,7 @@ def healthy() -> ExperimentLog:
     return session("", None, 6.0, 1)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", SPOILT)
 def test_data_that_are_wrong_are_refused_with_their_repair(what: str, healthy: ExperimentLog, tmp_path: Path) -> None:
     spoil, code, repair = SPOILT[what]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
@@ -40,6 +41,7 @@ def found(judging: Sequence[ExperimentLog]) -> Diagnosis:
     return diagnose(Logs(fitted, tuple(judging)), chosen)
 
 
+@pytest.mark.slow
 def test_a_cause_that_one_held_out_log_does_not_bear_out_is_not_accepted() -> None:
     """Cogging in what is fitted and in one held-out log; the other one comes of the same arm without it."""
     rippled = next(log for log in session("cogging", 2) if log.role == "validate")

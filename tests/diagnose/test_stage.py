@@ -37,6 +37,7 @@ def rippled(tmp_path_factory: pytest.TempPathFactory) -> Outcome[diagnose.Result
     return asked(written(place / "logs", session("cogging", 2)), place / "out")
 
 
+@pytest.mark.slow
 def test_the_result_holds_what_the_contract_says(rippled: Outcome[diagnose.Result]) -> None:
     """Names and nesting of cli-contract.md, in the file itself."""
     stored = json.loads((rippled.folder / "result.json").read_text())
@@ -99,6 +100,7 @@ def test_other_causes_have_other_names(cause: str, joint: int, tmp_path: Path) -
     assert [(one.cause, one.joint) for one in found.findings] == [(cause, joint)]
 
 
+@pytest.mark.slow
 def test_an_arm_in_order_has_nothing_wrong(tmp_path: Path) -> None:
     """Exit 0, and it is said what would have been found."""
     outcome = asked(written(tmp_path / "logs", session()), tmp_path / "out", replicas=2)
@@ -116,6 +118,7 @@ def test_what_the_user_excludes_is_not_named(tmp_path: Path) -> None:
     assert "cogging" in causes.rstrip(".").split(", ")
 
 
+@pytest.mark.slow
 def test_paths_go_before_what_logs_say_of_themselves(tmp_path: Path) -> None:
     """Two logs of role identify, one of them named to judge: it judges. The same one cannot do both."""
     logs = session("torque_offset", 3)

@@ -109,6 +109,7 @@ def test_the_noise_of_a_run_moves_next_to_nothing(lag: float, monkeypatch: pytes
     assert known < 0.5 * scatter()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("known", [True, False])
 def test_every_model_of_a_search_is_moved_by_what_the_arm_that_was_found_leaves(known: bool) -> None:
     """The nominal one, that of the only step, before and after, and the final one; none where no log can be run."""

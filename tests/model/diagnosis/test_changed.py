@@ -30,6 +30,7 @@ def diagnosed(two: bool, monkeypatch: pytest.MonkeyPatch) -> Diagnosis:
     return diagnose(Logs((hidden(1, wave),), (), (before,)), SETTINGS)
 
 
+@pytest.mark.slow
 def test_limits_stand_on_the_last_look_as_if_all_had_been_fitted_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """The model of the last look, refitted with the ripple among the noise, and what was screened beside it."""
     asked: list[tuple[Step, Step]] = []

@@ -25,6 +25,7 @@ def orders(hidden: Mapping[float, float], *wanted: Wanted) -> list[float]:
     return sorted(acting.values["order"] for acting in found.arm.effects)
 
 
+@pytest.mark.slow
 def test_a_cause_is_named_once_and_found_as_often_as_it_acts() -> None:
     """Poles, slots and teeth: what `diagnose` finds in three steps is one cause to whoever asks for it."""
     assert orders({7.0: 0.05, 28.0: 0.03, 12.0: 0.014}, Wanted(Cogging(joint=1))) == [7.0, 12.0, 28.0]

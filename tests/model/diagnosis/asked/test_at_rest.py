@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
@@ -51,6 +52,7 @@ def _counting(*logs: ExperimentLog) -> float:
     return float(data.counts.mean())
 
 
+@pytest.mark.slow
 def test_what_friction_holds_at_rest_is_no_cause() -> None:
     """The offset keeps its name, and nothing that the places have in common gets another."""
     found = diagnose(Logs((slide(1, "identify", 18.0),)), DiagnosisSettings(replicas=0, evidence=False, limits=False))

@@ -31,6 +31,7 @@ def nominal(prepared: Prepared) -> Exact:
     return Exact.start(*fit_nominal(prepared.data, prepared.columns))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stands", STANDING)
 @pytest.mark.parametrize("kind", ACTING, ids=lambda kind: kind.name)
 def test_what_stands_is_acted_on(kind: type[Effect], stands: str, nominal: Exact, prepared: Prepared) -> None:

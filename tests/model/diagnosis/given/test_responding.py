@@ -49,6 +49,7 @@ def asked(reference: tuple[ExperimentLog, ...] = ()) -> Diagnosis:
     return diagnose(Logs((fitted,), (judging,), reference, (fitted,)), SETTINGS)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("told")
 def test_a_soft_base_is_worth_something_on_held_out_logs_and_enters_the_model() -> None:
     found = asked()
@@ -79,6 +80,7 @@ def test_what_does_harm_to_the_model_is_told_once() -> None:
     assert not any("rrrid extend" in text for text in section.text)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("told")
 def test_the_extension_takes_the_responses_numbers() -> None:
     """Nothing but the base: its frequency is that of the responses, within their deviation."""

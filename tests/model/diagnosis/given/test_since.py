@@ -58,6 +58,7 @@ def loaded() -> Diagnosis:
     return diagnose(Logs((hidden(1, both), hidden(2, both)), (), (before(hidden(4, push)), before(hidden(5, push)))), SETTINGS)
 
 
+@pytest.mark.slow
 def test_a_load_at_the_tip_is_named_by_the_base_parameters(loaded: Diagnosis) -> None:
     """Its mass within 3 %."""
     assert [finding.cause for finding in loaded.findings] == ["payload"]
@@ -121,6 +122,7 @@ def test_what_was_there_before_stands(loaded: Diagnosis) -> None:
     assert loaded.extended.parameters["torque_offset:3:offset"].std == offset.std
 
 
+@pytest.mark.slow
 def test_nothing_has_changed() -> None:
     found = diagnose(Logs((hidden(1, push), hidden(2, push)), (), (before(hidden(4, push)), before(hidden(5, push)))), SETTINGS)
     assert found.verdict == "nothing-wrong"
@@ -128,6 +130,7 @@ def test_nothing_has_changed() -> None:
     assert not found.findings
 
 
+@pytest.mark.slow
 def test_what_is_new_is_found() -> None:
     found = diagnose(Logs((hidden(1, push), hidden(2, push)), (), (before(hidden(4)), before(hidden(5)))), SETTINGS)
     assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 3)]

@@ -94,6 +94,7 @@ def test_of_three_sigmoids_one_is_left_where_friction_has_one(cogging: bool) -> 
     np.testing.assert_allclose(done.rms, fitted(prepare(simple(cogging), SETTINGS)).rms, rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_of_three_sigmoids_two_are_left_where_friction_has_two() -> None:
     """A dip keeps its own term, with its height and sharpness."""
     logs = Logs((hidden(1, dipping), hidden(2, dipping)), (hidden(3, dipping, "validate"),))
@@ -145,6 +146,7 @@ def test_three_sigmoids_come_out_right_beside_cogging(samples: Path) -> None:
         assert number.value == pytest.approx(truth, abs=3.0 * number.std)
 
 
+@pytest.mark.slow
 def test_merged_terms_are_said() -> None:
     """Of one sigmoid fitted as three nothing but their sum is seen, and the words say of which numbers; a law of one term has none
     to confuse."""
@@ -202,6 +204,7 @@ def test_the_time_before_says_what_friction_was() -> None:
     assert kinds(with_terms_told_apart(unmoved, SETTINGS.blocks), 2) == [TwoSigmoid]
 
 
+@pytest.mark.slow
 def test_what_judges_the_model_does_not_choose_it() -> None:
     prepared = prepare(simple(), SETTINGS, synthetic_arm())
     nothing: Any = object()  # whoever asks it fails
@@ -247,6 +250,7 @@ def test_laws_of_one_term_are_left_alone() -> None:
     assert with_terms_told_apart(prepared, SETTINGS.blocks) is prepared
 
 
+@pytest.mark.slow
 def test_a_part_that_stands_beside_a_law_is_not_laid_twice() -> None:
     """A model with viscous friction of its own beside three sigmoids is left with Coulomb friction and that."""
     prepared = prepare(simple(), SETTINGS, synthetic_arm())
@@ -255,6 +259,7 @@ def test_a_part_that_stands_beside_a_law_is_not_laid_twice() -> None:
     assert kinds(told, 2) == [Coulomb, Viscous]
 
 
+@pytest.mark.slow
 def test_a_narrower_look_still_says_so() -> None:
     told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), SETTINGS.blocks)
     assert narrowed(told, 10.0, [0.0] * 3).fewer == told.fewer != ()

@@ -95,6 +95,7 @@ def sprung(seed: int, stiffness: float, role: str = "identify") -> ExperimentLog
     return replace(log, signals={**log.signals, "tau": replace(log.signals["tau"], values=tau)})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("amplitude", "moved"), [(0.0, True), (0.5, False), (1.0, False)])
 def test_what_a_spring_shares_with_weight_is_no_load(amplitude: float, moved: bool) -> None:
     """Fitted beside base parameters that are free, a spring leaves them a part of what it does, here half of it; with those of the
@@ -117,6 +118,7 @@ def loaded(seed: int, mass: float, role: str = "identify") -> ExperimentLog:
                     name=f"{role}-{seed}", experiment="excitation", role=role, period=10.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("without", "verdict"), [((), "cause"), (("payload",), "unknown")])
 def test_base_parameters_that_moved_as_no_cause_moves_them_are_no_arm_in_order(without: tuple[str, ...], verdict: str) -> None:
     """Nothing stands in the residual, and yet the arm is another: with the load in the library it has a name, without it none."""
@@ -132,6 +134,7 @@ def test_base_parameters_that_moved_as_no_cause_moves_them_are_no_arm_in_order(w
         assert float(told[1]) > 1.5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("mass", "verdict"), [(0.3, "unknown"), (0.0, "nothing-wrong")])
 def test_a_load_that_is_not_accepted_leaves_no_arm_in_order(mass: float, verdict: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The base parameters have moved all the same, and the ledger says why the load has no name."""
@@ -171,6 +174,7 @@ def compared(now: Arm, tried: tuple[str, ...]) -> Diagnosis:
                          (turned(before, 4, "reference"), turned(before, 5, "reference"))), brief)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("error", [-2e-3, 2e-3])
 def test_a_longer_link_is_told_by_the_masses_beyond_it(error: float) -> None:
     """Within a session base parameters take nearly all of it in. How heavy what is beyond the link is they do not say, so that they
@@ -190,6 +194,7 @@ def test_a_longer_link_is_told_by_the_masses_beyond_it(error: float) -> None:
     assert abs(numbers["error"].value - error) < min(3.0 * numbers["error"].std, 0.5 * abs(error))
 
 
+@pytest.mark.slow
 def test_the_model_of_a_longer_link_is_as_right_as_one_fitted_after_it() -> None:
     """The length is an effect of it, and the masses beyond the link stay on their longer lever."""
     now = altered(1.5e-3)

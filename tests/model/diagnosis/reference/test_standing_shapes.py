@@ -99,6 +99,7 @@ def test_a_drive_that_gives_too_little_gives_too_little_of_what_stands() -> None
     np.testing.assert_allclose(model.torque(prepared.data), done, atol=1e-9 * np.abs(done).max())
 
 
+@pytest.mark.slow
 def test_what_stands_is_no_extension() -> None:
     """Who asks for it is told that it is in the model already; no model is written for it."""
     logs = Logs((log_of(1, "identify"),), (log_of(2, "validate"),), (log_of(4, "reference"), log_of(5, "reference")))

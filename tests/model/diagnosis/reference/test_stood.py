@@ -76,6 +76,7 @@ def share(effect: Effect, was: Callable[[Motion], Array], now: Callable[[Motion]
     return share_before(columns, data, later, others, standing, np.array([50.0, 100.0, 200.0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("was", "stood", "doubtful"), [
     (0.0, False, False), (0.1, False, False), (0.4, False, True), (1.0, True, True), (-1.0, False, False)])
 def test_one_amplitude(was: float, stood: bool, doubtful: bool) -> None:
@@ -139,6 +140,7 @@ def test_what_is_known_to_stand_is_taken_out_of_the_later_logs() -> None:
     assert known.case.data.rms(moved[1])[1] < 0.5 * plain.case.data.rms(moved[0])[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("before", "moved", "early"), [(1.0, True, True), (0.0, True, False), (1.0, False, False)])
 def test_what_stood_is_seen_beside_what_is_far_greater(before: float, moved: bool, early: bool) -> None:
     """A drag at joint 2 of before and after, and a spring at joint 1 of the later logs alone: the drag ends the search before it

@@ -85,6 +85,7 @@ def found() -> Found:
     return search(Case(prepared.data, None, model, fit.weight, every, None), 2)
 
 
+@pytest.mark.slow
 def test_lag_and_ripple_are_named_and_the_inertia_comes_out(found: Found) -> None:
     assert abs(found.nominal.model.beta[0] / _INERTIA - 1.0) > 0.5  # the nominal model knows nothing of it
     named = {one.effect.name: one for one in found.final.model.effects}

@@ -93,6 +93,7 @@ def test_what_held_out_time_refused_stays_out_and_so_does_all_where_no_floor_is_
     assert better_than(lesser, replace(case, thresholds=None), now, every, gate(seen, "torque_offset")) is None
 
 
+@pytest.mark.slow
 def test_what_passed_is_not_asked_again() -> None:
     """Among those above their thresholds the search has chosen already, by its own rules."""
     case, now, seen = looked_at(pulled, False)
@@ -100,6 +101,7 @@ def test_what_passed_is_not_asked_again() -> None:
     assert better_than(lesser, case, now, every, replace(gate(seen, "torque_offset"), passed=every)) is None
 
 
+@pytest.mark.slow
 def test_what_is_no_number_is_not_better() -> None:
     case, now, seen = looked_at(pulled, False)
     error, every = HeldOut.of(now, case), tuple(seen.values())

@@ -45,6 +45,7 @@ def led_astray(loose: bool, **away: float) -> tuple[Refined, Refined]:
     return good, bad
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("sharpness", "roundness"), [(2000.0, 3.5), (900.0, 0.4), (5.0, 3.5)])
 def test_the_curve_is_found_from_where_no_step_leads_back(sharpness: float, roundness: float) -> None:
     good, bad = led_astray(True, sharpness=sharpness, roundness=roundness)
@@ -70,6 +71,7 @@ def test_a_law_of_a_model_that_was_given_keeps_its_form() -> None:
     assert with_curves_anew(given) is given
 
 
+@pytest.mark.slow
 def test_of_three_sigmoids_that_have_merged_all_are_found_again_beside_a_cause(samples: Path) -> None:
     """Joint 3 of the arm of three sigmoids, whose second and third a fault has made one: by where they began the truth comes back,
     and without that knowledge nothing is done again."""

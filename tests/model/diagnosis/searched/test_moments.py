@@ -38,6 +38,7 @@ def bumps(*starts: float, joints: tuple[float, ...] = (1.0, 0.7, 0.2)) -> Screen
     return next(one for one in screen(prepared.data, fit, every, arm) if one.family.event)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("starts", "out"), [((3.0,), True), ((2.0, 5.5), True), ((1.0, 2.3, 3.1, 4.6, 6.0), False)])
 def test_few_moments_stand_out(starts: tuple[float, ...], out: bool) -> None:
     one = bumps(*starts)

@@ -24,6 +24,7 @@ from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden
 
 
+@pytest.mark.slow
 def test_two_scales_of_torque_that_are_one_are_one(monkeypatch: pytest.MonkeyPatch) -> None:
     """The drive of joint 3 gives a tenth less than its log tells, and a great wave at joint 1 hides what that does there. If the
     search begins with the scale of joint 2, it needs that of joint 1 beside it; of scales only the ratios show."""
@@ -77,6 +78,7 @@ def test_one_for_two_is_what_could_have_been_accepted(possible: bool, error: flo
     assert (found is not None and found[2] is rival) is (taken and before == 2.0)
 
 
+@pytest.mark.slow
 def test_a_search_that_takes_one_for_two_comes_to_an_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Two drives are off, and each is taken for both of them: neither rests until the other is there."""
     def scaled(seed: int, role: str = "identify") -> ExperimentLog:

@@ -100,6 +100,7 @@ def _line_and_offset(seed: int, stiffness: float) -> tuple[Data, Tried, Tried]:
     return prepared.data, tried(Spring(joint=2, degree=1, highest=1), 2), tried(TorqueOffset(joint=2), 1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 def test_a_slow_wander_makes_no_spring_of_an_offset(seed: int) -> None:
     assert hypotheses._beyond(*_line_and_offset(seed, 0.0)) < 3.0

@@ -129,6 +129,7 @@ def test_a_drift_that_is_seen_only_at_its_beginning_has_numbers_that_can_be() ->
     assert gone == pytest.approx(0.012 * end, rel=0.15)
 
 
+@pytest.mark.slow
 def test_an_event_belongs_to_its_log() -> None:
     """A push at the tip for 0.3 s in the second of two logs is found there, at its time."""
     def push(motion: Motion) -> np.ndarray:  # type: ignore[type-arg]
