@@ -119,8 +119,7 @@ class Later:
                     model, theta, residual, now = tried, theta + base, left, cost
                     break
             gained = before - now
-            linear = all(one.effect.adds and not one.free_shapes for one in model.effects)
-            if gained < 2.0 + _SETTLED * now or linear:
+            if gained < 2.0 + _SETTLED * now:
                 break
         slopes, _ = self._slopes(model)
         effects = slopes.scaled(1.0 / _unit(slopes.norms))
@@ -132,9 +131,10 @@ class Later:
         both = Table.stacked([self.base, state.effects])
         cross = np.concatenate([self.cross, state.effects.gram(self.candidates)])
         info = self._information(state.info, state.effects)
-        assert len(info) == both.width
-        return screen(self.dictionary.groups, info, cross, self.squares,
-                      self.candidates.moments(state.residual))
+        slope = np.r_[state.moment - state.info @ state.theta, np.zeros(state.effects.width)]
+        slope += both.moments(state.residual)  # zero where the fit has settled
+        moments = self.candidates.moments(state.residual) - cross.T @ np.linalg.solve(info, slope)
+        return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""

@@ -138,7 +138,7 @@ def _refitted(later: Later, state: State, significant: dict[Key, Screened], base
     for acting in responses:
         effect = acting.effect.at(acting.values)
         out.append(_candidate(later, state, (effect.name, effect.joint), max(top, 1.0), effect,
-                              effect.amplitudes(acting.values), held=effect.free))
+                              effect.amplitudes(acting.values)))
     return [one for one in out if one is not None and one.possible]
 
 
