@@ -28,15 +28,35 @@ def diagnosed(folder: Path, exclude: Sequence[str] = ()) -> Diagnosis:
 def answer(folder: Path, exclude: tuple[str, ...]) -> dict[str, Any]:
     """Return the fields of `rrrid diagnose --json` that the judge of `hidden_effects` reads."""
     found = diagnosed(folder, exclude)
-    verdict = "nothing-wrong" if found.decision.verdict == "no-fault-found" else found.decision.verdict
-    nothing: dict[str, Any] = {"validate_torque_rms": {"after": []}, "simulation": "none", "simulated_position_rms": None}
+    verdict = (
+        "nothing-wrong" if found.decision.verdict == "no-fault-found" else found.decision.verdict
+    )
+    nothing: dict[str, Any] = {
+        "validate_torque_rms": {"after": []},
+        "simulation": "none",
+        "simulated_position_rms": None,
+    }
     effects = found.selection.end.model.effects
-    findings = [{"cause": cause.key[0], "joint": cause.key[1], "gain": nothing,
-                 "rivals": [{"cause": name, "joint": joint} for name, joint in cause.alternatives],
-                 "parameters": {name: {"value": value, "std": None} for name, value in one.values.items()}}
-                for cause, one in zip(found.decision.causes, effects, strict=False)]
-    return {"verdict": verdict, "reason": found.decision.reason, "findings": findings, "standing": [],
-            "not_testable": [], "residual_rms": {"floor": []}}
+    findings = [
+        {
+            "cause": cause.key[0],
+            "joint": cause.key[1],
+            "gain": nothing,
+            "rivals": [{"cause": name, "joint": joint} for name, joint in cause.alternatives],
+            "parameters": {
+                name: {"value": value, "std": None} for name, value in one.values.items()
+            },
+        }
+        for cause, one in zip(found.decision.causes, effects, strict=False)
+    ]
+    return {
+        "verdict": verdict,
+        "reason": found.decision.reason,
+        "findings": findings,
+        "standing": [],
+        "not_testable": [],
+        "residual_rms": {"floor": []},
+    }
 
 
 def main(root: Path) -> None:
@@ -46,8 +66,12 @@ def main(root: Path) -> None:
         found = diagnosed(root / name)
         truth = [f"{one['cause']}:{one['joint']}" for one in known["truth"]] or [known["kind"]]
         causes = [(cause.key, cause.alternatives) for cause in found.decision.causes]
-        print(f"{name} {'+'.join(truth):24} {found.decision.verdict:14} {causes} {found.decision.reason} "
-              f"{time.process_time() - begun:.0f} s", flush=True)
+        print(
+            f"{name} {'+'.join(truth):24} {found.decision.verdict:14} {causes} "
+            f"{found.decision.reason} "
+            f"{time.process_time() - begun:.0f} s",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -5,14 +5,14 @@
     dictionary.table(rows)                 the columns over some rows
 
 A group is what is screened at once: one shape of one cause at one joint. Groups without a name are
-splines of the position, speed and torque of a joint, and ripple of its drive, of any order: where one
-of these predicts better than every cause, the cause is not known.
+splines of the position, speed and torque of a joint, and ripple of its drive, of any order: where
+one of these predicts better than every cause, the cause is not known.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -34,7 +34,9 @@ __all__ = ["Dictionary", "Group", "Key", "Kind"]
 
 Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
-Kind = Literal["named", "compliance", "unnamed"]  # of compliance rows show the class, responses the cause
+Kind = Literal[
+    "named", "compliance", "unnamed"
+]  # of compliance rows show the class, responses the cause
 
 
 @dataclass(frozen=True)
@@ -63,7 +65,9 @@ class Dictionary:
     later: Table
 
     @classmethod
-    def of(cls, dataset: Dataset, config: DiagnosisConfig, exclude: Sequence[str] = ()) -> Dictionary:
+    def of(
+        cls, dataset: Dataset, config: DiagnosisConfig, exclude: Sequence[str] = ()
+    ) -> Dictionary:
         """Return every candidate, with its columns over the reference and the later rows."""
         found = _families(dataset, exclude)
         plain = _unnamed(dataset, config)
@@ -92,10 +96,7 @@ def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
     motion = whole_motion(dataset.later.data)
     found = {}
     for family in families(dataset.model.columns.laws, motion, dataset.arm, exclude):
-        shapes = family.shapes
-        if hasattr(shapes[0], "since"):  # a joint that is warm stays warm in the next log
-            shapes = tuple(replace(shape, since=dataset.session_start)  # type: ignore[call-arg]
-                           for shape in shapes)
+        shapes = tuple(shape.in_session(dataset.session_start) for shape in family.shapes)
         found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
     for kind in all_effects():  # what base parameters absorb without a reference
         if kind.evidence == "base parameters" and kind.name not in exclude:
@@ -116,8 +117,16 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
         parts.append(rows.table(columns))
         for k in range(shapes):
             number = laid.first + k
-            groups.append(Group((family.cause, family.joint), number, seen, width,
-                                _standing(family, number), kind))
+            groups.append(
+                Group(
+                    (family.cause, family.joint),
+                    number,
+                    seen,
+                    width,
+                    _standing(family, number),
+                    kind,
+                )
+            )
             seen += width
 
 
@@ -146,14 +155,16 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
         low, high = float(every.min()), float(every.max())
         knots = np.r_[[low] * 3, np.linspace(low, high, config.knots - 2), [high] * 3]
         inside = high - 1e-9 * (high - low)
-        return lambda motion: np.asarray(BSpline.design_matrix(
-            np.clip(signal(kind, motion, j), low, inside), knots, 3).toarray())
+        return lambda motion: np.asarray(
+            BSpline.design_matrix(np.clip(signal(kind, motion, j), low, inside), knots, 3).toarray()
+        )
 
     def ripple(order: int, j: int) -> Make:
         def make(motion: Motion) -> Array:
             angle = order * motion.q[:, j]
             waves = np.stack([np.sin(angle), np.cos(angle)], 1)
             return np.asarray(signal("tau", motion, j)[:, None] * waves)
+
         return make
 
     for j in range(dataset.later.n_joints):

@@ -11,7 +11,9 @@ __all__ = ["DiagnosisConfig"]
 class DiagnosisConfig:
     """All deciding numbers of the diagnosis; `benchmarks.diagnosis` varies each by ½ and 2."""
 
-    cutoff_hz: float = 25.0  # zero-phase low-pass of all rows: above it quantised positions dominate
+    cutoff_hz: float = (
+        25.0  # zero-phase low-pass of all rows: above it quantised positions dominate
+    )
     alpha: float = 0.01  # family-wise error of screening, all candidates together
     set_alpha: float = 0.05  # of the model confidence set (Hansen, Lunde & Nason 2011)
     block: float = 1.0  # [s] blocks of the predictive score, longer than the low-pass remembers
@@ -27,4 +29,9 @@ class DiagnosisConfig:
     ripple_orders: int = 24  # [1/rev] of torque-proportional ripple in the standing dictionary
     knots: int = 10  # of the splines without a name
     event_candidates: int = 600  # windows that a search for a contact compares
-    excess: float = 1.5  # mean square residual of a joint over the baseline's, from which it is too large
+    share: float = (
+        0.5  # of the excess residual, that causes have to explain where the rest does not fit
+    )
+    excess: float = (
+        1.5  # mean square residual of a joint over the baseline's, from which it is too large
+    )

@@ -1,17 +1,17 @@
-"""Rows of a session and of its reference, whitened and weighted, and the model they are explained by.
+"""Rows of a session and of its reference, whitened and weighted, and their nominal model.
 
     dataset = load(logs, config)
     dataset.later.y, dataset.later.nominal        the rows that are diagnosed
     dataset.reference                             the rows of role "reference"
 
-The noise covariance Σ is one: an autoregressive model of each joint's reference residual, by which all
-rows pass (Aitken 1935), and its standard deviation, in units of which they are then expressed.
+The noise covariance Σ is one: an autoregressive model of each joint's reference residual, by which
+all rows pass (Aitken 1935), and its standard deviation, in units of which they are expressed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -77,7 +77,7 @@ class Rows:
         return self.signal(model.torque(self.data))
 
     def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
-        """Return the slopes of the model's torque by the numbers of its effects, and their names."""
+        """Return the slopes of the torque by the numbers of the effects, and their names."""
         every, names = slopes_of(model, self.data, rigid_rows(self.data, model.columns))
         first = len(model.beta)
         places = [k for k, name in enumerate(names) if name[0] == 1]
@@ -121,8 +121,11 @@ def load(logs: Sequence[ExperimentLog], config: DiagnosisConfig) -> Dataset:
     """
     roles = Logs.by_role(logs)
     if not roles.reference:
-        raise InputRejected("S01", "no log of role 'reference'", remedy="record the arm before, or name "
-                         "an earlier recording with that role")
+        raise InputRejected(
+            "S01",
+            "no log of role 'reference'",
+            remedy="record the arm before, or name an earlier recording with that role",
+        )
     ready = prepare(roles, DiagnosisSettings(cutoff_hz=config.cutoff_hz))
     assert ready.reference is not None
     columns, fit = fit_nominal(ready.reference, ready.columns)
@@ -135,11 +138,20 @@ def load(logs: Sequence[ExperimentLog], config: DiagnosisConfig) -> Dataset:
     table, shapes = _nominal(reference, columns, model.beta)
     weight = 1.0 / fit_columns(reference, table).rms
     later_table, _ = _nominal(later, columns, model.beta)
-    plain = [Rows(data, columns, weight, Table.of(t * weight[data.joint], data.joint, data.n_joints))
-             for data, t in ((reference, table), (later, later_table))]
+    plain = [
+        Rows(data, columns, weight, Table.of(t * weight[data.joint], data.joint, data.n_joints))
+        for data, t in ((reference, table), (later, later_table))
+    ]
     start = min(float(one.motion.t[0]) for one in later.logs)
-    return Dataset(model, plain[0], plain[1], tuple(range(len(own), len(own) + len(judged))),
-                   tuple(shapes), roles.frf, start)
+    return Dataset(
+        model,
+        plain[0],
+        plain[1],
+        tuple(range(len(own), len(own) + len(judged))),
+        tuple(shapes),
+        roles.frf,
+        start,
+    )
 
 
 def _nominal(data: Data, columns: Columns, beta: Array) -> tuple[Array, list[tuple[int, str]]]:
@@ -147,13 +159,13 @@ def _nominal(data: Data, columns: Columns, beta: Array) -> tuple[Array, list[tup
     return np.concatenate([rows_of(data, columns), *slopes]), shapes
 
 
-def moved(model: Exact, base: Array, names: Sequence[tuple[int, str]], effects: Array,
-          effect_names: Sequence[tuple[int, int, str]]) -> Exact:
+def moved(
+    model: Exact,
+    base: Array,
+    names: Sequence[tuple[int, str]],
+    effects: Array,
+    effect_names: Sequence[tuple[int, int, str]],
+) -> Exact:
     """Return the model with its nominal numbers moved by `base` and its effects' by `effects`."""
     laws = [(0, place, name) for place, name in names]
     return model.moved(np.concatenate([base, effects]), [*laws, *effect_names])
-
-
-def without_effects(model: Exact) -> Exact:
-    """Return the nominal model alone."""
-    return replace(model, effects=())

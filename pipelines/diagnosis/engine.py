@@ -29,8 +29,11 @@ class Diagnosis:
     baseline: Baseline
 
 
-def diagnose(logs: Sequence[ExperimentLog], config: DiagnosisConfig | None = None,
-             exclude: Sequence[str] = ()) -> Diagnosis:
+def diagnose(
+    logs: Sequence[ExperimentLog],
+    config: DiagnosisConfig | None = None,
+    exclude: Sequence[str] = (),
+) -> Diagnosis:
     """Return what has changed since the reference logs.
 
     Args:
@@ -44,7 +47,9 @@ def diagnose(logs: Sequence[ExperimentLog], config: DiagnosisConfig | None = Non
     dictionary = Dictionary.of(dataset, config, exclude)
     prior = reference_prior(dataset, dictionary, config)
     later = Later.of(dataset, dictionary, prior, config)
-    known = baseline(dataset, dictionary, prior, event_threshold(dataset, dictionary, prior, config), config)
+    known = baseline(
+        dataset, dictionary, prior, event_threshold(dataset, dictionary, prior, config), config
+    )
     responses = compliance(dataset.frf, dataset.model.nominal, exclude)
     found = select(later, known, responses.named if responses else (), config)
     return Diagnosis(decide(later, found, known, config), found, known)

@@ -1,6 +1,6 @@
 """Find the window in which a push on the tip explains most of a residual.
 
-    window = best_window(rows, dictionary, arm, residual, noise)
+window = best_window(rows, dictionary, arm, residual, noise)
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ class Window:
     log: int
 
 
-def best_window(rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array],
-                noise: float) -> Window | None:
+def best_window(
+    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], noise: float
+) -> Window | None:
     """Return the best window on a residual (rows of each joint) in units of the noise."""
     data, best = rows.data, None
     if dictionary.event is None:
@@ -42,7 +43,7 @@ def best_window(rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence
     weight = rows.weight * noise**-0.5
     first = 0
     for place, one in enumerate(data.logs):
-        own = np.stack([r[first:first + one.rows] for r in residual])
+        own = np.stack([r[first : first + one.rows] for r in residual])
         first += one.rows
         torque = own / weight[:, None]
         full = np.stack([np.interp(one.motion.t, one.t, v) for v in torque], axis=1)
@@ -56,7 +57,9 @@ def best_window(rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence
     return best
 
 
-def event_threshold(dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig) -> float:
+def event_threshold(
+    dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
+) -> float:
     """Return the gain that a window exceeds with probability alpha where nothing touched the arm.
 
     The largest of m independent windows has a known law; what the reference exceeds it by is the
@@ -68,7 +71,9 @@ def event_threshold(dataset: Dataset, dictionary: Dictionary, prior: Prior, conf
     info, moment = prior.precision + sum(prior.grams), sum(prior.moments)
     mean = np.asarray(np.linalg.solve(info, moment), dtype=np.float64)
     table = prior.table(rows.nominal, dictionary.reference)
-    residual = tuple(y * prior.noise**-0.5 - t for y, t in zip(rows.y, table.times(mean), strict=True))
+    residual = tuple(
+        y * prior.noise**-0.5 - t for y, t in zip(rows.y, table.times(mean), strict=True)
+    )
     found = best_window(rows, dictionary, dataset.arm, residual, prior.noise)
     usual = float(chi2.isf(-np.expm1(np.log(0.5) / config.event_candidates), _DIRECTIONS))
     dispersion = max(1.0, (found.gain if found else 0.0) / usual)

@@ -4,8 +4,8 @@
     prior.of(parts)                        information of the numbers of later logs
 
 Nominal numbers b have a flat prior in the reference. Standing numbers s_g ~ N(0, τ_g), with τ_g by
-empirical Bayes: expectation maximisation, each group shrunk to its family (Efron & Morris 1973). The
-prior of later logs is the posterior N(m, V) of the reference, plus what may drift between sessions
+empirical Bayes: expectation maximisation, each group shrunk to its family (Efron & Morris 1973).
+The prior of later logs is the posterior N(m, V) of the reference, plus what may drift between sessions
 without a fault: friction, by a relative standard deviation; rigid-body numbers not at all.
 """
 
@@ -35,7 +35,9 @@ class Prior:
     standing: Indices  # columns of the dictionary
     precision: Array  # (k, k) of the numbers before any log
     drift: Array  # (k,) variance between sessions
-    parts: tuple[tuple[np.ndarray, ...], ...]  # masks (rows,) of each joint, for each part of the reference
+    parts: tuple[
+        tuple[np.ndarray, ...], ...
+    ]  # masks (rows,) of each joint, for each part of the reference
     grams: tuple[Array, ...]  # (k, k) of each part
     moments: tuple[Array, ...]
 
@@ -74,14 +76,23 @@ def reference_prior(dataset: Dataset, dictionary: Dictionary, config: DiagnosisC
     grams = np.array([table.gram(table, part) for part in parts])
     moments = np.array([table.moments(rows.y, part) for part in parts])
     power = sum(float(y @ y) for y in rows.y)
-    tau, noise = _components(grams.sum(axis=0), moments.sum(axis=0), power, rows.count, groups, len(scale), config)
+    tau, noise = _components(
+        grams.sum(axis=0), moments.sum(axis=0), power, rows.count, groups, len(scale), config
+    )
     n_nominal = len(scale)
     keep = np.flatnonzero(np.r_[np.ones(n_nominal, bool), tau.variance > _LEAST_VARIANCE])
     precision = np.diag(np.r_[tau.flat, tau.mean_square / tau.variance][keep])
     at = np.ix_(keep, keep)
-    return Prior(scale, noise, columns[keep[n_nominal:] - n_nominal], precision,
-                 _drift(dataset, scale, len(keep), config), parts,
-                 tuple(gram[at] / noise for gram in grams), tuple(m[keep] / noise for m in moments))
+    return Prior(
+        scale,
+        noise,
+        columns[keep[n_nominal:] - n_nominal],
+        precision,
+        _drift(dataset, scale, len(keep), config),
+        parts,
+        tuple(gram[at] / noise for gram in grams),
+        tuple(m[keep] / noise for m in moments),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,8 +102,15 @@ class _Components:
     variance: Array  # (standing,) τ_g of a row
 
 
-def _components(gram: Array, moment: Array, power: float, rows: int, groups: list[Group],
-                n_nominal: int, config: DiagnosisConfig) -> tuple[_Components, float]:
+def _components(
+    gram: Array,
+    moment: Array,
+    power: float,
+    rows: int,
+    groups: list[Group],
+    n_nominal: int,
+    config: DiagnosisConfig,
+) -> tuple[_Components, float]:
     """Return the variance of each standing column, and that of the noise, by EM."""
     own = np.concatenate([np.full(g.width, k) for k, g in enumerate(groups)])
     names = list(dict.fromkeys(_family(g) for g in groups))
@@ -106,7 +124,7 @@ def _components(gram: Array, moment: Array, power: float, rows: int, groups: lis
         covariance = np.linalg.inv(gram / noise + np.diag(precision))
         mean = covariance @ (moment / noise)
         spread = np.diag(covariance)
-        energy = (mean[n_nominal:]**2 + spread[n_nominal:]) * mean_square
+        energy = (mean[n_nominal:] ** 2 + spread[n_nominal:]) * mean_square
         of_family = np.bincount(family, energy) / per_family
         pooled = np.bincount(own, energy)[own] + config.variance_prior * of_family[family]
         tau = np.maximum(pooled / (per_group[own] + config.variance_prior), 1e-12)
@@ -124,8 +142,8 @@ def _drift(dataset: Dataset, scale: Array, size: int, config: DiagnosisConfig) -
     """Return the variance between sessions of each scaled number: friction drifts."""
     beta, rigid = dataset.model.beta, len(dataset.model.columns.kept)
     out = np.zeros(size)
-    out[rigid:len(beta)] = (config.friction_drift * beta[rigid:] * scale[rigid:len(beta)])**2
-    out[len(beta):len(scale)] = (config.friction_drift * scale[len(beta):])**2
+    out[rigid : len(beta)] = (config.friction_drift * beta[rigid:] * scale[rigid : len(beta)]) ** 2
+    out[len(beta) : len(scale)] = (config.friction_drift * scale[len(beta) :]) ** 2
     return out
 
 
@@ -136,6 +154,8 @@ def _halves(dataset: Dataset) -> tuple[tuple[np.ndarray, ...], ...]:
     for k in range(len(data.logs)):
         own = data.log_of == k
         late = data.t > np.median(data.t[own])
-        out += [tuple((own & (late == half))[data.joint == j] for j in range(data.n_joints))
-                for half in (False, True)]
+        out += [
+            tuple((own & (late == half))[data.joint == j] for j in range(data.n_joints))
+            for half in (False, True)
+        ]
     return tuple(out)

@@ -1,8 +1,8 @@
 """Exact fits to the later rows: Gauss-Newton under the prior, and the block-wise predictive score.
 
-    later = Later.of(dataset, dictionary, prior)
-    state = later.start(config)
-    state = later.fit(state.with_effect(...))
+later = Later.of(dataset, dictionary, prior)
+state = later.start(config)
+state = later.fit(state.with_effect(...))
 """
 
 from __future__ import annotations
@@ -41,6 +41,9 @@ class State:
     moment: Array  # A m
     residual: tuple[Array, ...]  # of each joint, in units of the noise
     effects: Table  # slopes by the numbers of the effects, of unit length
+    lasting: (
+        Indices  # of these, numbers that hold for all time; those of an event hold for its moment
+    )
     losses: Array  # (blocks,) squared error of each block, predicted from all others
 
     @property
@@ -69,7 +72,9 @@ class Later:
     block: tuple[Indices, ...]  # of each joint's rows
 
     @classmethod
-    def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig) -> Later:
+    def of(
+        cls, dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
+    ) -> Later:
         rows, unit = dataset.later, prior.noise**-0.5
         base = prior.table(rows.nominal, dictionary.later)
         table = dictionary.later.scaled(np.full(dictionary.later.width, unit))
@@ -77,14 +82,26 @@ class Later:
         for group in dictionary.groups:
             own = table.take(group.columns)
             squares.append(own.gram(own))
-        return cls(rows, dictionary, prior, dataset, base, table, base.gram(base), base.gram(table),
-                   tuple(squares), rows.blocks(config.block))
+        return cls(
+            rows,
+            dictionary,
+            prior,
+            dataset,
+            base,
+            table,
+            base.gram(base),
+            base.gram(table),
+            tuple(squares),
+            rows.blocks(config.block),
+        )
 
     @cached_property
     def block_rows(self) -> Array:
         """(blocks,) rows of each, of all joints."""
         count = 1 + max(int(b.max()) for b in self.block if len(b))
-        return np.asarray(sum(np.bincount(b, minlength=count) for b in self.block), dtype=np.float64)
+        return np.asarray(
+            sum(np.bincount(b, minlength=count) for b in self.block), dtype=np.float64
+        )
 
     @cached_property
     def y(self) -> tuple[Array, ...]:
@@ -95,10 +112,12 @@ class Later:
         info, moment = self.prior.of(range(len(self.prior.parts)))
         theta = np.zeros(self.base.width)
         model = self.dataset.model
-        theta[:len(model.beta)] = model.beta * self.prior.scale[:len(model.beta)]
+        theta[: len(model.beta)] = model.beta * self.prior.scale[: len(model.beta)]
         return self.fit(model, theta, info, moment)
 
-    def fit(self, model: Exact, theta: Array, info: Array, moment: Array, steps: int = _STEPS) -> State:
+    def fit(
+        self, model: Exact, theta: Array, info: Array, moment: Array, steps: int = _STEPS
+    ) -> State:
         """Return the model with all its numbers fitted; those of effects have no prior."""
         residual = self._residual(model, theta)
         now = self._cost(residual, theta, info, moment)
@@ -106,12 +125,14 @@ class Later:
             slopes, names = self._slopes(model)
             size = _unit(slopes.norms)
             unit = slopes.scaled(1.0 / size)
-            gradient = np.r_[moment - info @ theta + self.base.moments(residual), unit.moments(residual)]
+            gradient = np.r_[
+                moment - info @ theta + self.base.moments(residual), unit.moments(residual)
+            ]
             step = np.linalg.solve(self._information(info, unit), gradient)
             before = now
             for share in _SHARES:
-                base, more = share * step[:len(theta)], share * step[len(theta):] / size
-                own = base[:self.prior.n_nominal] / self.prior.scale
+                base, more = share * step[: len(theta)], share * step[len(theta) :] / size
+                own = base[: self.prior.n_nominal] / self.prior.scale
                 tried = moved(model, own, self.dataset.law_names, more, names)
                 left = self._residual(tried, theta + base)
                 cost = self._cost(left, theta + base, info, moment)
@@ -121,9 +142,10 @@ class Later:
             gained = before - now
             if gained < 2.0 + _SETTLED * now:
                 break
-        slopes, _ = self._slopes(model)
+        slopes, names = self._slopes(model)
         effects = slopes.scaled(1.0 / _unit(slopes.norms))
-        state = State(model, theta, info, moment, residual, effects, np.zeros(0))
+        lasting = np.flatnonzero([model.effects[place].log is None for _, place, _ in names])
+        state = State(model, theta, info, moment, residual, effects, lasting, np.zeros(0))
         return replace(state, losses=self.losses(state))
 
     def screened(self, state: State) -> list[Screened]:
@@ -140,18 +162,34 @@ class Later:
         """Return the state with further columns, fitted linearly."""
         more = Table.stacked([state.effects, columns.scaled(1.0 / _unit(columns.norms))])
         info = self._information(state.info, more)
-        gradient = np.r_[state.moment - state.info @ state.theta + self.base.moments(state.residual),
-                         more.moments(state.residual)]
+        gradient = np.r_[
+            state.moment - state.info @ state.theta + self.base.moments(state.residual),
+            more.moments(state.residual),
+        ]
         step = np.asarray(np.linalg.solve(info, gradient), dtype=np.float64)
         torque = Table.stacked([self.base, more]).times(step)
         residual = tuple(r - t for r, t in zip(state.residual, torque, strict=True))
-        there = replace(state, theta=state.theta + step[:len(state.theta)], residual=residual, effects=more)
+        lasting = np.append(state.lasting, np.arange(state.effects.width, more.width))
+        there = replace(
+            state,
+            theta=state.theta + step[: len(state.theta)],
+            residual=residual,
+            effects=more,
+            lasting=lasting,
+        )
         return replace(there, losses=self.losses(there))
 
     def losses(self, state: State) -> Array:
-        """Return the squared error (blocks,) of each block, predicted from all others and the prior."""
-        columns = Table.stacked([self.base, state.effects])
-        return block_losses(columns, self._information(state.info, state.effects), state.residual, self.block)
+        """Return the squared error (blocks,) of each block, predicted from all the others.
+
+        The numbers of an event cannot be predicted from other times: they are taken as known, and
+        the selection charges them.
+        """
+        lasting = state.effects.take(state.lasting)
+        columns = Table.stacked([self.base, lasting])
+        return block_losses(
+            columns, self._information(state.info, lasting), state.residual, self.block
+        )
 
     def freed(self, state: State, effect: Effect) -> tuple[Array, Array]:
         """Return the prior free along base parameters that the effect moves by unknown numbers."""
@@ -160,7 +198,7 @@ class Later:
             return state.info, state.moment
         kept = list(self.dataset.model.columns.kept)
         along = np.zeros((len(state.info), directions.shape[1]))
-        along[:len(kept)] = directions[kept] * self.prior.scale[:len(kept), None]
+        along[: len(kept)] = directions[kept] * self.prior.scale[: len(kept), None]
         along = along[:, np.linalg.norm(along, axis=0) > 0.0]
         along = along / np.linalg.norm(along, axis=0)
         side = state.info @ along
@@ -183,10 +221,12 @@ class Later:
 
     def _residual(self, model: Exact, theta: Array) -> tuple[Array, ...]:
         standing = theta.copy()
-        standing[:self.prior.n_nominal] = 0.0
+        standing[: self.prior.n_nominal] = 0.0
         torque, unit = self.rows.torque(model), self.prior.noise**-0.5
-        return tuple(y - unit * t - s for y, t, s in
-                     zip(self.y, torque, self.base.times(standing), strict=True))
+        return tuple(
+            y - unit * t - s
+            for y, t, s in zip(self.y, torque, self.base.times(standing), strict=True)
+        )
 
     def _cost(self, residual: tuple[Array, ...], theta: Array, info: Array, moment: Array) -> float:
         return float(sum(r @ r for r in residual) + theta @ info @ theta - 2.0 * moment @ theta)

@@ -4,8 +4,9 @@
     log_scores(losses, rows)            of each block, its noise level unknown
     confidence_set({key: scores})       the models that the data do not tell from the best
 
-A block predicted from all others leaves e_b = (I - J_bᵀ P⁻¹ J_b)⁻¹ r_b, exact for a linear model: J are
-the slopes by all numbers, P their information with the prior, r the residual of the fit to all rows.
+A block predicted from all others leaves e_b = (I - J_bᵀ P⁻¹ J_b)⁻¹ r_b, exact for a linear model:
+J are the slopes by all numbers, P their information with the prior, r the residual of the fit to
+all rows.
 Hansen, Lunde & Nason 2011, statistic T_max, with a moving-block bootstrap (Künsch 1989).
 """
 
@@ -26,7 +27,9 @@ K = TypeVar("K", bound=Hashable)
 _SEED = 1
 
 
-def block_losses(columns: Table, info: Array, residual: Sequence[Array], block: Sequence[Indices]) -> Array:
+def block_losses(
+    columns: Table, info: Array, residual: Sequence[Array], block: Sequence[Indices]
+) -> Array:
     """Return the squared error (blocks,) of each block of rows, predicted from all other blocks.
 
     Args:
@@ -38,18 +41,23 @@ def block_losses(columns: Table, info: Array, residual: Sequence[Array], block: 
     from scipy.linalg import solve_triangular
 
     factor = np.linalg.cholesky(info)
-    whole = [solve_triangular(factor, columns.dense(j), lower=True, check_finite=False)
-             for j in range(len(residual))]
+    whole = [
+        solve_triangular(factor, columns.dense(j), lower=True, check_finite=False)
+        for j in range(len(residual))
+    ]
     count = 1 + max(int(b.max()) for b in block if len(b))
     order = [np.argsort(b, kind="stable") for b in block]
     edges = [np.searchsorted(b[o], np.arange(count + 1)) for b, o in zip(block, order, strict=True)]
     out = np.zeros(count)
     for b in range(count):
-        own = [o[e[b]:e[b + 1]] for o, e in zip(order, edges, strict=True)]
+        own = [o[e[b] : e[b + 1]] for o, e in zip(order, edges, strict=True)]
         w = np.concatenate([v[:, rows] for v, rows in zip(whole, own, strict=True)], axis=1)
         r = np.concatenate([v[rows] for v, rows in zip(residual, own, strict=True)])
-        error = (np.linalg.solve(np.eye(len(r)) - w.T @ w, r) if len(r) < len(w) else
-                 r + w.T @ np.linalg.solve(np.eye(len(w)) - w @ w.T, w @ r))
+        error = (
+            np.linalg.solve(np.eye(len(r)) - w.T @ w, r)
+            if len(r) < len(w)
+            else r + w.T @ np.linalg.solve(np.eye(len(w)) - w @ w.T, w @ r)
+        )
         out[b] = float(error @ error)
     return out
 
@@ -66,7 +74,9 @@ def confidence_set(scores: Mapping[K, Array], config: DiagnosisConfig) -> list[K
     blocks, length = table.shape[1], min(config.blocks_together, table.shape[1])
     rng = np.random.default_rng(_SEED)
     starts = rng.integers(0, blocks, (config.resamples, -(-blocks // length)))
-    drawn = (starts[:, :, None] + np.arange(length)).reshape(config.resamples, -1)[:, :blocks] % blocks
+    drawn = (starts[:, :, None] + np.arange(length)).reshape(config.resamples, -1)[
+        :, :blocks
+    ] % blocks
     resampled, mean = table[:, drawn].mean(axis=2), table.mean(axis=1)
     alive = list(range(len(keys)))
     while len(alive) > 1:

@@ -38,8 +38,9 @@ class Screened:
     amplitudes: Array
 
 
-def screen(groups: Sequence[Group], info: Array, cross: Array, own: Sequence[Array],
-           moments: Array) -> list[Screened]:
+def screen(
+    groups: Sequence[Group], info: Array, cross: Array, own: Sequence[Array], moments: Array
+) -> list[Screened]:
     """Return T_c of every group.
 
     Args:
@@ -95,50 +96,95 @@ class Baseline:
         return chi2_bound(self.alpha / self.families, freedom) + rows * self.bias[kind]
 
 
-def baseline(dataset: Dataset, dictionary: Dictionary, prior: Prior, event: float,
-             config: DiagnosisConfig) -> Baseline:
+def baseline(
+    dataset: Dataset, dictionary: Dictionary, prior: Prior, event: float, config: DiagnosisConfig
+) -> Baseline:
     """Return what screening and residual are between parts of the reference."""
-    rows, groups = dataset.reference, dictionary.groups
-    unit = prior.noise**-0.5
-    own_table = dictionary.reference.scaled(np.full(dictionary.reference.width, unit))
-    table = prior.table(rows.nominal, dictionary.reference)
-    y = tuple(one * unit for one in rows.y)
-    parts = prior.parts
-    cross = np.array([table.gram(own_table, part) for part in parts])
-    moments = np.array([own_table.moments(y, part) for part in parts])
-    squares = [[own_table.take(g.columns).gram(own_table.take(g.columns), part) for g in groups]
-               for part in parts]
-    powers = [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
-    counts = [sum(int(m.sum()) for m in part) for part in parts]
-    families = len({g.key for g in groups})
+    parts = _Parts.of(dataset, dictionary, prior)
+    families = len({group.key for group in dictionary.groups})
     excess: dict[str, list[float]] = {"named": [], "compliance": [], "unnamed": []}
     fits: list[float] = []
-    for before, after in _splits(len(parts)):
-        info, moment = prior.of(before)
-        chosen = list(after)
-        gram = np.sum([prior.grams[k] for k in after], axis=0)
-        own = np.sum([prior.moments[k] for k in after], axis=0)
-        mean = np.linalg.solve(info + gram, moment + own)
-        across = cross[chosen].sum(axis=0)
-        found = screen(groups, info + gram, across,
-                       [np.sum([squares[k][i] for k in after], axis=0) for i in range(len(groups))],
-                       moments[chosen].sum(axis=0) - across.T @ mean)
-        n = sum(counts[k] for k in after)
+    for before, after in _splits(len(prior.parts)):
+        found, fit, rows = parts.compared(before, list(after))
+        fits.append(fit)
         for kind, values in excess.items():
-            values.append(max((one.gain - chi2_bound(config.alpha / families, one.freedom)
-                               for one in best_of(found).values() if one.group.kind == kind),
-                              default=0.0) / n)
-        left = sum(powers[k] for k in after) - 2.0 * float(mean @ own) + float(mean @ gram @ mean)
-        fits.append(left / n)
-    return Baseline(config.alpha, families,
-                    {kind: max(0.0, _upper(values, config.alpha)) for kind, values in excess.items()},
-                    _upper(fits, config.alpha), float(np.median(fits)), event)
+            values.append(
+                max(
+                    (
+                        one.gain - chi2_bound(config.alpha / families, one.freedom)
+                        for one in found
+                        if one.group.kind == kind
+                    ),
+                    default=0.0,
+                )
+                / rows
+            )
+    bias = {kind: max(0.0, _upper(values, config.alpha)) for kind, values in excess.items()}
+    return Baseline(
+        config.alpha, families, bias, _upper(fits, config.alpha), float(np.median(fits)), event
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Products of the columns over each part of the reference, in units of the noise."""
+
+    prior: Prior
+    groups: tuple[Group, ...]
+    cross: Array  # (parts, k, columns) B Cᵀ
+    moments: Array  # (parts, columns) C y
+    squares: list[list[Array]]  # of each part and group, C Cᵀ
+    powers: Array  # (parts,) yᵀy
+    counts: Array  # (parts,) rows
+
+    @classmethod
+    def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior) -> _Parts:
+        rows, unit, parts = dataset.reference, prior.noise**-0.5, prior.parts
+        candidates = dictionary.reference.scaled(np.full(dictionary.reference.width, unit))
+        base = prior.table(rows.nominal, dictionary.reference)
+        y = tuple(one * unit for one in rows.y)
+        own = [candidates.take(group.columns) for group in dictionary.groups]
+        return cls(
+            prior,
+            dictionary.groups,
+            np.array([base.gram(candidates, part) for part in parts]),
+            np.array([candidates.moments(y, part) for part in parts]),
+            [[table.gram(table, part) for table in own] for part in parts],
+            np.array(
+                [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
+            ),
+            np.array([sum(int(m.sum()) for m in part) for part in parts], dtype=np.float64),
+        )
+
+    def compared(
+        self, before: tuple[int, ...], after: list[int]
+    ) -> tuple[list[Screened], float, float]:
+        """Return candidates, mean square residual and rows of some parts after others."""
+        info, moment = self.prior.of(before)
+        gram = np.sum([self.prior.grams[k] for k in after], axis=0)
+        own = np.sum([self.prior.moments[k] for k in after], axis=0)
+        mean = np.linalg.solve(info + gram, moment + own)
+        cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
+        squares = [
+            np.sum([self.squares[k][i] for k in after], axis=0) for i in range(len(self.groups))
+        ]
+        found = screen(
+            self.groups,
+            info + gram,
+            cross,
+            squares,
+            self.moments[after].sum(axis=0) - cross.T @ mean,
+        )
+        left = float(self.powers[after].sum() - 2.0 * mean @ own + mean @ gram @ mean)
+        return found, left / rows, rows
 
 
 def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Return splits of the parts into two, half of them each."""
     every = range(parts)
-    out = [(half, tuple(k for k in every if k not in half)) for half in combinations(every, parts // 2)]
+    out = [
+        (half, tuple(k for k in every if k not in half)) for half in combinations(every, parts // 2)
+    ]
     step = max(1, len(out) // _SPLITS)
     return out[::step][:_SPLITS]
 

@@ -1,13 +1,13 @@
 """Select causes: forward by the predictive score, a confidence set at each round, then backward.
 
-    selection = select(later, baseline, responses, config)
-    selection.causes              each with its alternatives and its probability
-    selection.stopped             why the search ended, where it did not for lack of anything left
+selection = select(later, baseline, responses, config)
+selection.causes              each with its alternatives
+selection.stopped             why the search ended, where it did not for lack of anything left
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,8 +24,6 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["Cause", "Selection", "select"]
 
-_EVENT_FREEDOM = 5  # start, duration, three components of a force
-
 
 @dataclass(frozen=True)
 class Candidate:
@@ -34,11 +32,22 @@ class Candidate:
     key: Key
     gain: float  # of screening
     state: State
-    numbers: int  # that it adds to the model
+
+    @property
+    def numbers(self) -> int:
+        """Numbers that it adds to the model."""
+        return self.state.model.effects[-1].count
+
+    @property
+    def event(self) -> bool:
+        """True for a cause of one moment in one log."""
+        return self.state.model.effects[-1].log is not None
 
     @property
     def possible(self) -> bool:
-        return bool(self.state.model.effects[-1].possible) and bool(np.isfinite(self.state.losses).all())
+        return bool(self.state.model.effects[-1].possible) and bool(
+            np.isfinite(self.state.losses).all()
+        )
 
 
 @dataclass(frozen=True)
@@ -47,7 +56,6 @@ class Cause:
 
     key: Key
     alternatives: tuple[Key, ...]
-    probability: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +77,9 @@ class _Round:
     stopped: str = ""
 
 
-def select(later: Later, baseline: Baseline, responses: Sequence[Acting], config: DiagnosisConfig) -> Selection:
+def select(
+    later: Later, baseline: Baseline, responses: Sequence[Acting], config: DiagnosisConfig
+) -> Selection:
     """Return the causes that explain the later rows.
 
     Args:
@@ -79,57 +89,114 @@ def select(later: Later, baseline: Baseline, responses: Sequence[Acting], config
     causes: list[Cause] = []
     stopped = ""
     while len(causes) < config.causes:
-        found = _round(later, start, state, causes, baseline, responses if not causes else (), config)
+        found = _round(
+            later, start, state, causes, baseline, responses if not causes else (), config
+        )
         stopped = found.stopped
         if found.cause is None or found.state is None:
             break
         causes.append(found.cause)
         state = found.state
-    causes, state = _backward(later, causes, start, state, baseline, config)
+    causes, state = _backward(later, causes, state, config)
     return Selection(tuple(causes), start, state, stopped)
 
 
-def _round(later: Later, start: State, state: State, causes: Sequence[Cause], baseline: Baseline,
-           responses: Sequence[Acting], config: DiagnosisConfig) -> _Round:
+def _round(
+    later: Later,
+    start: State,
+    state: State,
+    causes: Sequence[Cause],
+    baseline: Baseline,
+    responses: Sequence[Acting],
+    config: DiagnosisConfig,
+) -> _Round:
     """Return the cause that explains most of the residual of `state`, or why none is selected."""
-    best = best_of(later.screened(state))
     relevant = config.relevance**2 * (start.losses.sum() - state.losses.sum())
-    taken = {cause.key for cause in causes}
-    significant = {key: one for key, one in best.items() if key not in taken and one.gain > relevant
-                   and one.gain > baseline.threshold(one.group.kind, one.freedom, later.rows.count)}
-    tried = _refitted(later, state, significant, baseline, responses, config)
-    tried = [one for one in tried if one.gain > relevant and one.state.losses.sum() < state.losses.sum()]
+    significant = _significant(later, state, [cause.key for cause in causes], relevant, baseline)
+    tried = [
+        one
+        for one in _refitted(later, state, significant, baseline, responses, config)
+        if one.gain > relevant and one.state.losses.sum() < state.losses.sum()
+    ]
     others = _unnamed(later, state, significant, bool(responses))
     if not tried:
         return _Round(None, None, f"follows {_place(next(iter(others)))}" if others else "")
+    pick, alternatives, stopped = _contest(later, state, tried, others, config)
+    if pick is None:
+        return _Round(None, None, stopped)
+    return _Round(Cause(pick.key, alternatives), _other_form(later, state, pick))
+
+
+def _significant(
+    later: Later, state: State, taken: Sequence[Key], relevant: float, baseline: Baseline
+) -> dict[Key, Screened]:
+    """Return the candidates above the family-wise threshold, the best shape of each."""
+    rows = later.rows.count
+    return {
+        key: one
+        for key, one in best_of(later.screened(state)).items()
+        if key not in taken
+        and one.gain > relevant
+        and one.gain > baseline.threshold(one.group.kind, one.freedom, rows)
+    }
+
+
+def _contest(
+    later: Later,
+    state: State,
+    tried: Sequence[Candidate],
+    others: Mapping[Key, State],
+    config: DiagnosisConfig,
+) -> tuple[Candidate | None, tuple[Key, ...], str]:
+    """Return the winner of the predictive scores and its alternatives, or why nothing wins."""
     rows, size = later.block_rows, np.log(later.rows.count)
-    scores = {one.key: log_scores(one.state.losses, rows) + _event_price(one.key, later) for one in tried}
+    scores = {
+        one.key: log_scores(one.state.losses, rows) + _event_price(one, later) for one in tried
+    }
     free = {key: log_scores(other.losses, rows) for key, other in others.items()}
     kept = confidence_set(scores | free, config)
-    named = [key for key in kept if key in scores]
+    named = [one for one in tried if one.key in kept]
     if not named:
-        return _Round(None, None, f"{_place(kept[0])} predicts better than {_place(min(scores, key=lambda k: scores[k].sum()))}")
-    before = log_scores(state.losses, rows)
-    numbers = {one.key: one.numbers for one in tried}
-    pick = min(named, key=lambda key: scores[key].sum() + numbers[key] * size)  # BIC
-    pays = confidence_set({"with": scores[pick], "without": before}, config)
-    if "without" in pays and not _event(later, pick):
-        return _Round(None, None, f"{_place(pick)} does not pay on blocks that it was not fitted to")
-    cause = Cause(pick, tuple(key for key in named if key != pick), _probability(pick, scores | free))
-    chosen = next(one for one in tried if one.key == pick)
-    return _Round(cause, _other_form(later, state, chosen))
+        best = min(scores, key=lambda key: scores[key].sum())
+        return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
+    pick = min(named, key=lambda one: scores[one.key].sum() + one.numbers * size)  # BIC
+    pays = confidence_set(
+        {"with": scores[pick.key], "without": log_scores(state.losses, rows)}, config
+    )
+    if "without" in pays and not pick.event:
+        return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
+    return pick, tuple(one.key for one in named if one is not pick), ""
 
 
-def _refitted(later: Later, state: State, significant: dict[Key, Screened], baseline: Baseline,
-              responses: Sequence[Acting], config: DiagnosisConfig) -> list[Candidate]:
+def _refitted(
+    later: Later,
+    state: State,
+    significant: dict[Key, Screened],
+    baseline: Baseline,
+    responses: Sequence[Acting],
+    config: DiagnosisConfig,
+) -> list[Candidate]:
     """Return the most promising causes with all their numbers fitted exactly."""
-    named = sorted((one for one in significant.values() if one.group.kind == "named"),
-                   key=lambda one: -one.gain)[:config.refits]
+    named = sorted(
+        (one for one in significant.values() if one.group.kind == "named"),
+        key=lambda one: -one.gain,
+    )[: config.refits]
     out = []
-    touch = best_window(later.rows, later.dictionary, later.dataset.arm, state.residual, later.prior.noise)
+    touch = best_window(
+        later.rows, later.dictionary, later.dataset.arm, state.residual, later.prior.noise
+    )
     if touch is not None and touch.gain > baseline.event:
-        out.append(_candidate(later, state, (touch.effect.name, None), touch.gain, touch.effect, touch.amplitudes,
-                              log=touch.log))
+        out.append(
+            _candidate(
+                later,
+                state,
+                (touch.effect.name, None),
+                touch.gain,
+                touch.effect,
+                touch.amplitudes,
+                log=touch.log,
+            )
+        )
     top = max([one.gain for one in named], default=0.0)
     for one in named:
         if one.gain > config.promising * top:
@@ -137,34 +204,58 @@ def _refitted(later: Later, state: State, significant: dict[Key, Screened], base
             out.append(_candidate(later, state, one.group.key, one.gain, effect, one.amplitudes))
     for acting in responses:
         effect = acting.effect.at(acting.values)
-        out.append(_candidate(later, state, (effect.name, effect.joint), max(top, 1.0), effect,
-                              effect.amplitudes(acting.values)))
+        out.append(
+            _candidate(
+                later,
+                state,
+                (effect.name, effect.joint),
+                max(top, 1.0),
+                effect,
+                effect.amplitudes(acting.values),
+            )
+        )
     return [one for one in out if one is not None and one.possible]
 
 
-def _candidate(later: Later, state: State, key: Key, gain: float, effect: Effect, amplitudes: Array,
-               log: int | None = None, held: tuple[str, ...] = ()) -> Candidate | None:
-    """Return the cause refitted; None where the fit fails: a failing candidate costs itself alone."""
+def _candidate(
+    later: Later,
+    state: State,
+    key: Key,
+    gain: float,
+    effect: Effect,
+    amplitudes: Array,
+    log: int | None = None,
+) -> Candidate | None:
+    """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
     start = np.zeros(max(len(amplitudes), _width(later, effect)))
-    start[:len(amplitudes)] = amplitudes
+    start[: len(amplitudes)] = amplitudes
     info, moment = later.freed(state, effect)
     try:
-        fitted = later.fit(state.model.with_effect(effect, start, log=log, held=held), state.theta, info, moment)
+        fitted = later.fit(
+            state.model.with_effect(effect, start, log=log), state.theta, info, moment
+        )
     except np.linalg.LinAlgError:
         return None
-    numbers = fitted.model.effects[-1].count + (_EVENT_FREEDOM if log is not None else 0)
-    return Candidate(key, gain, fitted, numbers)
+    return Candidate(key, gain, fitted)
 
 
 def _width(later: Later, effect: Effect) -> int:
     """Return how many amplitudes the effect has, in the form that is refitted."""
     first = later.rows.data.logs[0].motion
-    some = replace(first, t=first.t[:8], q=first.q[:8], dq=first.dq[:8], ddq=first.ddq[:8],
-                   tau=None if first.tau is None else first.tau[:8])
+    some = replace(
+        first,
+        t=first.t[:8],
+        q=first.q[:8],
+        dq=first.dq[:8],
+        ddq=first.ddq[:8],
+        tau=None if first.tau is None else first.tau[:8],
+    )
     return int(effect.columns(some, later.dataset.arm).shape[2])
 
 
-def _unnamed(later: Later, state: State, significant: dict[Key, Screened], responses: bool) -> dict[Key, State]:
+def _unnamed(
+    later: Later, state: State, significant: dict[Key, Screened], responses: bool
+) -> dict[Key, State]:
     """Return the best shape without a name, and, without responses, the best compliance."""
     out = {}
     kinds = ("unnamed",) if responses else ("unnamed", "compliance")
@@ -189,8 +280,9 @@ def _other_form(later: Later, state: State, chosen: Candidate) -> State:
     return best
 
 
-def _backward(later: Later, causes: list[Cause], start: State, end: State, baseline: Baseline,
-              config: DiagnosisConfig) -> tuple[list[Cause], State]:
+def _backward(
+    later: Later, causes: list[Cause], end: State, config: DiagnosisConfig
+) -> tuple[list[Cause], State]:
     """Take out every cause without which the rest predicts as well."""
     rows = later.block_rows
     place = 0
@@ -205,22 +297,11 @@ def _backward(later: Later, causes: list[Cause], start: State, end: State, basel
     return causes, end
 
 
-def _event(later: Later, key: Key) -> bool:
-    return later.dictionary.families[key].event if key in later.dictionary.families else False
-
-
-def _event_price(key: Key, later: Later) -> float:
-    """Return what a window that was searched for costs a block, by BIC."""
-    if not _event(later, key):
-        return 0.0
-    return float(_EVENT_FREEDOM * np.log(later.rows.count) / len(later.block_rows))
-
-
-def _probability(pick: Key, scores: dict[Key, Array]) -> float:
-    """Return the softmax of half the scores at the picked one."""
-    total = np.array([score.sum() for score in scores.values()])
-    weight = np.exp(-0.5 * (total - total.min()))
-    return float(np.exp(-0.5 * (scores[pick].sum() - total.min())) / weight.sum())
+def _event_price(one: Candidate, later: Later) -> float:
+    """Return what the numbers of an event cost a block: their share of BIC."""
+    return (
+        float(one.numbers * np.log(later.rows.count) / len(later.block_rows)) if one.event else 0.0
+    )
 
 
 def _place(key: Key) -> str:

@@ -1,7 +1,7 @@
-"""Columns over the rows of logs, stored joint by joint: no room for a joint on which a column does not act.
+"""Columns over the rows of logs, stored joint by joint, only where they act.
 
-    table = Table.of(columns, joint, n_joints)
-    table.gram(other), table.moments(y), table.times(coefficients)
+table = Table.of(columns, joint, n_joints)
+table.gram(other), table.moments(y), table.times(coefficients)
 """
 
 from __future__ import annotations
@@ -47,10 +47,14 @@ class Table:
         """Return the columns of several tables over the same rows, one behind the other."""
         first = np.cumsum([0, *(table.width for table in tables)])
         joints = range(len(tables[0].index))
-        return cls(int(first[-1]),
-                   tuple(np.concatenate([t.index[j] + f for t, f in zip(tables, first, strict=False)])
-                         for j in joints),
-                   tuple(np.concatenate([t.values[j] for t in tables]) for j in joints))
+        return cls(
+            int(first[-1]),
+            tuple(
+                np.concatenate([t.index[j] + f for t, f in zip(tables, first, strict=False)])
+                for j in joints
+            ),
+            tuple(np.concatenate([t.values[j] for t in tables]) for j in joints),
+        )
 
     def take(self, columns: Indices) -> Table:
         """Return some of the columns, in the order given."""
@@ -58,13 +62,19 @@ class Table:
         place[columns] = np.arange(len(columns))
         kept = [np.flatnonzero(place[index] >= 0) for index in self.index]
         order = [k[np.argsort(place[index[k]])] for k, index in zip(kept, self.index, strict=True)]
-        return Table(len(columns), tuple(place[i[k]] for i, k in zip(self.index, order, strict=True)),
-                     tuple(v[k] for v, k in zip(self.values, order, strict=True)))
+        return Table(
+            len(columns),
+            tuple(place[i[k]] for i, k in zip(self.index, order, strict=True)),
+            tuple(v[k] for v, k in zip(self.values, order, strict=True)),
+        )
 
     def scaled(self, scale: Array) -> Table:
         """Return every column multiplied by its `scale` (k,)."""
-        return Table(self.width, self.index,
-                     tuple(v * scale[i, None] for v, i in zip(self.values, self.index, strict=True)))
+        return Table(
+            self.width,
+            self.index,
+            tuple(v * scale[i, None] for v, i in zip(self.values, self.index, strict=True)),
+        )
 
     @property
     def norms(self) -> Array:

@@ -20,7 +20,7 @@ def rng() -> np.random.Generator:
 
 
 def _problem(rng: np.random.Generator) -> tuple[Array, Array, Array, Array, np.ndarray]:
-    """Known columns, a candidate's columns, torque, prior information, and the joint of each row."""
+    """Known columns, a candidate's, torque, prior information, and the joint of each row."""
     joint = np.repeat(np.arange(_JOINTS), _ROWS // _JOINTS)
     base = rng.normal(size=(_KNOWN, _ROWS))
     base[3, joint != 1] = 0.0  # acts on one joint
@@ -31,12 +31,16 @@ def _problem(rng: np.random.Generator) -> tuple[Array, Array, Array, Array, np.n
 
 def _least_cost(columns: Array, y: Array, info: Array) -> tuple[float, Array]:
     """Return the least ‖y - Cᵀθ‖² + θᵀAθ and where it is."""
-    theta: Array = np.asarray(np.linalg.solve(columns @ columns.T + info, columns @ y), dtype=np.float64)
+    theta: Array = np.asarray(
+        np.linalg.solve(columns @ columns.T + info, columns @ y), dtype=np.float64
+    )
     left = y - columns.T @ theta
     return float(left @ left + theta @ info @ theta), theta
 
 
-def test_screening_is_what_an_exact_refit_with_the_candidate_gains(rng: np.random.Generator) -> None:
+def test_screening_is_what_an_exact_refit_with_the_candidate_gains(
+    rng: np.random.Generator,
+) -> None:
     base, more, y, info, joint = _problem(rng)
     cost, theta = _least_cost(base, y, info)
     wide = np.zeros((_KNOWN + _MORE,) * 2)
@@ -44,8 +48,13 @@ def test_screening_is_what_an_exact_refit_with_the_candidate_gains(rng: np.rando
     together, both = _least_cost(np.concatenate([base, more]), y, wide)
     b, c = (Table.of(x, joint, _JOINTS) for x in (base, more))
     residual = by_joint(y - base.T @ theta, joint, _JOINTS)
-    (found,) = screen([Group(("spring", 3), 0, 0, _MORE, True, "named")], info + b.gram(b), b.gram(c), [c.gram(c)],
-                      c.moments(residual))
+    (found,) = screen(
+        [Group(("spring", 3), 0, 0, _MORE, True, "named")],
+        info + b.gram(b),
+        b.gram(c),
+        [c.gram(c)],
+        c.moments(residual),
+    )
     assert found.gain == pytest.approx(cost - together)
     assert found.amplitudes == pytest.approx(both[_KNOWN:])
     assert found.freedom == _MORE
@@ -56,26 +65,40 @@ def test_a_block_is_predicted_as_by_a_fit_without_it(rng: np.random.Generator) -
     block = np.tile(np.repeat(np.arange(4), _ROWS // _JOINTS // 4), _JOINTS)
     _, theta = _least_cost(base, y, info)
     table = Table.of(base, joint, _JOINTS)
-    losses = block_losses(table, info + table.gram(table), by_joint(y - base.T @ theta, joint, _JOINTS),
-                          [block[joint == j] for j in range(_JOINTS)])
+    losses = block_losses(
+        table,
+        info + table.gram(table),
+        by_joint(y - base.T @ theta, joint, _JOINTS),
+        [block[joint == j] for j in range(_JOINTS)],
+    )
     for b in range(4):
         _, without = _least_cost(base[:, block != b], y[block != b], info)
         left = y[block == b] - base[:, block == b].T @ without
         assert losses[b] == pytest.approx(left @ left)
 
 
-def test_columns_stay_what_they_were_when_chosen_stacked_and_scaled(rng: np.random.Generator) -> None:
+def test_columns_stay_what_they_were_when_chosen_stacked_and_scaled(
+    rng: np.random.Generator,
+) -> None:
     base, more, y, _, joint = _problem(rng)
     table = Table.stacked([Table.of(base, joint, _JOINTS), Table.of(more, joint, _JOINTS)])
     dense = np.concatenate([base, more])
     chosen, factor = np.array([6, 3, 0]), np.array([2.0, -1.0, 0.5])
     some = table.take(chosen).scaled(factor)
     assert some.gram(table) == pytest.approx((dense[chosen] * factor[:, None]) @ dense.T)
-    assert some.moments(by_joint(y, joint, _JOINTS)) == pytest.approx((dense[chosen] * factor[:, None]) @ y)
+    assert some.moments(by_joint(y, joint, _JOINTS)) == pytest.approx(
+        (dense[chosen] * factor[:, None]) @ y
+    )
     assert some.norms == pytest.approx(np.linalg.norm(dense[chosen], axis=1) * np.abs(factor))
 
 
-def test_models_are_dropped_where_they_predict_worse_and_kept_where_chance_decides(rng: np.random.Generator) -> None:
+def test_models_are_dropped_where_they_predict_worse_and_kept_where_chance_decides(
+    rng: np.random.Generator,
+) -> None:
     common = rng.normal(size=40)
-    scores = {"best": common, "like it": common + rng.normal(0.0, 0.1, 40), "worse": common + 1.0 + rng.normal(0.0, 0.1, 40)}
+    scores = {
+        "best": common,
+        "like it": common + rng.normal(0.0, 0.1, 40),
+        "worse": common + 1.0 + rng.normal(0.0, 0.1, 40),
+    }
     assert set(confidence_set(scores, DiagnosisConfig())) == {"best", "like it"}

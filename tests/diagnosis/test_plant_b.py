@@ -11,7 +11,18 @@ import pytest
 from pipelines.diagnosis.engine import Diagnosis, diagnose
 from pipelines.log.hdf5 import read_parts
 
-_ALONE = ("01", "05", "06", "07", "08", "09", "11", "12", "15", "16")  # one cause, not to be mistaken
+_ALONE = (
+    "01",
+    "05",
+    "06",
+    "07",
+    "08",
+    "09",
+    "11",
+    "12",
+    "15",
+    "16",
+)  # one cause, not to be mistaken
 
 
 def _found(shared: Path, arm: str) -> tuple[Diagnosis, dict[str, Any]]:
@@ -20,7 +31,9 @@ def _found(shared: Path, arm: str) -> tuple[Diagnosis, dict[str, Any]]:
     return diagnose(logs), answers[f"arm-{arm}"]
 
 
-@pytest.mark.parametrize("arm", ["11", *(pytest.param(arm, marks=pytest.mark.slow) for arm in _ALONE if arm != "11")])
+@pytest.mark.parametrize(
+    "arm", ["11", *(pytest.param(arm, marks=pytest.mark.slow) for arm in _ALONE if arm != "11")]
+)
 def test_a_cause_is_named_with_its_joint(shared: Path, arm: str) -> None:
     found, answer = _found(shared, arm)
     (truth,) = answer["truth"]

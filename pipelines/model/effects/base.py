@@ -139,6 +139,10 @@ class Effect(Placed, ABC):
         """Those of its shapes that may explain `residual` (samples, joints) [N m] over `motion`, at most a few tens."""
         yield from self.shapes(motion, arm)
 
+    def in_session(self, start: float) -> Self:
+        """Itself with the clock of a session that began at `start` [s]; most effects know no time."""
+        return self
+
     def full(self) -> Self:
         """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
         return self

@@ -41,6 +41,10 @@ class ViscousDrift(Effect):
         left = np.expm1(-np.maximum(motion.t - start, 0.0) / self.time_constant)
         return self.on_own_row(arm, -self._viscous(arm) * left * self.own(motion.dq))
 
+    def in_session(self, start: float) -> Self:
+        """A joint that is warm stays warm in the next log."""
+        return replace(self, since=start)
+
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """From a fifth to five times the duration; beyond that it is a straight line."""
         duration = max(float(np.ptp(motion.t)), 1.0)
