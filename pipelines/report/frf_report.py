@@ -53,10 +53,14 @@ def _verdict(sure: Sequence[Classified], unsure: Sequence[Undecided], doctor: Se
     if rigid:
         words.append(f"Joint{'s' * (len(rigid) > 1)} {', '.join(rigid)}: rigid in the band.")
     if unsure:
-        modes = sum(one.frequency is not None for one in unsure)
-        what = f"{modes} mode{'s' * (modes > 1)}" if modes == len(unsure) else f"{len(unsure)} finding{'s' * (len(unsure) > 1)}"
-        words.append(f"{what} could be more than one thing; what to record is listed.")
+        words += list(dict.fromkeys(_undecided(one) for one in unsure))
+        words.append("What to record to decide is listed.")
     return " ".join([*gates, *words]) or "Nothing was measured."
+
+
+def _undecided(one: Undecided) -> str:
+    causes = " or ".join(cause.replace("_", " ") for cause in one.candidates)
+    return f"Joint {one.joint} is undecided: {causes or 'not measured well enough'}."
 
 
 def _said(one: Classified) -> str:
@@ -154,11 +158,12 @@ def _shown(own: Sequence[tuple[Posture, Mapping[str, Method]]],
 def _rigid(postures: Sequence[Posture]) -> Section:
     rows = [(p.joint, posture_words(p.posture, p.joint), p.expected_level, with_std(p.level.value, p.level.std), p.expected_inertia,
              None if p.inertia is None else with_std(p.inertia.value, p.inertia.std),
-             with_std(p.level_above.value, p.level_above.std), with_std(1e3 * p.delay.value, 1e3 * p.delay.std), p.expected_from)
+             with_std(p.level_above.value, p.level_above.std),
+             None if p.delay is None else with_std(1e3 * p.delay.value, 1e3 * p.delay.std), p.expected_from)
             for p in postures]
     text = ("Between friction and the first mode a rigid body accelerates by the same amount per input at every frequency. Under "
             "computed torque that is 1 where the controller's inertia is right. Above all modes only what is fast to the motor "
-            "moves.",)
+            "moves. Where the phase advances, no delay is given: modes outside the band, or two clocks, turn it.",)
     return Section("Beside the rigid body", text, (Table(
         ("joint", "posture", "level expected", "measured", "inertia expected [kg m^2]", "measured [kg m^2]",
          "level above all modes", "delay beside hold and controller [ms]", "expected from"), tuple(rows)),))

@@ -37,6 +37,8 @@ def test_lost_samples_do_not_speed_time_up(shared: Path, tmp_path: Path) -> None
     assert modes.inertia is not None
     assert modes.inertia.value == pytest.approx(0.5, rel=0.01)
     assert found.seen[0].measured.first.filled == pytest.approx(0.029, abs=0.003)
+    told = posture_of(found.seen[0]).delay
+    assert told is None or told.value >= 0.0  # no position comes before its torque
 
 
 def test_no_mode_where_coherence_is_lost(shared: Path, tmp_path: Path) -> None:

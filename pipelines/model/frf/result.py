@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -94,7 +94,7 @@ class Posture:
     level: Known  # measured, between friction and modes
     level_above: Known  # above all modes
     inertia: Known | None  # [kg m^2] measured below the modes
-    delay: Known  # [s] beside hold and controller
+    delay: Known | None  # [s] besides hold and controller; None: the phase advances, which no delay explains
     misfit: float
     band: Band  # [Hz] of the fit
     relative: Curve  # acceleration per input
@@ -186,9 +186,14 @@ def posture_of(seen: Seen) -> Posture:
                    float(np.mean([t.left_out for t in m.turned])), float(np.mean(left)) if left else None, modes.friction_below,
                    m.distortion, *m.detected,
                    seen.expected.level, seen.expected.inertia, seen.expected.source, modes.level, modes.level_above,
-                   modes.inertia, modes.delay, modes.misfit, modes.band, Curve.of(relative), fit, Curve.of(m.compliance),
-                   m.excited.intervals, max(t.filled for t in m.turned), m.held is not None,
+                   modes.inertia, _not_negative(modes.delay), modes.misfit, modes.band, Curve.of(relative), fit,
+                   Curve.of(m.compliance), m.excited.intervals, max(t.filled for t in m.turned), m.held is not None,
                    None if m.with_reversal is None else Curve.of(m.with_reversal), _continuous(seen))
+
+
+def _not_negative(delay: Known) -> Known | None:
+    """Return the delay, none below zero within two deviations of it, or None where it is negative for certain."""
+    return replace(delay, value=max(delay.value, 0.0)) if delay.value > -2.0 * delay.std else None
 
 
 def _continuous(seen: Seen) -> dict[str, float]:
