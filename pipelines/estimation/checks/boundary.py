@@ -305,13 +305,26 @@ class _Estimate:
         gain = 0.5 * float(gains[top] @ np.minimum(fits.model.effective, moments[top]))
         if gain < -(config.decisive if mistaken else config.alike):
             return same, fits
-        chosen, other = tried[top], self.fits(tried[top])
-        if gain > config.decisive and _power(other.best) < config.explained * _power(fits.best):
+        near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
+        alike = [tried[k] for k in near]
+        return self.chosen(fits, tried[top], alike, gain > config.decisive, mistaken)
+
+    def chosen(
+        self,
+        fits: _Fits,
+        chosen: ColumnOrder,
+        alike: Sequence[ColumnOrder],
+        decisive: bool,
+        mistaken: bool,
+    ) -> tuple[JointOrder, _Fits]:
+        """Return what the best other order shows, and the fits under the order that holds."""
+        config, other = self.config, self.fits(chosen)
+        same = JointOrder(tuple(range(1, fits.model.rows.n_joints + 1)), "")
+        if decisive and _power(other.best) < config.explained * _power(fits.best):
             columns = tuple(k + 1 for k in chosen.order)
             order = JointOrder(columns, chosen.signal, fits.rms, other.rms)
-            near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
-            if len(near) > 1:
-                orders = "; ".join(f"{tried[k].signal} {_listed(tried[k].order)}" for k in near)
+            if len(alike) > 1:
+                orders = "; ".join(f"{one.signal} {_listed(one.order)}" for one in alike)
                 order = replace(order, columns=None, reason=f"several orders fit alike: {orders}")
             return order, other
         swapped = f"{chosen.signal} are in the order {_listed(chosen.order)}"
