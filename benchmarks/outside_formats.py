@@ -7,18 +7,12 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
+from benchmarks.import_layouts import UR as UR_JOINTS
 from benchmarks.outside_layouts import Answer, Arm, Run, Signal, layout
 
 UR = Arm(
     "ur5",
-    (
-        "shoulder_pan_joint",
-        "shoulder_lift_joint",
-        "elbow_joint",
-        "wrist_1_joint",
-        "wrist_2_joint",
-        "wrist_3_joint",
-    ),
+    UR_JOINTS,
     "zyyyzy",
     (150, 150, 150, 28, 28, 28),
 )

@@ -152,43 +152,45 @@ def torque_boundary(
 ) -> Boundary | None:
     """Return what the torque of `logs`, of one robot, is; None where none of them moves the arm.
 
-    A fit that fails numerically leaves everything but the sign not identifiable, with its reason.
+    A check that fails numerically leaves what it tells not identifiable, and its reason names it.
     """
     config = config or BoundaryConfig()
     subjects = [Subject(log) for log in _informative(logs)]
-    usable = [
-        subject.good
-        for subject in subjects
-        if subject.sampled and subject.good.time.known and subject.good.runs
-    ]
+    usable = [one.good for one in subjects if one.sampled and one.good.time.known and one.good.runs]
     if not any(np.isfinite(one.log.tau[run]).any() for one in usable for run in one.runs):
         return None
     robot = usable[0].log.robot
     names = tuple(one.log.name for one in usable)
-    touches = touches_of_zero(usable, config)
-    counts = [count for count in touches if count is not None]
-    sign: str | None = "signed"
-    if len(counts) < len(touches):
-        signed = ", ".join(str(j) for j, count in enumerate(touches, 1) if count is None)
-        evidence = f"the torque of joint {signed} changes its sign"
-    elif max(counts) >= config.touches:
-        evidence = (
-            "no torque is ever negative, though they come down to zero "
-            f"{', '.join(map(str, counts))} times while the joints move"
-        )
-        return _unread(robot, "magnitude", names, "not identifiable from magnitudes", evidence)
-    else:  # a load on one side: the same as its magnitude
-        sign = None if any(counts) else "signed"
-        evidence = "no torque changes its sign" + (", or comes near zero" if sign else "")
+    check, sign, evidence = "test of the sign", None, "the sign of the torque is not identifiable"
     try:
+        sign, evidence = _sign(touches_of_zero(usable, config), config)
+        if sign == "magnitude":
+            return _unread(robot, sign, names, "not identifiable from magnitudes", evidence)
+        check = "fit"
         arm = generic_arm(robot)
         motions = [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
         if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
             return None
         return _Estimate(robot, arm, motions, config).boundary(names, sign, evidence)
     except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
-        reason = f"not identifiable: the fit failed: {error}"
+        reason = f"not identifiable: the {check} failed: {error}"
         return _unread(robot, sign, names, reason, evidence)
+
+
+def _sign(touches: Sequence[int | None], config: BoundaryConfig) -> tuple[str | None, str]:
+    """Return whether the torque is signed or a magnitude, and what that rests on."""
+    counts = [count for count in touches if count is not None]
+    if len(counts) < len(touches):
+        signed = ", ".join(str(j) for j, count in enumerate(touches, 1) if count is None)
+        return "signed", f"the torque of joint {signed} changes its sign"
+    if max(counts) >= config.touches:
+        return "magnitude", (
+            "no torque is ever negative, though they come down to zero "
+            f"{', '.join(map(str, counts))} times while the joints move"
+        )
+    if any(counts):  # a load on one side: the same as its magnitude
+        return None, "no torque changes its sign"
+    return "signed", "no torque changes its sign, or comes near zero"
 
 
 def _informative(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
@@ -303,13 +305,26 @@ class _Estimate:
         gain = 0.5 * float(gains[top] @ np.minimum(fits.model.effective, moments[top]))
         if gain < -(config.decisive if mistaken else config.alike):
             return same, fits
-        chosen, other = tried[top], self.fits(tried[top])
-        if gain > config.decisive and _power(other.best) < config.explained * _power(fits.best):
+        near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
+        alike = [tried[k] for k in near]
+        return self.chosen(fits, tried[top], alike, gain > config.decisive, mistaken)
+
+    def chosen(
+        self,
+        fits: _Fits,
+        chosen: ColumnOrder,
+        alike: Sequence[ColumnOrder],
+        decisive: bool,
+        mistaken: bool,
+    ) -> tuple[JointOrder, _Fits]:
+        """Return what the best other order shows, and the fits under the order that holds."""
+        config, other = self.config, self.fits(chosen)
+        same = JointOrder(tuple(range(1, fits.model.rows.n_joints + 1)), "")
+        if decisive and _power(other.best) < config.explained * _power(fits.best):
             columns = tuple(k + 1 for k in chosen.order)
             order = JointOrder(columns, chosen.signal, fits.rms, other.rms)
-            near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
-            if len(near) > 1:
-                orders = "; ".join(f"{tried[k].signal} {_listed(tried[k].order)}" for k in near)
+            if len(alike) > 1:
+                orders = "; ".join(f"{one.signal} {_listed(one.order)}" for one in alike)
                 order = replace(order, columns=None, reason=f"several orders fit alike: {orders}")
             return order, other
         swapped = f"{chosen.signal} are in the order {_listed(chosen.order)}"
