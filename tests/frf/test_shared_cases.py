@@ -12,6 +12,7 @@ import pytest
 from pipelines.log.files import open_log
 from pipelines.model.frf.findings import Findings, frf_findings
 from pipelines.model.frf.responses import measured_responses
+from pipelines.model.frf.result import posture_of
 from tests.cli.commands import rrrid
 
 
