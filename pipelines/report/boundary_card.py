@@ -92,7 +92,7 @@ def _sign(boundary: Boundary) -> Row:
 
 
 def _number(value: float | None, std: float | None) -> str:
-    if value is None or std is None:
+    if value is None or std is None or not math.isfinite(std):
         return _UNKNOWN
     digits = max(2, min(4, 1 - math.floor(math.log10(std)))) if std > 0.0 else 4
     return f"{value + 0.0:.{digits}f} ± {std:.{digits}f}"
@@ -139,7 +139,7 @@ def _friction(boundary: Boundary) -> Row:
         "share of friction",
         _number(share.share, share.std),
         " ".join(filter(None, meaning)),
-        ("neutral"),
+        "neutral",
     )
 
 

@@ -227,7 +227,7 @@ def unstacked(table: RawTable) -> RawTable:
 def _numbers_in_turn(table: RawTable) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield columns of whole numbers that repeat, and the numbers they go through."""
     for name, values in table.columns.items():
-        again = np.flatnonzero(values[1 : _MOST_KEYS + 1] == values[0]) + 1
+        again = np.flatnonzero(values[1 : _MOST_KEYS + 1] == values[:1]) + 1
         if again.size and (k := int(again[0])) > 1 and values.size >= 2 * k and np.array_equal(values[k:], values[:-k]) and (
                 values[:k] == np.round(values[:k])).all():
             yield name, tuple(f"{value:.0f}" for value in values[:k])

@@ -25,6 +25,8 @@ from pipelines.model.frf.modes import Pair
 __all__ = ["Explained", "explain", "predicted"]
 
 _FLOOR = 1e-3  # relative deviation of a frequency, that of every bin of the fit
+_LEAST = 1e-12  # of J: less is lost in the sums of the mass matrix, which is singular then
+
 
 @dataclass(frozen=True)
 class Explained:
@@ -44,7 +46,7 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
     link = inertia - motor
     kept = [i for i, there in enumerate((base is not None, True, joint is not None)) if there]
     locked = [i for i in kept if i != 1]
-    if not np.isfinite([f_b**2 * i_b, k, link]).all() or min(link, motor, i_b) <= 0.0:
+    if not np.isfinite([f_b * f_b * i_b, k, link]).all() or min(link, motor, i_b) <= _LEAST * inertia:
         return np.full(len(locked), np.nan), np.full(len(locked), np.nan)
     mass = np.array([[i_b + inertia, inertia, link], [inertia, inertia, link], [link, link, link]])
     spring = np.diag([i_b * (2.0 * np.pi * f_b) ** 2, 0.0, k])

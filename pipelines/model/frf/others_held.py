@@ -113,7 +113,7 @@ class _Fit:
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
                 most: Array | None = None, config: HeldConfig | None = None) -> Held | None:
-    """Return the response from torque to position with the other joints held; None where there are none.
+    """Return the response from torque to position with the other joints held; None where none of them moves.
 
     Args:
         responses: from v to torque and all positions, in the excited band.
@@ -122,6 +122,9 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
         most: D_kk of the others at most (others,) [kg m^2], where it is known.
     """
     config = config or HeldConfig()
+    bound = np.full(len(others), np.inf) if most is None else most
+    moves = np.array([bool(np.any(responses.response[:, k])) for k in others], dtype=bool)
+    others, bound = tuple(k for k, does in zip(others, moves, strict=True) if does), bound[moves]
     if not others or len(responses.frequency) < config.fewest:
         return None
     kept = [torque, position, *others]
@@ -132,7 +135,7 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
     rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
                  np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
-    fit = _unattenuated(rows, _with_modes(rows, np.full(len(others), np.inf) if most is None else most, config))
+    fit = _unattenuated(rows, _with_modes(rows, bound, config))
     held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
     couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit, config.draws)]) / rigid[:, None]
     rest = responses.response[:, torque] - np.einsum("dbk,bk->db", couplings, responses.response[:, list(others)])

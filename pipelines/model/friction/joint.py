@@ -120,7 +120,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
     for _ in range(_COURSES if course is not None else 1):
-        identify, validate = (_along(part, course, chosen) for part in (identify, validate))
+        both = _along((*identify, *validate), course, chosen)  # the same columns in both
+        identify, validate = both[:len(identify)], both[len(identify):]
         final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
         course, chosen = _next(course, final), final
     if sticks:

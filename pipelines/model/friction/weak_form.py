@@ -196,6 +196,7 @@ class Stretch:
         """(windows,) mean change of torque in a step, from the samples next to each window: their noise is not in its own mean."""
         known = np.where(np.isfinite(self.tau), self.tau, 0.0)
         before = np.maximum(self.edges[:-1] - 1, 0)
+        before = np.where(np.isfinite(self.tau[before]), before, self.edges[:-1])
         return np.asarray((known[self.edges[1:]] - known[before]) / (self.edges[1:] - before))
 
     @cached_property

@@ -181,3 +181,8 @@ def test_a_small_pair_of_a_base_is_faint() -> None:
     found, _ = group_joint(2, [modes_of([base_under_arm(28.0, 8.0, j)], j) for j in (1.0, 1.2)], 1e-3)
     heavy, _ = group_joint(2, [modes_of([base_under_arm(28.0, 2.0, j)], j) for j in (1.0, 1.2)], 1e-3)
     assert [(one.kind, one.faint) for one in (*found, *heavy)] == [("base", True), ("base", False)]
+
+
+@pytest.mark.parametrize(("base", "joint"), [((1e200, 1.0), None), ((10.0, 1e-320), None), ((10.0, 1.0), (100.0, 1e-320))])
+def test_bodies_beyond_all_numbers_do_not_exist(base: tuple[float, float], joint: tuple[float, float] | None) -> None:
+    assert all(np.isnan(kind).all() for kind in predicted(1.0, base, joint))
