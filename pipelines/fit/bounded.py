@@ -32,8 +32,14 @@ def least_squares(rest: Callable[[Array], Array], start: Array, low: Array | flo
         low, high: bounds of the parameters.
         scale: their characteristic sizes; None: by the slopes.
         steps: evaluations at most.
+
+    Raises:
+        numpy.linalg.LinAlgError: no number at `start`, or the step cannot be solved for.
     """
     from scipy import optimize
+
+    if not np.isfinite(rest(start)).all():
+        raise np.linalg.LinAlgError("the residual is no number where the search starts")
 
     found = optimize.least_squares(rest, start, bounds=(low, high), x_scale="jac" if scale is None else scale, max_nfev=steps)
     return Minimum(found.x, found.fun, found.jac, np.asarray(found.active_mask != 0))

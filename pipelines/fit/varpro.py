@@ -245,9 +245,9 @@ def held_out(basis: Array, residual: Array, blocks: npt.NDArray[np.intp]) -> Arr
         residual: (m,) of least squares over all rows.
         blocks: (m,) number of the block of every row, from 0.
     """
-    rest = residual.copy()
-    for block in range(int(blocks.max()) + 1):
-        own = basis[blocks == block]
+    rest, order = residual.copy(), np.argsort(blocks, kind="stable")
+    for rows in np.split(order, np.flatnonzero(np.diff(blocks[order])) + 1):
+        own = basis[rows]
         size, axes = np.linalg.eigh(own.T @ own)
-        rest[blocks == block] += own @ (axes @ ((axes.T @ (own.T @ residual[blocks == block])) / np.maximum(1.0 - size, _PULLED)))
+        rest[rows] += own @ (axes @ ((axes.T @ (own.T @ residual[rows])) / np.maximum(1.0 - size, _PULLED)))
     return rest

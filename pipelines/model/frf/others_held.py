@@ -191,8 +191,11 @@ def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
         def rest(x: Array, spread: Array = spread, ratios: tuple[Array | None, ...] = ratios) -> Array:
             return _linear(rows, x, spread, ratios).rest
 
-        found = least_squares(rest, np.clip(fit.shape, low + 1e-9, high - 1e-9), low, high,
-                              np.array([1e-4, *np.full(2 * modes, 0.1)]), 10)
+        try:
+            found = least_squares(rest, np.clip(fit.shape, low + 1e-9, high - 1e-9), low, high,
+                                  np.array([1e-4, *np.full(2 * modes, 0.1)]), 10)
+        except np.linalg.LinAlgError:  # the start as it is, which the description then judges
+            break
         fit, mask = _linear(rows, found.x, spread, ratios), found.at_bound
     return replace(fit, inside=not mask[1:].any())
 
