@@ -5,8 +5,8 @@
     dictionary.table(rows)                 the columns over some rows
 
 A group is what is screened at once: one shape of one cause at one joint. Groups without a name are
-splines of the position, speed and torque of a joint, and ripple of its drive, of any order: where
-one of these predicts better than every cause, the cause is not known.
+splines of the position, speed and torque of a joint, ripple of its drive, of any order, and the form
+of its friction law: where one of these predicts better than every cause, the cause is not known.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ from pipelines.model.diagnosis.screened.candidates import (
 from pipelines.model.effects import all_effects
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Dictionary", "Group", "Key", "Kind"]
+__all__ = ["FORM", "Dictionary", "Group", "Key", "Kind"]
+
+FORM = "friction form"
+_SLOWEST = 0.01  # of the top speed: the least width of a sigmoid of the friction form
 
 Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
@@ -140,7 +143,11 @@ Make = Callable[[Motion], Array]  # (samples, k) on one joint
 
 
 def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
-    """Return the shapes without a name: of each joint splines of q, dq and torque, and ripple."""
+    """Return the shapes without a name: splines of q, dq and torque, ripple, form of friction.
+
+    The form of a friction law is a sum of sigmoids tanh(dq / w) of any widths w (Kostić et al. 2004,
+    eq. 7): no law has the form of a machine's friction at every speed.
+    """
     motions = [one.motion for rows in (dataset.reference, dataset.later) for one in rows.data.logs]
     nominal, found = dataset.model.nominal, dict[Key, Make]()
 
@@ -167,7 +174,13 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
 
         return make
 
+    def form(j: int) -> Make:
+        top = max(float(np.abs(motion.dq[:, j]).max()) for motion in motions)
+        widths = np.geomspace(_SLOWEST * top, top, config.form_widths)
+        return lambda motion: np.asarray(np.tanh(motion.dq[:, j, None] / widths))
+
     for j in range(dataset.later.n_joints):
+        found[FORM, j + 1] = form(j)
         for kind in ("q", "dq", "tau"):
             found[f"spline of {kind}", j + 1] = spline(kind, j)
         for order in range(1, config.ripple_orders + 1):
@@ -186,5 +199,6 @@ def _lay_unnamed(rows: Rows, key: Key, make: Make, groups: list[Group], parts: l
 
     part = rows.table(rows.data.lay(on_joint))
     first = sum(one.width for one in parts)
-    groups.append(Group(key, 0, first, part.width, key[0].startswith("ripple"), "unnamed"))
+    standing = key[0].split()[0] in ("ripple", "friction")
+    groups.append(Group(key, 0, first, part.width, standing, "unnamed"))
     parts.append(part)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import Dictionary, Group
+from pipelines.diagnosis.candidates import FORM, Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.table import Array, Indices, Table
@@ -88,7 +88,7 @@ def reference_prior(dataset: Dataset, dictionary: Dictionary, config: DiagnosisC
         noise,
         columns[keep[n_nominal:] - n_nominal],
         precision,
-        _drift(dataset, scale, len(keep), config),
+        _drift(dataset, scale, tau, groups, config)[keep],
         parts,
         tuple(gram[at] / noise for gram in grams),
         tuple(m[keep] / noise for m in moments),
@@ -116,6 +116,9 @@ def _components(
     names = list(dict.fromkeys(_family(g) for g in groups))
     family = np.concatenate([np.full(g.width, names.index(_family(g))) for g in groups])
     mean_square = np.maximum(np.diag(gram)[n_nominal:] / rows, 1e-30)
+    for k, group in enumerate(groups):
+        if group.kind == "unnamed":  # its columns are alike, and share a variance [(N m)²]
+            mean_square[own == k] = mean_square[own == k].max()
     flat = _FLAT * np.diag(gram)[:n_nominal]
     noise, tau = 1.0, np.full(len(own), 1e-2)  # where EM begins
     per_group, per_family = np.bincount(own), np.bincount(family)
@@ -138,13 +141,19 @@ def _family(group: Group) -> tuple[str, int | None]:
     return (group.key[0].split()[0], group.key[1])
 
 
-def _drift(dataset: Dataset, scale: Array, size: int, config: DiagnosisConfig) -> Array:
+def _drift(
+    dataset: Dataset,
+    scale: Array,
+    tau: _Components,
+    groups: list[Group],
+    config: DiagnosisConfig,
+) -> Array:
     """Return the variance between sessions of each scaled number: friction drifts."""
     beta, rigid = dataset.model.beta, len(dataset.model.columns.kept)
-    out = np.zeros(size)
-    out[rigid : len(beta)] = (config.friction_drift * beta[rigid:] * scale[rigid : len(beta)]) ** 2
-    out[len(beta) : len(scale)] = (config.friction_drift * scale[len(beta) :]) ** 2
-    return out
+    usual = np.r_[beta[rigid:] * scale[rigid : len(beta)], scale[len(beta) :]] ** 2
+    form = np.concatenate([np.full(g.width, float(g.key[0] == FORM)) for g in groups])
+    every = np.r_[np.zeros(rigid), usual, form * tau.variance / tau.mean_square]
+    return np.asarray(config.friction_drift**2 * every)
 
 
 def _halves(dataset: Dataset) -> tuple[tuple[np.ndarray, ...], ...]:
