@@ -64,8 +64,13 @@ class Dictionary:
 
     groups: tuple[Group, ...]
     families: dict[Key, Family]
-    reference: Table
     later: Table
+    reference: Table | None
+
+    @property
+    def known(self) -> Table:
+        """The columns over the rows that tell what is usual on this machine."""
+        return self.later if self.reference is None else self.reference
 
     @classmethod
     def of(
@@ -74,8 +79,11 @@ class Dictionary:
         """Return every candidate, with its columns over the reference and the later rows."""
         found = _families(dataset, exclude)
         plain = _unnamed(dataset, config)
-        tables = []
-        for rows in (dataset.reference, dataset.later):
+        tables: list[Table | None] = []
+        for rows in (dataset.later, dataset.reference):
+            if rows is None:
+                tables.append(None)
+                continue
             groups: list[Group] = []
             parts: list[Table] = []
             for family in found.values():
@@ -84,7 +92,8 @@ class Dictionary:
             for key, make in plain.items():
                 _lay_unnamed(rows, key, make, groups, parts)
             tables.append(Table.stacked(parts))
-        return cls(tuple(groups), found, *tables)
+        assert tables[0] is not None
+        return cls(tuple(groups), found, tables[0], tables[1])
 
     @property
     def event(self) -> Family | None:
@@ -101,7 +110,8 @@ def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
     for family in families(dataset.model.columns.laws, motion, dataset.arm, exclude):
         shapes = tuple(shape.in_session(dataset.session_start) for shape in family.shapes)
         found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
-    for kind in all_effects():  # what base parameters absorb without a reference
+    changeable = () if dataset.reference is None else all_effects()
+    for kind in changeable:  # what base parameters absorb without a reference
         if kind.evidence == "base parameters" and kind.name not in exclude:
             for effect in kind.everywhere(dataset.arm.robot.revolute):
                 shapes = tuple(effect.shapes(dataset.later.data.logs[0].motion, dataset.arm))
@@ -148,7 +158,7 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
     The form of a friction law is a sum of sigmoids tanh(dq / w) of any widths w (Kostić et al. 2004,
     eq. 7): no law has the form of a machine's friction at every speed.
     """
-    motions = [one.motion for rows in (dataset.reference, dataset.later) for one in rows.data.logs]
+    motions = [one.motion for rows in (dataset.reference, dataset.later) if rows for one in rows.data.logs]
     nominal, found = dataset.model.nominal, dict[Key, Make]()
 
     def signal(kind: str, motion: Motion, j: int) -> Array:

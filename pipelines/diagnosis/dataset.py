@@ -1,28 +1,22 @@
 """Rows of a session and of its reference, whitened and weighted, and their nominal model.
 
-    dataset = load(logs, config)
+    dataset = load(prepare(logs, settings))
     dataset.later.y, dataset.later.nominal        the rows that are diagnosed
     dataset.reference                             the rows of role "reference"
-
-The noise covariance Σ is one: an autoregressive model of each joint's reference residual, by which
-all rows pass (Aitken 1935), and its standard deviation, in units of which they are expressed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.table import Array, Indices, Table, by_joint
-from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.asked.inputs import Logs, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import (
     fit_columns,
@@ -33,6 +27,7 @@ from pipelines.model.diagnosis.fitted.nominal import (
 )
 from pipelines.model.diagnosis.fitted.slopes import slopes_of
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.rows.kept import Kept
 from pipelines.model.diagnosis.rows.whitening import Whitening
 from pipelines.model.estimation.regression import Columns
 
@@ -41,12 +36,21 @@ __all__ = ["Dataset", "Rows", "load"]
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Whitened rows of some logs, in units of the noise's standard deviation."""
+    """Rows of some logs, in units of the noise's standard deviation."""
 
     data: Data
     columns: Columns
     weight: Array  # (joints,) [1/(N m)]
     nominal: Table  # slopes by base parameters and friction laws
+
+    @classmethod
+    def of(cls, data: Data, model: Exact) -> Rows:
+        """Return the rows of data, weighted by what the nominal model leaves of them."""
+        slopes, _ = law_slopes(data, model.columns, model.beta)
+        table = np.concatenate([rows_of(data, model.columns), *slopes])
+        weight = 1.0 / fit_columns(data, table).rms
+        nominal = Table.of(table * weight[data.joint], data.joint, data.n_joints)
+        return cls(data, model.columns, weight, nominal)
 
     @property
     def n_joints(self) -> int:
@@ -89,15 +93,46 @@ class Rows:
         _, numbered = np.unique(which, return_inverse=True)
         return tuple(numbered[self.joint == j] for j in range(self.n_joints))
 
+    def whitened(self, noise: Sequence[Array]) -> tuple[Rows, Callable[[Table], Table]]:
+        """Return the rows in which `noise`, in units of these rows, is white and of unit variance.
+
+        The noise of a joint is one autoregressive process (Aitken 1935). The second that is returned
+        brings columns over these rows there.
+        """
+        flat = np.empty(self.count)
+        for j, own in enumerate(noise):
+            flat[self.joint == j] = own / self.weight[j]
+        whitening = Whitening.of(self.data, flat[None])
+        weight = 1.0 / self.data.rms(flat)
+
+        def through(table: Table) -> Table:
+            return Table(
+                table.width,
+                table.index,
+                tuple(self._through(whitening, v, j) * (weight[j] / self.weight[j])
+                      for j, v in enumerate(table.values)),
+            )
+
+        there = Rows(self.data.whitened(whitening), self.columns, weight, through(self.nominal))
+        return there, through
+
+    def _through(self, whitening: Whitening, x: Array, joint: int) -> Array:
+        first, out = 0, []
+        for one in self.data.logs:
+            own = x[:, first : first + one.rows]
+            joints = np.full(len(own), joint, dtype=np.intp)
+            out.append(whitening.through(own, joints, one.stretches))
+            first += one.rows
+        return np.concatenate(out, axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class Dataset:
-    """The rows that are diagnosed, and the reference rows of the same machine."""
+    """The rows that are diagnosed, and the reference rows of the same machine, if there are any."""
 
-    model: Exact  # nominal, as the reference has it
-    reference: Rows
+    model: Exact  # nominal, as the reference has it, or else the rows themselves
+    reference: Rows | None
     later: Rows
-    held_out: tuple[int, ...]  # places of the later logs that no fit of an effect saw
     law_names: tuple[tuple[int, str], ...]  # shapes of friction laws, behind the base parameters
     frf: tuple[ExperimentLog, ...]
     session_start: float  # [s] clock time at which the later logs begin
@@ -111,52 +146,32 @@ class Dataset:
         """Numbers of the nominal model that are linear."""
         return len(self.model.beta)
 
+    @property
+    def known(self) -> Rows:
+        """The rows that tell what is usual on this machine."""
+        return self.later if self.reference is None else self.reference
 
-def load(logs: Sequence[ExperimentLog], config: DiagnosisConfig) -> Dataset:
-    """Return the rows of the logs, by their roles.
+    @property
+    def noise_ratio(self) -> Array:
+        """(joints,) variance of the later rows' noise over that of the reference."""
+        return np.asarray((self.known.weight / self.later.weight) ** 2)
 
-    Raises:
-        InputRejected: S01, no log of role "reference";
-            and as `prepare`, logs that give no rows.
+
+def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:
+    """Return the rows of prepared logs, with the nominal model of the reference or of themselves.
+
+    Logs that judge are rows like the others: the score predicts each block from all others.
     """
-    roles = Logs.by_role(logs)
-    if not roles.reference:
-        raise InputRejected(
-            "S01",
-            "no log of role 'reference'",
-            remedy="record the arm before, or name an earlier recording with that role",
-        )
-    ready = prepare(roles, DiagnosisSettings(cutoff_hz=config.cutoff_hz))
-    assert ready.reference is not None
-    columns, fit = fit_nominal(ready.reference, ready.columns)
+    own, judged, before = prepared.data, prepared.judge, prepared.reference
+    kept = Kept()
+    every = enumerate((*own.logs, *(judged.logs if judged else ())))
+    later = Data(tuple(replace(one, place=k, kept=kept) for k, one in every), first=own.first)
+    columns, fit = fit_nominal(before or later, prepared.columns)
     model = Exact.start(columns, fit)
-    whitening = Whitening.of(ready.reference, fit.left[None])
-    reference = ready.reference.whitened(whitening)
-    own = ready.data.whitened(whitening).logs
-    judged = ready.judge.whitened(whitening).logs if ready.judge else ()
-    later = Data((*own, *judged), first=ready.data.first)
-    table, shapes = _nominal(reference, columns, model.beta)
-    weight = 1.0 / fit_columns(reference, table).rms
-    later_table, _ = _nominal(later, columns, model.beta)
-    plain = [
-        Rows(data, columns, weight, Table.of(t * weight[data.joint], data.joint, data.n_joints))
-        for data, t in ((reference, table), (later, later_table))
-    ]
     start = min(float(one.motion.t[0]) for one in later.logs)
-    return Dataset(
-        model,
-        plain[0],
-        plain[1],
-        tuple(range(len(own), len(own) + len(judged))),
-        tuple(shapes),
-        roles.frf,
-        start,
-    )
-
-
-def _nominal(data: Data, columns: Columns, beta: Array) -> tuple[Array, list[tuple[int, str]]]:
-    slopes, shapes = law_slopes(data, columns, beta)
-    return np.concatenate([rows_of(data, columns), *slopes]), shapes
+    _, shapes = law_slopes(before or later, columns, model.beta)
+    reference = None if before is None else Rows.of(before, model)
+    return Dataset(model, reference, Rows.of(later, model), tuple(shapes), tuple(frf), start)
 
 
 def moved(

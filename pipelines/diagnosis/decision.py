@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.screening import Baseline, best_of
+from pipelines.diagnosis.screening import Baseline
 from pipelines.diagnosis.selection import Cause, Selection
 
 __all__ = ["Decision", "decide"]
@@ -27,10 +27,12 @@ def decide(
 ) -> Decision:
     """Return the verdict by significance and goodness of fit."""
     rows, causes = later.rows.count, selection.causes
-    first, last = selection.start.rss / rows, selection.end.rss / rows
-    explained = (first - last) / max(first - baseline.usual_fit, 1e-9)
-    largest = float(selection.end.mean_squares.max())
-    fits = last <= baseline.worst_fit or largest < config.excess * max(1.0, baseline.usual_fit)
+    first, last = selection.start.cost / rows, selection.end.cost / rows
+    gained = max(first - last, 1e-12)
+    explained = gained / max(first - baseline.usual_fit, gained) if causes else 0.0
+    left = selection.end.mean_squares * later.dataset.noise_ratio
+    bound = max(config.excess * max(1.0, baseline.usual_fit), baseline.worst_fit)
+    fits = bool(max(float(left.max()), last) < bound)
     if causes and not fits and explained < config.share:
         return Decision(
             "unknown",
@@ -42,23 +44,13 @@ def decide(
         return Decision("unknown", "several causes explain it", causes, explained)
     if causes:
         return Decision("cause", "", causes, explained)
-    if reason := selection.stopped or _misfit(later, selection, baseline, fits):
+    if selection.stopped:
+        return Decision("unknown", selection.stopped, (), explained)
+    if not fits:
+        more = f"; it follows {selection.follows}" if selection.follows else ""
+        reason = (
+            f"the mean square residual is {left.max():.2f} of the noise at joint "
+            f"{int(left.argmax()) + 1}, where {bound:.2f} is usual at most{more}"
+        )
         return Decision("unknown", reason, (), explained)
     return Decision("no-fault-found", "", (), explained)
-
-
-def _misfit(later: Later, selection: Selection, baseline: Baseline, fits: bool) -> str:
-    """Return what the final model leaves unexplained; "" where the reference leaves as much."""
-    rows = later.rows.count
-    if not fits:
-        return (
-            f"the mean square residual is {selection.end.rss / rows:.2f} of the noise, "
-            f"{baseline.worst_fit:.2f} at most in the reference"
-        )
-    for one in best_of(later.screened(selection.end)).values():
-        if one.group.kind == "unnamed" and one.gain > baseline.threshold(
-            "unnamed", one.freedom, rows
-        ):
-            signal, joint = one.group.key
-            return f"the residual follows {signal} of joint {joint}, and no cause explains it"
-    return ""

@@ -10,11 +10,14 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.events import event_threshold
-from pipelines.diagnosis.prior import reference_prior
+from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.screening import Baseline, baseline
 from pipelines.diagnosis.selection import Selection, select
+from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.given.compliance import compliance
 
 __all__ = ["Diagnosis", "diagnose"]
@@ -34,18 +37,19 @@ def diagnose(
     config: DiagnosisConfig | None = None,
     exclude: Sequence[str] = (),
 ) -> Diagnosis:
-    """Return what has changed since the reference logs.
+    """Return what has changed since the reference logs, or without them what is wrong.
 
     Args:
         exclude: causes that are not considered.
 
     Raises:
-        InputRejected: S01, no reference logs; logs that give no rows.
+        InputRejected: as `prepare`, logs that give no rows.
     """
     config = config or DiagnosisConfig()
-    dataset = load(logs, config)
-    dictionary = Dictionary.of(dataset, config, exclude)
-    prior = reference_prior(dataset, dictionary, config)
+    roles = Logs.by_role(logs)
+    rough = load(prepare(roles, DiagnosisSettings(cutoff_hz=config.cutoff_hz)), roles.frf)
+    dataset, dictionary = settle(rough, Dictionary.of(rough, config, exclude), config)
+    prior = prior_of(dataset, dictionary, config)
     later = Later.of(dataset, dictionary, prior, config)
     known = baseline(
         dataset, dictionary, prior, event_threshold(dataset, dictionary, prior, config), config

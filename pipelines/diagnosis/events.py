@@ -34,13 +34,13 @@ class Window:
 
 
 def best_window(
-    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], noise: float
+    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array]
 ) -> Window | None:
     """Return the best window on a residual (rows of each joint) in units of the noise."""
     data, best = rows.data, None
     if dictionary.event is None:
         return None
-    weight = rows.weight * noise**-0.5
+    weight = rows.weight
     first = 0
     for place, one in enumerate(data.logs):
         own = np.stack([r[first : first + one.rows] for r in residual])
@@ -67,14 +67,11 @@ def event_threshold(
     """
     from scipy.stats import chi2
 
-    rows = dataset.reference
-    info, moment = prior.precision + sum(prior.grams), sum(prior.moments)
-    mean = np.asarray(np.linalg.solve(info, moment), dtype=np.float64)
-    table = prior.table(rows.nominal, dictionary.reference)
-    residual = tuple(
-        y * prior.noise**-0.5 - t for y, t in zip(rows.y, table.times(mean), strict=True)
-    )
-    found = best_window(rows, dictionary, dataset.arm, residual, prior.noise)
+    rows = dataset.known
+    mean = np.linalg.solve(prior.precision + sum(prior.grams), sum(prior.moments))
+    table = prior.table(rows.nominal, dictionary.known)
+    residual = [y - t for y, t in zip(rows.y, table.times(np.asarray(mean)), strict=True)]
+    found = best_window(rows, dictionary, dataset.arm, residual)
     usual = float(chi2.isf(-np.expm1(np.log(0.5) / config.event_candidates), _DIRECTIONS))
     dispersion = max(1.0, (found.gain if found else 0.0) / usual)
     return dispersion * float(chi2.isf(config.alpha / config.event_candidates, _DIRECTIONS))

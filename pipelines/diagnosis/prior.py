@@ -1,17 +1,19 @@
-"""Prior of a healthy machine: variance components, and the posterior of the reference.
+"""Prior of a healthy machine: what its reference logs, or its other joints, tell of it.
 
-    prior = reference_prior(dataset, dictionary, config)
-    prior.of(parts)                        information of the numbers of later logs
+    prior = prior_of(dataset, dictionary, config)
+    prior.start                            information and moment of the numbers before the later logs
+    prior.of(parts)                        the same after some parts of the known logs
 
-Nominal numbers b have a flat prior in the reference. Standing numbers s_g ~ N(0, τ_g), with τ_g by
-empirical Bayes: expectation maximisation, each group shrunk to its family (Efron & Morris 1973).
-The prior of later logs is the posterior N(m, V) of the reference, plus what may drift between sessions
-without a fault: friction, by a relative standard deviation; rigid-body numbers not at all.
+With reference logs, the prior of later logs is their posterior N(m, V), plus what may drift between
+sessions without a fault: friction, by a relative standard deviation; rigid-body numbers not at all.
+Without them nominal numbers have a flat prior, and standing ones are as large as is typical of their
+family over the joints of this machine: a fault is what stands out of its family.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,10 +21,10 @@ from pipelines.diagnosis.candidates import FORM, Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.table import Array, Indices, Table
+from pipelines.diagnosis.variance import Components, components
 
-__all__ = ["Prior", "reference_prior"]
+__all__ = ["Prior", "prior_of"]
 
-_FLAT = 1e-10  # numerics: of a column's information
 _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot be seen in 1e5 rows
 
 
@@ -30,28 +32,25 @@ _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot
 class Prior:
     """Gaussian knowledge of nominal and standing numbers; columns are scaled to unit noise."""
 
-    scale: Array  # (nominal,) length of each nominal column in the reference
-    noise: float  # variance of a row that neither model explains
+    scale: Array  # (nominal,) length of each nominal column in the known logs
     standing: Indices  # columns of the dictionary
-    precision: Array  # (k, k) of the numbers before any log
+    precision: Array  # (k, k) of the numbers before any log, as the known logs have their variances
     drift: Array  # (k,) variance between sessions
-    parts: tuple[
-        tuple[np.ndarray, ...], ...
-    ]  # masks (rows,) of each joint, for each part of the reference
+    parts: tuple[tuple[np.ndarray, ...], ...]  # masks (rows,) of each joint, of parts of known logs
     grams: tuple[Array, ...]  # (k, k) of each part
     moments: tuple[Array, ...]
+    start: tuple[Array, Array]  # information A and A m before the later logs
 
     @property
     def n_nominal(self) -> int:
         return len(self.scale)
 
     def table(self, nominal: Table, dictionary: Table) -> Table:
-        """Return B = [N D] in units of the noise, of the reference or of the later rows."""
-        columns = Table.stacked([nominal.scaled(1.0 / self.scale), dictionary.take(self.standing)])
-        return columns.scaled(np.full(columns.width, self.noise**-0.5))
+        """Return B = [N D], of the known or of the later rows."""
+        return Table.stacked([nominal.scaled(1.0 / self.scale), dictionary.take(self.standing)])
 
     def of(self, parts: range | tuple[int, ...]) -> tuple[Array, Array]:
-        """Return information A and A m of later numbers, after some parts of the reference.
+        """Return information A and A m of numbers of a later session, after some parts.
 
         (V + U Q Uᵀ)⁻¹ = A - A U (Q⁻¹ + Uᵀ A U)⁻¹ Uᵀ A (Woodbury).
         """
@@ -65,86 +64,83 @@ class Prior:
         return new, new @ np.linalg.solve(info, moment)
 
 
-def reference_prior(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) -> Prior:
-    """Return the posterior of the reference with its variance components."""
-    rows = dataset.reference
+def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) -> Prior:
+    """Return what is known before the later logs are looked at."""
+    rows = dataset.known
     groups = [group for group in dictionary.groups if group.standing]
-    scale = rows.nominal.norms
-    columns = dictionary.standing()
-    table = Table.stacked([rows.nominal.scaled(1.0 / scale), dictionary.reference.take(columns)])
+    scale = np.where(rows.nominal.norms > 0.0, rows.nominal.norms, 1.0)
+    columns, first = dictionary.standing(), len(scale)
+    table = Table.stacked([rows.nominal.scaled(1.0 / scale), dictionary.known.take(columns)])
     parts = _halves(dataset)
     grams = np.array([table.gram(table, part) for part in parts])
     moments = np.array([table.moments(rows.y, part) for part in parts])
-    power = sum(float(y @ y) for y in rows.y)
-    tau, noise = _components(
-        grams.sum(axis=0), moments.sum(axis=0), power, rows.count, groups, len(scale), config
-    )
-    n_nominal = len(scale)
-    keep = np.flatnonzero(np.r_[np.ones(n_nominal, bool), tau.variance > _LEAST_VARIANCE])
-    precision = np.diag(np.r_[tau.flat, tau.mean_square / tau.variance][keep])
+    gram = grams.sum(axis=0)
+    found = components(gram, moments.sum(axis=0), rows.count, groups, first, config)
+    later = dictionary.later.take(columns).norms ** 2 / dataset.later.count
+    visible = found.variance * np.maximum(1.0, later / found.mean_square)
+    keep = np.flatnonzero(np.r_[np.ones(first, bool), visible > _LEAST_VARIANCE])
     at = np.ix_(keep, keep)
-    return Prior(
+    out = Prior(
         scale,
-        noise,
-        columns[keep[n_nominal:] - n_nominal],
-        precision,
-        _drift(dataset, scale, tau, groups, config)[keep],
+        columns[keep[first:] - first],
+        np.diag(found.precision[keep]),
+        _drift(dataset, scale, found, groups, config)[keep],
         parts,
-        tuple(gram[at] / noise for gram in grams),
-        tuple(m[keep] / noise for m in moments),
+        tuple(g[at] for g in grams),
+        tuple(m[keep] for m in moments),
+        (np.zeros((0, 0)), np.zeros(0)),
     )
+    if dataset.reference is not None:
+        return replace(out, start=out.of(range(len(parts))))
+    usual = _typical(dataset, dictionary, found, groups)
+    return replace(out, start=(np.diag(usual.precision[keep]), np.zeros(len(keep))))
 
 
-@dataclass(frozen=True, eq=False)
-class _Components:
-    flat: Array  # (nominal,) precision
-    mean_square: Array  # (standing,) of each column
-    variance: Array  # (standing,) τ_g of a row
+def _typical(
+    dataset: Dataset, dictionary: Dictionary, found: Components, groups: list[Group]
+) -> Components:
+    """Return the variances as far as they are those of the family over all joints.
+
+    What a family has in common is relative to the torque of the joints on which it acts.
+    """
+    powers = np.array([float(y @ y) for y in dataset.known.y]) / dataset.known.count
+    table = dictionary.known.take(dictionary.standing())
+    power = np.zeros(table.width)
+    for index, own in zip(table.index, powers, strict=True):
+        power[index] += own
+    relative = found.variance / np.maximum(power, 1e-300)
+    largest: dict[str, dict[int, float]] = {}  # of each family and joint
+    for group, value in zip(groups, _first_of(groups, relative), strict=True):
+        at = largest.setdefault(group.key[0].split()[0], {})
+        at[group.key[1] or 0] = max(value, at.get(group.key[1] or 0, 0.0))
+    median = {word: _lower_median(at.values()) for word, at in largest.items()}
+    several = [value for word, value in median.items() if len(largest[word]) > 1]
+    other = _lower_median(several or median.values())
+    usual = np.concatenate(
+        [
+            np.full(g.width, median[word] if len(largest[word]) > 1 else other)
+            for g in groups
+            for word in [g.key[0].split()[0]]
+        ]
+    )
+    return replace(found, variance=np.minimum(found.variance, usual * power))
 
 
-def _components(
-    gram: Array,
-    moment: Array,
-    power: float,
-    rows: int,
-    groups: list[Group],
-    n_nominal: int,
-    config: DiagnosisConfig,
-) -> tuple[_Components, float]:
-    """Return the variance of each standing column, and that of the noise, by EM."""
-    own = np.concatenate([np.full(g.width, k) for k, g in enumerate(groups)])
-    names = list(dict.fromkeys(_family(g) for g in groups))
-    family = np.concatenate([np.full(g.width, names.index(_family(g))) for g in groups])
-    mean_square = np.maximum(np.diag(gram)[n_nominal:] / rows, 1e-30)
-    for k, group in enumerate(groups):
-        if group.kind == "unnamed":  # its columns are alike, and share a variance [(N m)²]
-            mean_square[own == k] = mean_square[own == k].max()
-    flat = _FLAT * np.diag(gram)[:n_nominal]
-    noise, tau = 1.0, np.full(len(own), 1e-2)  # where EM begins
-    per_group, per_family = np.bincount(own), np.bincount(family)
-    for _ in range(config.em_rounds):
-        precision = np.r_[flat, mean_square / tau]
-        covariance = np.linalg.inv(gram / noise + np.diag(precision))
-        mean = covariance @ (moment / noise)
-        spread = np.diag(covariance)
-        energy = (mean[n_nominal:] ** 2 + spread[n_nominal:]) * mean_square
-        of_family = np.bincount(family, energy) / per_family
-        pooled = np.bincount(own, energy)[own] + config.variance_prior * of_family[family]
-        tau = np.maximum(pooled / (per_group[own] + config.variance_prior), 1e-12)
-        rss = power - 2.0 * float(mean @ moment) + float(mean @ gram @ mean)
-        noise = rss / (rows - len(gram) + float(spread @ precision))
-    return _Components(flat, mean_square, tau), noise
+def _first_of(groups: list[Group], values: Array) -> Array:
+    """Return the value of the first column of each group."""
+    first = np.cumsum([0, *(g.width for g in groups)])[:-1]
+    return np.asarray(values[first])
 
 
-def _family(group: Group) -> tuple[str, int | None]:
-    """Return the key that shares a variance: of a ripple its joint, of any order."""
-    return (group.key[0].split()[0], group.key[1])
+def _lower_median(values: Iterable[float]) -> float:
+    ordered = sorted(values)
+    return ordered[(len(ordered) - 1) // 2]
 
 
 def _drift(
     dataset: Dataset,
     scale: Array,
-    tau: _Components,
+    found: Components,
     groups: list[Group],
     config: DiagnosisConfig,
 ) -> Array:
@@ -152,13 +148,13 @@ def _drift(
     beta, rigid = dataset.model.beta, len(dataset.model.columns.kept)
     usual = np.r_[beta[rigid:] * scale[rigid : len(beta)], scale[len(beta) :]] ** 2
     form = np.concatenate([np.full(g.width, float(g.key[0] == FORM)) for g in groups])
-    every = np.r_[np.zeros(rigid), usual, form * tau.variance / tau.mean_square]
+    every = np.r_[np.zeros(rigid), usual, form * found.variance / found.mean_square]
     return np.asarray(config.friction_drift**2 * every)
 
 
 def _halves(dataset: Dataset) -> tuple[tuple[np.ndarray, ...], ...]:
-    """Return the first and the second half of each reference log, as masks of each joint's rows."""
-    data = dataset.reference.data
+    """Return the first and the second half of each known log, as masks of each joint's rows."""
+    data = dataset.known.data
     out = []
     for k in range(len(data.logs)):
         own = data.log_of == k

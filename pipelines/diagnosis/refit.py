@@ -50,6 +50,13 @@ class State:
     def rss(self) -> float:
         return sum(float(r @ r) for r in self.residual)
 
+    @cached_property
+    def cost(self) -> float:
+        """‖r‖² + (θ - m)ᵀ A (θ - m)"""
+        theta, moment = self.theta, self.moment
+        away = theta @ self.info @ theta - 2.0 * moment @ theta
+        return self.rss + float(away + moment @ np.linalg.solve(self.info, moment))
+
     @property
     def mean_squares(self) -> Array:
         """(joints,)"""
@@ -75,9 +82,9 @@ class Later:
     def of(
         cls, dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
     ) -> Later:
-        rows, unit = dataset.later, prior.noise**-0.5
+        rows = dataset.later
         base = prior.table(rows.nominal, dictionary.later)
-        table = dictionary.later.scaled(np.full(dictionary.later.width, unit))
+        table = dictionary.later
         squares = []
         for group in dictionary.groups:
             own = table.take(group.columns)
@@ -105,11 +112,11 @@ class Later:
 
     @cached_property
     def y(self) -> tuple[Array, ...]:
-        return tuple(v * self.prior.noise**-0.5 for v in self.rows.y)
+        return self.rows.y
 
     def start(self) -> State:
         """Return the nominal model, fitted under the prior alone."""
-        info, moment = self.prior.of(range(len(self.prior.parts)))
+        info, moment = self.prior.start
         theta = np.zeros(self.base.width)
         model = self.dataset.model
         theta[: len(model.beta)] = model.beta * self.prior.scale[: len(model.beta)]
@@ -157,6 +164,30 @@ class Later:
         slope += both.moments(state.residual)  # zero where the fit has settled
         moments = self.candidates.moments(state.residual) - cross.T @ np.linalg.solve(info, slope)
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
+
+    def resemblance(self, state: State) -> Array:
+        """Return, of each group, the share of its columns that the effects of a state can imitate.
+
+        ρ² = tr(H_cc⁻¹ H_ce H_ee⁻¹ H_ec) / k, beside the columns B: the mean squared canonical
+        correlation (Hotelling 1936).
+        """
+        if not state.effects.width:
+            return np.zeros(len(self.dictionary.groups))
+        info = state.info + self.gram
+        cross_effects = self.base.gram(state.effects)
+        solved = np.linalg.solve(info, np.c_[self.cross, cross_effects])
+        of_columns, of_effects = np.split(solved, [self.cross.shape[1]], axis=1)
+        own = state.effects.gram(state.effects) - cross_effects.T @ of_effects
+        own += _RIDGE * np.eye(len(own))
+        shared = self.candidates.gram(state.effects) - self.cross.T @ of_effects
+        out = []
+        for group, square in zip(self.dictionary.groups, self.squares, strict=True):
+            at = group.columns
+            left = square - self.cross[:, at].T @ of_columns[:, at]
+            imitated = shared[at] @ np.linalg.solve(own, shared[at].T)
+            inverse = np.linalg.pinv(left, rcond=1e-9, hermitian=True)
+            out.append(float(np.trace(inverse @ imitated)) / len(at))
+        return np.clip(out, 0.0, 1.0)
 
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""
@@ -216,15 +247,14 @@ class Later:
     def _slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
         if not model.effects:
             return self.base.take(np.zeros(0, dtype=np.intp)), []
-        slopes, names = self.rows.slopes(model)
-        return slopes.scaled(np.full(slopes.width, self.prior.noise**-0.5)), names
+        return self.rows.slopes(model)
 
     def _residual(self, model: Exact, theta: Array) -> tuple[Array, ...]:
         standing = theta.copy()
         standing[: self.prior.n_nominal] = 0.0
-        torque, unit = self.rows.torque(model), self.prior.noise**-0.5
+        torque = self.rows.torque(model)
         return tuple(
-            y - unit * t - s
+            y - t - s
             for y, t, s in zip(self.y, torque, self.base.times(standing), strict=True)
         )
 

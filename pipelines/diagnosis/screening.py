@@ -82,12 +82,12 @@ def chi2_bound(alpha: float, freedom: int) -> float:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Screening and residual of a healthy machine, from splits of its reference logs."""
+    """Screening and residual of what is usual on a machine, from splits of its known logs."""
 
     alpha: float
     families: int  # causes at joints, that are compared at once
     bias: dict[str, float]  # of each class, a row: what T_c exceeds its χ² bound by
-    worst_fit: float  # mean square residual of a row, that a healthy session exceeds rarely
+    worst_fit: float  # cost of a row, that a healthy session exceeds rarely
     usual_fit: float
     event: float  # gain that a contact has to exceed
 
@@ -139,10 +139,9 @@ class _Parts:
 
     @classmethod
     def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior) -> _Parts:
-        rows, unit, parts = dataset.reference, prior.noise**-0.5, prior.parts
-        candidates = dictionary.reference.scaled(np.full(dictionary.reference.width, unit))
-        base = prior.table(rows.nominal, dictionary.reference)
-        y = tuple(one * unit for one in rows.y)
+        rows, y, parts = dataset.known, dataset.known.y, prior.parts
+        candidates = dictionary.known
+        base = prior.table(rows.nominal, candidates)
         own = [candidates.take(group.columns) for group in dictionary.groups]
         return cls(
             prior,
@@ -159,7 +158,7 @@ class _Parts:
     def compared(
         self, before: tuple[int, ...], after: list[int]
     ) -> tuple[list[Screened], float, float]:
-        """Return candidates, mean square residual and rows of some parts after others."""
+        """Return candidates, cost a row (`State.cost`) and rows of some parts after others."""
         info, moment = self.prior.of(before)
         gram = np.sum([self.prior.grams[k] for k in after], axis=0)
         own = np.sum([self.prior.moments[k] for k in after], axis=0)
@@ -175,8 +174,9 @@ class _Parts:
             squares,
             self.moments[after].sum(axis=0) - cross.T @ mean,
         )
-        left = float(self.powers[after].sum() - 2.0 * mean @ own + mean @ gram @ mean)
-        return found, left / rows, rows
+        cost = self.powers[after].sum() - (moment + own) @ mean
+        cost += moment @ np.linalg.solve(info, moment)
+        return found, float(cost) / rows, rows
 
 
 def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:

@@ -65,7 +65,8 @@ class Selection:
     causes: tuple[Cause, ...]
     start: State
     end: State
-    stopped: str  # "" where nothing significant was left
+    stopped: str  # why a significant cause was not selected; "" where there was none
+    follows: str  # what the rest follows; "" where nothing is significant
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,7 @@ class _Round:
     cause: Cause | None
     state: State | None
     stopped: str = ""
+    follows: str = ""
 
 
 def select(
@@ -87,18 +89,18 @@ def select(
     """
     start = state = later.start()
     causes: list[Cause] = []
-    stopped = ""
+    stopped = follows = ""
     while len(causes) < config.causes:
         found = _round(
             later, start, state, causes, baseline, responses if not causes else (), config
         )
-        stopped = found.stopped
+        stopped, follows = found.stopped, found.follows
         if found.cause is None or found.state is None:
             break
         causes.append(found.cause)
         state = found.state
     causes, state = _backward(later, causes, state, config)
-    return Selection(tuple(causes), start, state, stopped)
+    return Selection(tuple(causes), start, state, stopped, follows)
 
 
 def _round(
@@ -111,16 +113,17 @@ def _round(
     config: DiagnosisConfig,
 ) -> _Round:
     """Return the cause that explains most of the residual of `state`, or why none is selected."""
-    relevant = config.relevance**2 * (start.losses.sum() - state.losses.sum())
-    significant = _significant(later, state, [cause.key for cause in causes], relevant, baseline)
+    significant = _significant(
+        later, state, [cause.key for cause in causes], start.cost - state.cost, baseline, config
+    )
     tried = [
         one
         for one in _refitted(later, state, significant, baseline, responses, config)
-        if one.gain > relevant and one.state.losses.sum() < state.losses.sum()
+        if one.state.losses.sum() < state.losses.sum()
     ]
     others = _unnamed(later, state, significant, bool(responses))
     if not tried:
-        return _Round(None, None, f"follows {_place(next(iter(others)))}" if others else "")
+        return _Round(None, None, follows=_place(next(iter(others))) if others else "")
     pick, alternatives, stopped = _contest(later, state, tried, others, config)
     if pick is None:
         return _Round(None, None, stopped)
@@ -128,15 +131,29 @@ def _round(
 
 
 def _significant(
-    later: Later, state: State, taken: Sequence[Key], relevant: float, baseline: Baseline
+    later: Later,
+    state: State,
+    taken: Sequence[Key],
+    explained: float,
+    baseline: Baseline,
+    config: DiagnosisConfig,
 ) -> dict[Key, Screened]:
-    """Return the candidates above the family-wise threshold, the best shape of each."""
+    """Return the candidates above the family-wise threshold, the best shape of each.
+
+    No law is exact: what resembles the causes found so far has to gain more than a share of what
+    these explain, weighed by the resemblance.
+    """
     rows = later.rows.count
+    alike = later.resemblance(state)
+    inexact = {
+        group: config.relevance * explained * max(float(share), config.relevance)
+        for group, share in zip(later.dictionary.groups, alike, strict=True)
+    }
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
         if key not in taken
-        and one.gain > relevant
+        and one.gain > inexact[one.group]
         and one.gain > baseline.threshold(one.group.kind, one.freedom, rows)
     }
 
@@ -182,9 +199,7 @@ def _refitted(
         key=lambda one: -one.gain,
     )[: config.refits]
     out = []
-    touch = best_window(
-        later.rows, later.dictionary, later.dataset.arm, state.residual, later.prior.noise
-    )
+    touch = best_window(later.rows, later.dictionary, later.dataset.arm, state.residual)
     if touch is not None and touch.gain > baseline.event:
         out.append(
             _candidate(

@@ -1,0 +1,115 @@
+"""Variance components of what healthy machines have in small, and the noise that is left beside it.
+
+    found = components(table, y, groups, n_nominal, config)
+    dataset, dictionary = settle(dataset, dictionary, config)
+
+Standing numbers s_g ~ N(0, τ_g), with τ_g by empirical Bayes: expectation maximisation, each group
+shrunk to its family (Dempster, Laird & Rubin 1977; Efron & Morris 1973). The noise Σ of each session
+is an autoregressive process for each joint: what the nominal model and the dictionary together leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.diagnosis.candidates import Dictionary, Group
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import Dataset, Rows
+from pipelines.diagnosis.table import Array, Table
+
+__all__ = ["Components", "components", "settle"]
+
+_FLAT = 1e-10  # numerics: of a column's information
+_START = 1e-2  # numerics: variance at which the expectation maximisation begins
+_NOISE_ROUNDS = 3  # numerics: of the same for the noise alone, which hardly depends on it
+
+
+@dataclass(frozen=True, eq=False)
+class Components:
+    """Standing numbers and their variances."""
+
+    flat: Array  # (nominal,) precision
+    mean_square: Array  # (standing,) of each column
+    variance: Array  # (standing,) τ_g of a row, in units of the noise
+    mean: Array  # (nominal + standing,) of the numbers
+
+    @property
+    def precision(self) -> Array:
+        """(nominal + standing,)"""
+        return np.r_[self.flat, self.mean_square / self.variance]
+
+
+def components(
+    gram: Array,
+    moment: Array,
+    rows: int,
+    groups: Sequence[Group],
+    n_nominal: int,
+    config: DiagnosisConfig,
+    rounds: int | None = None,
+) -> Components:
+    """Return the numbers and variances of the standing columns, of rows of unit noise.
+
+    Args:
+        gram: B Bᵀ (k, k), B the nominal columns and those of the groups.
+        moment: B y (k,).
+    """
+    own = np.concatenate([np.full(g.width, k) for k, g in enumerate(groups)])
+    names = list(dict.fromkeys(_family(g) for g in groups))
+    family = np.concatenate([np.full(g.width, names.index(_family(g))) for g in groups])
+    mean_square = np.maximum(np.diag(gram)[n_nominal:] / rows, 1e-30)
+    for k, group in enumerate(groups):
+        if group.kind == "unnamed":  # its columns are alike, and share a variance [(N m)²]
+            mean_square[own == k] = mean_square[own == k].max()
+    flat = _FLAT * np.diag(gram)[:n_nominal]
+    tau, mean = np.full(len(own), _START), np.zeros(len(gram))
+    per_group, per_family = np.bincount(own), np.bincount(family)
+    for _ in range(rounds or config.em_rounds):
+        covariance = np.linalg.inv(gram + np.diag(np.r_[flat, mean_square / tau]))
+        mean = covariance @ moment
+        spread = np.diag(covariance)
+        energy = (mean[n_nominal:] ** 2 + spread[n_nominal:]) * mean_square
+        of_family = np.bincount(family, energy) / per_family
+        pooled = np.bincount(own, energy)[own] + config.variance_prior * of_family[family]
+        tau = np.maximum(pooled / (per_group[own] + config.variance_prior), 1e-12)
+    return Components(flat, mean_square, tau, mean)
+
+
+def _family(group: Group) -> tuple[str, int | None]:
+    """Return the key that shares a variance: of a ripple its joint, of any order."""
+    return (group.key[0].split()[0], group.key[1])
+
+
+def settle(
+    dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig
+) -> tuple[Dataset, Dictionary]:
+    """Return the rows of each session whitened, in units of its own noise, and their columns."""
+    groups = [g for g in dictionary.groups if g.shape == 0]
+    columns = np.concatenate([g.columns for g in groups])
+
+    def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
+        there, through = rows.whitened(_left(rows, table.take(columns), groups, config))
+        return there, through(table)
+
+    later, table = settled(dataset.later, dictionary.later)
+    if dataset.reference is None or dictionary.reference is None:
+        return replace(dataset, later=later), replace(dictionary, later=table)
+    before, known = settled(dataset.reference, dictionary.reference)
+    return (
+        replace(dataset, later=later, reference=before),
+        replace(dictionary, later=table, reference=known),
+    )
+
+
+def _left(
+    rows: Rows, dictionary: Table, groups: Sequence[Group], config: DiagnosisConfig
+) -> tuple[Array, ...]:
+    """Return what the nominal columns and the dictionary together leave, of each joint."""
+    scale = rows.nominal.norms
+    table = Table.stacked([rows.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0)), dictionary])
+    gram, moment = table.gram(table), table.moments(rows.y)
+    found = components(gram, moment, rows.count, groups, len(scale), config, _NOISE_ROUNDS)
+    return tuple(y - t for y, t in zip(rows.y, table.times(found.mean), strict=True))
