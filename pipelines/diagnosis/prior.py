@@ -92,38 +92,32 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
     )
     if dataset.reference is not None:
         return replace(out, start=out.of(range(len(parts))))
-    usual = _typical(dataset, dictionary, found, groups)
+    usual = _typical(found, groups)
     return replace(out, start=(np.diag(usual.precision[keep]), np.zeros(len(keep))))
 
 
-def _typical(
-    dataset: Dataset, dictionary: Dictionary, found: Components, groups: list[Group]
-) -> Components:
+def _typical(found: Components, groups: list[Group]) -> Components:
     """Return the variances as far as they are those of the family over all joints.
 
-    What a family has in common is relative to the torque of the joints on which it acts.
+    What a family has in common is in units of the noise of the joints on which it acts; of a family
+    of one place it is that of the other families.
     """
-    powers = np.array([float(y @ y) for y in dataset.known.y]) / dataset.known.count
-    table = dictionary.known.take(dictionary.standing())
-    power = np.zeros(table.width)
-    for index, own in zip(table.index, powers, strict=True):
-        power[index] += own
-    relative = found.variance / np.maximum(power, 1e-300)
     largest: dict[str, dict[int, float]] = {}  # of each family and joint
-    for group, value in zip(groups, _first_of(groups, relative), strict=True):
-        at = largest.setdefault(group.key[0].split()[0], {})
+    for group, value in zip(groups, _first_of(groups, found.variance), strict=True):
+        at = largest.setdefault(_word(group), {})
         at[group.key[1] or 0] = max(value, at.get(group.key[1] or 0, 0.0))
     median = {word: _lower_median(at.values()) for word, at in largest.items()}
     several = [value for word, value in median.items() if len(largest[word]) > 1]
     other = _lower_median(several or median.values())
     usual = np.concatenate(
-        [
-            np.full(g.width, median[word] if len(largest[word]) > 1 else other)
-            for g in groups
-            for word in [g.key[0].split()[0]]
-        ]
+        [np.full(g.width, median[_word(g)] if len(largest[_word(g)]) > 1 else other) for g in groups]
     )
-    return replace(found, variance=np.minimum(found.variance, usual * power))
+    return replace(found, variance=np.minimum(found.variance, usual))
+
+
+def _word(group: Group) -> str:
+    """Return the family of a group: of a ripple that of any order."""
+    return group.key[0].split()[0]
 
 
 def _first_of(groups: list[Group], values: Array) -> Array:

@@ -125,9 +125,12 @@ def _round(
     if not tried:
         return _Round(None, None, follows=_place(next(iter(others))) if others else "")
     pick, alternatives, stopped = _contest(later, state, tried, others, config)
+    if pick is None:  # perhaps by another law of the same cause
+        tried = [_other_form(later, state, one) for one in tried]
+        pick, alternatives, stopped = _contest(later, state, tried, others, config)
     if pick is None:
         return _Round(None, None, stopped)
-    return _Round(Cause(pick.key, alternatives), _other_form(later, state, pick))
+    return _Round(Cause(pick.key, alternatives), _other_form(later, state, pick).state)
 
 
 def _significant(
@@ -166,11 +169,9 @@ def _contest(
     config: DiagnosisConfig,
 ) -> tuple[Candidate | None, tuple[Key, ...], str]:
     """Return the winner of the predictive scores and its alternatives, or why nothing wins."""
-    rows, size = later.block_rows, np.log(later.rows.count)
-    scores = {
-        one.key: log_scores(one.state.losses, rows) + _event_price(one, later) for one in tried
-    }
-    free = {key: log_scores(other.losses, rows) for key, other in others.items()}
+    size = np.log(later.rows.count)
+    scores = {one.key: _scores(later, one.state) + _event_price(one, later) for one in tried}
+    free = {key: _scores(later, other) for key, other in others.items()}
     kept = confidence_set(scores | free, config)
     named = [one for one in tried if one.key in kept]
     if not named:
@@ -178,7 +179,7 @@ def _contest(
         return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
     pick = min(named, key=lambda one: scores[one.key].sum() + one.numbers * size)  # BIC
     pays = confidence_set(
-        {"with": scores[pick.key], "without": log_scores(state.losses, rows)}, config
+        {"with": scores[pick.key], "without": _scores(later, state)}, config
     )
     if "without" in pays and not pick.event:
         return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
@@ -282,34 +283,45 @@ def _unnamed(
     return out
 
 
-def _other_form(later: Later, state: State, chosen: Candidate) -> State:
+def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
     """Return the chosen cause by the law of it that predicts best."""
-    best = chosen.state
-    one = best.model.effects[-1]
+    best, one = chosen, chosen.state.model.effects[-1]
     if one.log is not None:
         return best
     for form in one.effect.forms():
         other = _candidate(later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes))
-        if other is not None and other.possible and other.state.losses.sum() < best.losses.sum():
-            best = other.state
+        if other is not None and other.possible and _loss(other) < _loss(best):
+            best = other
     return best
+
+
+def _loss(one: Candidate) -> float:
+    return float(one.state.losses.sum())
 
 
 def _backward(
     later: Later, causes: list[Cause], end: State, config: DiagnosisConfig
 ) -> tuple[list[Cause], State]:
     """Take out every cause without which the rest predicts as well."""
-    rows = later.block_rows
     place = 0
     while len(causes) > 1 and place < len(causes):
         model = end.model.without(place)
         without = later.fit(model, end.theta, end.info, end.moment)
-        scores = {"with": log_scores(end.losses, rows), "without": log_scores(without.losses, rows)}
+        scores = {"with": _scores(later, end), "without": _scores(later, without)}
         if "without" in confidence_set(scores, config):
             causes, end, place = [c for k, c in enumerate(causes) if k != place], without, 0
         else:
             place += 1
     return causes, end
+
+
+def _scores(later: Later, state: State) -> Array:
+    """Return the predictive score of each block, and its share of what the prior says against it.
+
+    A standing number that is far from the prior predicts other blocks as well as a cause does.
+    """
+    against = (state.cost - state.rss) / len(later.block_rows)
+    return log_scores(state.losses, later.block_rows) + against
 
 
 def _event_price(one: Candidate, later: Later) -> float:
