@@ -28,7 +28,7 @@ def decide(
     """Return the verdict by significance and goodness of fit."""
     rows, causes = later.rows.count, selection.causes
     first, last = selection.start.cost / rows, selection.end.cost / rows
-    gained = max(first - last, 1e-12)
+    gained = max(selection.explained / rows, 1e-12)
     explained = gained / max(first - baseline.usual_fit, gained) if causes else 0.0
     left = selection.end.mean_squares * later.dataset.noise_ratio
     bound = max(config.excess * max(1.0, baseline.usual_fit), baseline.worst_fit)

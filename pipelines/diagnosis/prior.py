@@ -12,7 +12,7 @@ family over the joints of this machine: a fault is what stands out of its family
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,7 +23,7 @@ from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.diagnosis.variance import Components, components
 
-__all__ = ["Prior", "prior_of"]
+__all__ = ["Prior", "prior_of", "typical"]
 
 _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot be seen in 1e5 rows
 
@@ -34,12 +34,14 @@ class Prior:
 
     scale: Array  # (nominal,) length of each nominal column in the known logs
     standing: Indices  # columns of the dictionary
+    groups: tuple[Group, ...]  # of each of them
     precision: Array  # (k, k) of the numbers before any log, as the known logs have their variances
     drift: Array  # (k,) variance between sessions
     parts: tuple[tuple[np.ndarray, ...], ...]  # masks (rows,) of each joint, of parts of known logs
     grams: tuple[Array, ...]  # (k, k) of each part
     moments: tuple[Array, ...]
     start: tuple[Array, Array]  # information A and A m before the later logs
+    learned: bool  # from reference logs
 
     @property
     def n_nominal(self) -> int:
@@ -68,62 +70,70 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
     """Return what is known before the later logs are looked at."""
     rows = dataset.known
     groups = [group for group in dictionary.groups if group.standing]
+    of = [group for group in groups for _ in range(group.width)]
     scale = np.where(rows.nominal.norms > 0.0, rows.nominal.norms, 1.0)
     columns, first = dictionary.standing(), len(scale)
     table = Table.stacked([rows.nominal.scaled(1.0 / scale), dictionary.known.take(columns)])
     parts = _halves(dataset)
     grams = np.array([table.gram(table, part) for part in parts])
     moments = np.array([table.moments(rows.y, part) for part in parts])
-    gram = grams.sum(axis=0)
-    found = components(gram, moments.sum(axis=0), rows.count, groups, first, config)
+    found = components(grams.sum(axis=0), moments.sum(axis=0), rows.count, of, config)
     later = dictionary.later.take(columns).norms ** 2 / dataset.later.count
     visible = found.variance * np.maximum(1.0, later / found.mean_square)
     keep = np.flatnonzero(np.r_[np.ones(first, bool), visible > _LEAST_VARIANCE])
     at = np.ix_(keep, keep)
+    kept = tuple(of[k - first] for k in keep[first:])
     out = Prior(
         scale,
         columns[keep[first:] - first],
+        kept,
         np.diag(found.precision[keep]),
-        _drift(dataset, scale, found, groups, config)[keep],
+        _drift(dataset, scale, found, of, config)[keep],
         parts,
         tuple(g[at] for g in grams),
         tuple(m[keep] for m in moments),
         (np.zeros((0, 0)), np.zeros(0)),
+        dataset.reference is not None,
     )
-    if dataset.reference is not None:
+    if out.learned:
         return replace(out, start=out.of(range(len(parts))))
-    usual = _typical(found, groups)
-    return replace(out, start=(np.diag(usual.precision[keep]), np.zeros(len(keep))))
+    return replace(out, start=typical(out, sum(out.grams), sum(out.moments), rows.count, config))
 
 
-def _typical(found: Components, groups: list[Group]) -> Components:
+def typical(
+    prior: Prior, gram: Array, moment: Array, rows: int, config: DiagnosisConfig
+) -> tuple[Array, Array]:
+    """Return information A and A m of a machine whose standing numbers are typical of its joints.
+
+    Args:
+        gram: of the columns of the prior, behind those of causes that were selected.
+        moment: of the same.
+    """
+    found = _typical(components(gram, moment, rows, prior.groups, config), prior.groups)
+    precision = found.precision[len(gram) - len(prior.precision) :]
+    return np.diag(precision), np.zeros(len(precision))
+
+
+def _typical(found: Components, of: Sequence[Group]) -> Components:
     """Return the variances as far as they are those of the family over all joints.
 
     What a family has in common is in units of the noise of the joints on which it acts; of a family
     of one place it is that of the other families.
     """
     largest: dict[str, dict[int, float]] = {}  # of each family and joint
-    for group, value in zip(groups, _first_of(groups, found.variance), strict=True):
+    for group, value in zip(of, found.variance, strict=True):
         at = largest.setdefault(_word(group), {})
         at[group.key[1] or 0] = max(value, at.get(group.key[1] or 0, 0.0))
     median = {word: _lower_median(at.values()) for word, at in largest.items()}
     several = [value for word, value in median.items() if len(largest[word]) > 1]
     other = _lower_median(several or median.values())
-    usual = np.concatenate(
-        [np.full(g.width, median[_word(g)] if len(largest[_word(g)]) > 1 else other) for g in groups]
-    )
+    usual = [median[w] if len(largest[w]) > 1 else other for w in map(_word, of)]
     return replace(found, variance=np.minimum(found.variance, usual))
 
 
 def _word(group: Group) -> str:
     """Return the family of a group: of a ripple that of any order."""
     return group.key[0].split()[0]
-
-
-def _first_of(groups: list[Group], values: Array) -> Array:
-    """Return the value of the first column of each group."""
-    first = np.cumsum([0, *(g.width for g in groups)])[:-1]
-    return np.asarray(values[first])
 
 
 def _lower_median(values: Iterable[float]) -> float:
@@ -135,13 +145,13 @@ def _drift(
     dataset: Dataset,
     scale: Array,
     found: Components,
-    groups: list[Group],
+    of: Sequence[Group],
     config: DiagnosisConfig,
 ) -> Array:
     """Return the variance between sessions of each scaled number: friction drifts."""
     beta, rigid = dataset.model.beta, len(dataset.model.columns.kept)
     usual = np.r_[beta[rigid:] * scale[rigid : len(beta)], scale[len(beta) :]] ** 2
-    form = np.concatenate([np.full(g.width, float(g.key[0] == FORM)) for g in groups])
+    form = np.array([float(g.key[0] == FORM) for g in of])
     every = np.r_[np.zeros(rigid), usual, form * found.variance / found.mean_square]
     return np.asarray(config.friction_drift**2 * every)
 

@@ -15,7 +15,7 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows, moved
-from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.prior import Prior, typical
 from pipelines.diagnosis.score import block_losses
 from pipelines.diagnosis.screening import Screened, screen
 from pipelines.diagnosis.table import Array, Indices, Table
@@ -154,6 +154,21 @@ class Later:
         lasting = np.flatnonzero([model.effects[place].log is None for _, place, _ in names])
         state = State(model, theta, info, moment, residual, effects, lasting, np.zeros(0))
         return replace(state, losses=self.losses(state))
+
+    def beside(self, state: State, config: DiagnosisConfig) -> State:
+        """Return the state with what is typical of the machine beside its causes.
+
+        What a cause leaks into other families is typical of nothing. Reference logs know better.
+        """
+        if self.prior.learned:
+            return state
+        columns = Table.stacked([state.effects, self.base])
+        linear = self.base.times(state.theta)
+        target = tuple(r + t for r, t in zip(state.residual, linear, strict=True))
+        info, moment = typical(
+            self.prior, columns.gram(columns), columns.moments(target), self.rows.count, config
+        )
+        return self.fit(state.model, state.theta, info, moment)
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""

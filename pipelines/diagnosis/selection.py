@@ -65,6 +65,7 @@ class Selection:
     causes: tuple[Cause, ...]
     start: State
     end: State
+    explained: float  # cost that the causes save
     stopped: str  # why a significant cause was not selected; "" where there was none
     follows: str  # what the rest follows; "" where nothing is significant
 
@@ -90,31 +91,33 @@ def select(
     start = state = later.start()
     causes: list[Cause] = []
     stopped = follows = ""
+    explained = 0.0
     while len(causes) < config.causes:
         found = _round(
-            later, start, state, causes, baseline, responses if not causes else (), config
+            later, state, causes, explained, baseline, responses if not causes else (), config
         )
         stopped, follows = found.stopped, found.follows
         if found.cause is None or found.state is None:
             break
         causes.append(found.cause)
-        state = found.state
+        explained += max(state.cost - found.state.cost, 0.0)
+        state = later.beside(found.state, config)
     causes, state = _backward(later, causes, state, config)
-    return Selection(tuple(causes), start, state, stopped, follows)
+    return Selection(tuple(causes), start, state, explained, stopped, follows)
 
 
 def _round(
     later: Later,
-    start: State,
     state: State,
     causes: Sequence[Cause],
+    explained: float,
     baseline: Baseline,
     responses: Sequence[Acting],
     config: DiagnosisConfig,
 ) -> _Round:
     """Return the cause that explains most of the residual of `state`, or why none is selected."""
     significant = _significant(
-        later, state, [cause.key for cause in causes], start.cost - state.cost, baseline, config
+        later, state, [cause.key for cause in causes], explained, baseline, config
     )
     tried = [
         one

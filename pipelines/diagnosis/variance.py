@@ -10,7 +10,7 @@ is an autoregressive process for each joint: what the nominal model and the dict
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,7 +18,7 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.table import Array, Table
+from pipelines.diagnosis.table import Array, Indices, Table
 
 __all__ = ["Components", "components", "settle"]
 
@@ -46,24 +46,24 @@ def components(
     gram: Array,
     moment: Array,
     rows: int,
-    groups: Sequence[Group],
-    n_nominal: int,
+    of: Sequence[Group],
     config: DiagnosisConfig,
     rounds: int | None = None,
 ) -> Components:
     """Return the numbers and variances of the standing columns, of rows of unit noise.
 
     Args:
-        gram: B Bᵀ (k, k), B the nominal columns and those of the groups.
+        gram: B Bᵀ (k, k), B the nominal columns and, behind them, the standing ones.
         moment: B y (k,).
+        of: group of each standing column.
     """
-    own = np.concatenate([np.full(g.width, k) for k, g in enumerate(groups)])
-    names = list(dict.fromkeys(_family(g) for g in groups))
-    family = np.concatenate([np.full(g.width, names.index(_family(g))) for g in groups])
+    n_nominal = len(gram) - len(of)
+    own, family = _numbered([(g.key, g.shape) for g in of]), _numbered([_family(g) for g in of])
     mean_square = np.maximum(np.diag(gram)[n_nominal:] / rows, 1e-30)
-    for k, group in enumerate(groups):
-        if group.kind == "unnamed":  # its columns are alike, and share a variance [(N m)²]
-            mean_square[own == k] = mean_square[own == k].max()
+    largest = np.zeros(int(own.max()) + 1)
+    np.maximum.at(largest, own, mean_square)
+    alike = np.array([g.kind == "unnamed" for g in of])  # columns that share a variance [(N m)²]
+    mean_square = np.where(alike, largest[own], mean_square)
     flat = _FLAT * np.diag(gram)[:n_nominal]
     tau, mean = np.full(len(own), _START), np.zeros(len(gram))
     per_group, per_family = np.bincount(own), np.bincount(family)
@@ -78,6 +78,12 @@ def components(
     return Components(flat, mean_square, tau, mean)
 
 
+def _numbered(names: Sequence[Hashable]) -> Indices:
+    """Return the number of each name, in order of appearance."""
+    number = {name: k for k, name in enumerate(dict.fromkeys(names))}
+    return np.array([number[name] for name in names], dtype=np.intp)
+
+
 def _family(group: Group) -> tuple[str, int | None]:
     """Return the key that shares a variance: of a ripple its joint, of any order."""
     return (group.key[0].split()[0], group.key[1])
@@ -89,9 +95,10 @@ def settle(
     """Return the rows of each session whitened, in units of its own noise, and their columns."""
     groups = [g for g in dictionary.groups if g.shape == 0]
     columns = np.concatenate([g.columns for g in groups])
+    of = [g for g in groups for _ in range(g.width)]
 
     def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
-        there, through = rows.whitened(_left(rows, table.take(columns), groups, config))
+        there, through = rows.whitened(_left(rows, table.take(columns), of, config))
         return there, through(table)
 
     later, table = settled(dataset.later, dictionary.later)
@@ -105,11 +112,11 @@ def settle(
 
 
 def _left(
-    rows: Rows, dictionary: Table, groups: Sequence[Group], config: DiagnosisConfig
+    rows: Rows, dictionary: Table, of: Sequence[Group], config: DiagnosisConfig
 ) -> tuple[Array, ...]:
     """Return what the nominal columns and the dictionary together leave, of each joint."""
     scale = rows.nominal.norms
     table = Table.stacked([rows.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0)), dictionary])
     gram, moment = table.gram(table), table.moments(rows.y)
-    found = components(gram, moment, rows.count, groups, len(scale), config, _NOISE_ROUNDS)
+    found = components(gram, moment, rows.count, of, config, _NOISE_ROUNDS)
     return tuple(y - t for y, t in zip(rows.y, table.times(found.mean), strict=True))
