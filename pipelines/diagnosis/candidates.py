@@ -33,7 +33,6 @@ from pipelines.model.rigid.body import Motion
 __all__ = ["FORM", "Dictionary", "Group", "Key", "Kind"]
 
 FORM = "friction form"
-_SLOWEST = 0.01  # of the top speed: the least width of a sigmoid of the friction form
 
 Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
@@ -158,7 +157,9 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
     The form of a friction law is a sum of sigmoids tanh(dq / w) of any widths w (Kostić et al. 2004,
     eq. 7): no law has the form of a machine's friction at every speed.
     """
-    motions = [one.motion for rows in (dataset.reference, dataset.later) if rows for one in rows.data.logs]
+    motions = [
+        one.motion for rows in (dataset.reference, dataset.later) if rows for one in rows.data.logs
+    ]
     nominal, found = dataset.model.nominal, dict[Key, Make]()
 
     def signal(kind: str, motion: Motion, j: int) -> Array:
@@ -186,7 +187,9 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
 
     def form(j: int) -> Make:
         top = max(float(np.abs(motion.dq[:, j]).max()) for motion in motions)
-        widths = np.geomspace(_SLOWEST * top, top, config.form_widths)
+        own = [law for law in dataset.model.columns.laws if law.joint == j + 1]
+        sharp = next((law.sharpness for law in own if hasattr(law, "sharpness")), 1.0 / top)
+        widths = np.geomspace(0.5 / sharp, top, config.form_widths)
         return lambda motion: np.asarray(np.tanh(motion.dq[:, j, None] / widths))
 
     for j in range(dataset.later.n_joints):

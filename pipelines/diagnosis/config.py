@@ -27,7 +27,8 @@ class DiagnosisConfig:
     promising: float = 0.3  # of the best screening gain, from which a candidate is refitted
     causes: int = 4  # most causes in one session
     ripple_orders: int = 24  # [1/rev] of torque-proportional ripple in the standing dictionary
-    form_widths: int = 6  # sigmoids that make the form of a friction law
+    form_widths: int = 7  # sigmoids that make the form of a friction law
+    noise_bins: int = 8  # of speed, in each of which the noise of a joint has its own level
     knots: int = 10  # of the splines without a name
     event_candidates: int = 600  # windows that a search for a contact compares
     share: float = (

@@ -1,8 +1,8 @@
 """Rows of a session and of its reference, whitened and weighted, and their nominal model.
 
-    dataset = load(prepare(logs, settings))
-    dataset.later.y, dataset.later.nominal        the rows that are diagnosed
-    dataset.reference                             the rows of role "reference"
+dataset = load(prepare(logs, settings))
+dataset.later.y, dataset.later.nominal        the rows that are diagnosed
+dataset.reference                             the rows of role "reference"
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.diagnosis.table import Array, Indices, Table, by_joint
 from pipelines.log.experiment import ExperimentLog
@@ -21,7 +22,6 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import (
     fit_columns,
     fit_nominal,
-    law_slopes,
     rigid_rows,
     rows_of,
 )
@@ -35,21 +35,54 @@ __all__ = ["Dataset", "Rows", "load"]
 
 
 @dataclass(frozen=True, eq=False)
+class NoiseLevel:
+    """Standard deviation of each joint's noise over its speed, constant within bins."""
+
+    edges: Array  # (joints, bins - 1) speeds between the bins
+    std: Array  # (joints, bins) [N m]
+
+    @classmethod
+    def of(
+        cls, noise: Array, speed: Array, joint: Indices, counts: npt.NDArray[np.bool_], bins: int
+    ) -> NoiseLevel:
+        """Return the level of `noise` (rows,) [N m] in bins of equal count."""
+        edges, std = [], []
+        for j in range(int(joint.max()) + 1):
+            own = (joint == j) & counts
+            inner = np.quantile(speed[own], np.arange(1, bins) / bins)
+            at = np.searchsorted(inner, speed[own])
+            power = np.bincount(at, noise[own] ** 2, bins) / np.maximum(
+                np.bincount(at, None, bins), 1
+            )
+            edges.append(inner)
+            std.append(np.sqrt(np.where(power > 0.0, power, power.max())))
+        return cls(np.array(edges), np.array(std))
+
+    def at(self, speed: Array, joint: Indices) -> Array:
+        """Return the level (rows,) [N m] at speeds of joints."""
+        out = np.empty(len(speed))
+        for j, (edges, std) in enumerate(zip(self.edges, self.std, strict=True)):
+            own = joint == j
+            out[own] = std[np.searchsorted(edges, speed[own])]
+        return out
+
+
+@dataclass(frozen=True, eq=False)
 class Rows:
     """Rows of some logs, in units of the noise's standard deviation."""
 
     data: Data
     columns: Columns
-    weight: Array  # (joints,) [1/(N m)]
-    nominal: Table  # slopes by base parameters and friction laws
+    weight: Array  # (rows,) [1/(N m)]
+    nominal: Table  # columns of base parameters and friction laws
+    level: NoiseLevel | None = None
 
     @classmethod
     def of(cls, data: Data, model: Exact) -> Rows:
         """Return the rows of data, weighted by what the nominal model leaves of them."""
-        slopes, _ = law_slopes(data, model.columns, model.beta)
-        table = np.concatenate([rows_of(data, model.columns), *slopes])
-        weight = 1.0 / fit_columns(data, table).rms
-        nominal = Table.of(table * weight[data.joint], data.joint, data.n_joints)
+        table = rows_of(data, model.columns)
+        weight = 1.0 / fit_columns(data, table).rms[data.joint]
+        nominal = Table.of(table * weight, data.joint, data.n_joints)
         return cls(data, model.columns, weight, nominal)
 
     @property
@@ -70,11 +103,11 @@ class Rows:
 
     def signal(self, x: Array) -> tuple[Array, ...]:
         """Return torque (…, rows) [N m] joint by joint, in units of the noise."""
-        return by_joint(x * self.weight[self.joint], self.joint, self.n_joints)
+        return by_joint(x * self.weight, self.joint, self.n_joints)
 
     def table(self, columns: Array) -> Table:
         """Return columns (k, rows) [N m] in units of the noise."""
-        return Table.of(columns * self.weight[self.joint], self.joint, self.n_joints)
+        return Table.of(columns * self.weight, self.joint, self.n_joints)
 
     def torque(self, model: Exact) -> tuple[Array, ...]:
         """Return the torque of an exact model, joint by joint, in units of the noise."""
@@ -93,28 +126,38 @@ class Rows:
         _, numbered = np.unique(which, return_inverse=True)
         return tuple(numbered[self.joint == j] for j in range(self.n_joints))
 
-    def whitened(self, noise: Sequence[Array]) -> tuple[Rows, Callable[[Table], Table]]:
+    @cached_property
+    def speed(self) -> Array:
+        """(rows,) |dq| of each row's joint."""
+        laid = [np.abs(one.at_rows(one.motion.dq)).T.ravel() for one in self.data.logs]
+        return np.concatenate(laid)
+
+    def whitened(self, noise: Sequence[Array], bins: int) -> tuple[Rows, Callable[[Table], Table]]:
         """Return the rows in which `noise`, in units of these rows, is white and of unit variance.
 
-        The noise of a joint is one autoregressive process (Aitken 1935). The second that is returned
-        brings columns over these rows there.
+        The noise of a joint is one autoregressive process (Aitken 1935) of a level that depends on
+        its speed: at reversals no friction law is exact, and positions are coarse. The second that
+        is returned brings columns over these rows there.
         """
         flat = np.empty(self.count)
         for j, own in enumerate(noise):
-            flat[self.joint == j] = own / self.weight[j]
+            flat[self.joint == j] = own
+        flat = flat / self.weight
         whitening = Whitening.of(self.data, flat[None])
-        weight = 1.0 / self.data.rms(flat)
+        white = self.data.through(whitening, flat)
+        level = NoiseLevel.of(white, self.speed, self.joint, self.data.counts, bins)
+        weight = 1.0 / level.at(self.speed, self.joint)
+        before, after = (by_joint(w, self.joint, self.n_joints) for w in (self.weight, weight))
 
         def through(table: Table) -> Table:
-            return Table(
-                table.width,
-                table.index,
-                tuple(self._through(whitening, v, j) * (weight[j] / self.weight[j])
-                      for j, v in enumerate(table.values)),
+            values = tuple(
+                self._through(whitening, v / before[j], j) * after[j]
+                for j, v in enumerate(table.values)
             )
+            return Table(table.width, table.index, values)
 
-        there = Rows(self.data.whitened(whitening), self.columns, weight, through(self.nominal))
-        return there, through
+        there = self.data.whitened(whitening)
+        return Rows(there, self.columns, weight, through(self.nominal), level), through
 
     def _through(self, whitening: Whitening, x: Array, joint: int) -> Array:
         first, out = 0, []
@@ -133,7 +176,6 @@ class Dataset:
     model: Exact  # nominal, as the reference has it, or else the rows themselves
     reference: Rows | None
     later: Rows
-    law_names: tuple[tuple[int, str], ...]  # shapes of friction laws, behind the base parameters
     frf: tuple[ExperimentLog, ...]
     session_start: float  # [s] clock time at which the later logs begin
 
@@ -153,8 +195,13 @@ class Dataset:
 
     @property
     def noise_ratio(self) -> Array:
-        """(joints,) variance of the later rows' noise over that of the reference."""
-        return np.asarray((self.known.weight / self.later.weight) ** 2)
+        """(joints,) variance of the later rows' noise, over that of the reference at such speeds."""
+        later, level = self.later, self.known.level
+        if level is None:
+            return np.ones(later.n_joints)
+        usual = level.at(later.speed, later.joint)
+        power = np.bincount(later.joint, later.weight**-2)
+        return np.asarray(power / np.bincount(later.joint, usual**2))
 
 
 def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:
@@ -169,18 +216,5 @@ def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:
     columns, fit = fit_nominal(before or later, prepared.columns)
     model = Exact.start(columns, fit)
     start = min(float(one.motion.t[0]) for one in later.logs)
-    _, shapes = law_slopes(before or later, columns, model.beta)
     reference = None if before is None else Rows.of(before, model)
-    return Dataset(model, reference, Rows.of(later, model), tuple(shapes), tuple(frf), start)
-
-
-def moved(
-    model: Exact,
-    base: Array,
-    names: Sequence[tuple[int, str]],
-    effects: Array,
-    effect_names: Sequence[tuple[int, int, str]],
-) -> Exact:
-    """Return the model with its nominal numbers moved by `base` and its effects' by `effects`."""
-    laws = [(0, place, name) for place, name in names]
-    return model.moved(np.concatenate([base, effects]), [*laws, *effect_names])
+    return Dataset(model, reference, Rows.of(later, model), tuple(frf), start)

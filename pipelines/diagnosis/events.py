@@ -14,7 +14,7 @@ from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior
-from pipelines.diagnosis.table import Array
+from pipelines.diagnosis.table import Array, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
 
@@ -40,15 +40,17 @@ def best_window(
     data, best = rows.data, None
     if dictionary.event is None:
         return None
-    weight = rows.weight
+    weight = by_joint(rows.weight, rows.joint, rows.n_joints)
     first = 0
     for place, one in enumerate(data.logs):
-        own = np.stack([r[first : first + one.rows] for r in residual])
+        own, here = (
+            np.stack([v[first : first + one.rows] for v in part]) for part in (residual, weight)
+        )
         first += one.rows
-        torque = own / weight[:, None]
+        torque = own / here
         full = np.stack([np.interp(one.motion.t, one.t, v) for v in torque], axis=1)
         for shape in dictionary.event.shapes[0].promising(one.motion, arm, full):
-            columns = one.lay(shape.columns(one.motion, arm)) * weight[None, :, None]
+            columns = one.lay(shape.columns(one.motion, arm)) * here
             x = columns.reshape(len(columns), -1)
             amplitudes = np.linalg.lstsq(x.T, own.ravel(), rcond=1e-6)[0]
             gain = float((x @ own.ravel()) @ amplitudes)

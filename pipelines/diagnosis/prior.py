@@ -150,7 +150,7 @@ def _drift(
 ) -> Array:
     """Return the variance between sessions of each scaled number: friction drifts."""
     beta, rigid = dataset.model.beta, len(dataset.model.columns.kept)
-    usual = np.r_[beta[rigid:] * scale[rigid : len(beta)], scale[len(beta) :]] ** 2
+    usual = (beta[rigid:] * scale[rigid:]) ** 2
     form = np.array([float(g.key[0] == FORM) for g in of])
     every = np.r_[np.zeros(rigid), usual, form * found.variance / found.mean_square]
     return np.asarray(config.friction_drift**2 * every)

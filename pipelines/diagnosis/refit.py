@@ -14,7 +14,7 @@ import numpy as np
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.dataset import Dataset, Rows, moved
+from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior, typical
 from pipelines.diagnosis.score import block_losses
 from pipelines.diagnosis.screening import Screened, screen
@@ -119,7 +119,7 @@ class Later:
         info, moment = self.prior.start
         theta = np.zeros(self.base.width)
         model = self.dataset.model
-        theta[: len(model.beta)] = model.beta * self.prior.scale[: len(model.beta)]
+        theta[: len(model.beta)] = model.beta * self.prior.scale
         return self.fit(model, theta, info, moment)
 
     def fit(
@@ -140,7 +140,7 @@ class Later:
             for share in _SHARES:
                 base, more = share * step[: len(theta)], share * step[len(theta) :] / size
                 own = base[: self.prior.n_nominal] / self.prior.scale
-                tried = moved(model, own, self.dataset.law_names, more, names)
+                tried = model.moved(np.r_[own, more], names)
                 left = self._residual(tried, theta + base)
                 cost = self._cost(left, theta + base, info, moment)
                 if np.isfinite(cost) and cost <= now:
@@ -269,8 +269,7 @@ class Later:
         standing[: self.prior.n_nominal] = 0.0
         torque = self.rows.torque(model)
         return tuple(
-            y - t - s
-            for y, t, s in zip(self.y, torque, self.base.times(standing), strict=True)
+            y - t - s for y, t, s in zip(self.y, torque, self.base.times(standing), strict=True)
         )
 
     def _cost(self, residual: tuple[Array, ...], theta: Array, info: Array, moment: Array) -> float:

@@ -181,9 +181,7 @@ def _contest(
         best = min(scores, key=lambda key: scores[key].sum())
         return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
     pick = min(named, key=lambda one: scores[one.key].sum() + one.numbers * size)  # BIC
-    pays = confidence_set(
-        {"with": scores[pick.key], "without": _scores(later, state)}, config
-    )
+    pays = confidence_set({"with": scores[pick.key], "without": _scores(later, state)}, config)
     if "without" in pays and not pick.event:
         return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
     return pick, tuple(one.key for one in named if one is not pick), ""

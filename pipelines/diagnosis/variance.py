@@ -98,7 +98,9 @@ def settle(
     of = [g for g in groups for _ in range(g.width)]
 
     def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
-        there, through = rows.whitened(_left(rows, table.take(columns), of, config))
+        there, through = rows.whitened(
+            _left(rows, table.take(columns), of, config), config.noise_bins
+        )
         return there, through(table)
 
     later, table = settled(dataset.later, dictionary.later)
@@ -116,7 +118,9 @@ def _left(
 ) -> tuple[Array, ...]:
     """Return what the nominal columns and the dictionary together leave, of each joint."""
     scale = rows.nominal.norms
-    table = Table.stacked([rows.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0)), dictionary])
+    table = Table.stacked(
+        [rows.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0)), dictionary]
+    )
     gram, moment = table.gram(table), table.moments(rows.y)
     found = components(gram, moment, rows.count, of, config, _NOISE_ROUNDS)
     return tuple(y - t for y, t in zip(rows.y, table.times(found.mean), strict=True))
