@@ -14,13 +14,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
+from pipelines.diagnosis.answer import answer
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.errors import Check, UsageError
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.answered.outcome import Result
 from pipelines.model.diagnosis.asked.gates import logs_of_roles
+from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
+from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.model.diagnosis.floor.calibration_file import calibration_files, read_calibration, write_calibration
 from pipelines.model.diagnosis.memory import Memory
@@ -32,6 +37,8 @@ from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
+
+WITHOUT_REFERENCE = False  # whether logs without reference logs are diagnosed by one model as well
 
 
 @dataclass(frozen=True)
@@ -130,14 +137,28 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     said, boundary = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
                                settings.decimate, settings.min_speed, settings.seed, evidence=whole, limits=whole)
-    found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)
+    extension = None
+    if given.calibration is None and (chosen.reference or WITHOUT_REFERENCE):
+        found, extension = _by_one_model(chosen, engine, given, memory)
+    else:
+        found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)
     found = replace(_beside_clocks(found, said), boundary=boundary)
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
-                  without=settings.without, doctor=(*said, *found.checks), memory=memory,
+                  without=settings.without, doctor=(*said, *found.checks), memory=memory, extension=extension,
                   laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name,
                   calibrated_with=() if given.calibration is None else tuple(one.name for one in given.calibration.origin.logs))
+
+
+def _by_one_model(logs: Logs, chosen: DiagnosisSettings, given: Material, memory: Memory) -> tuple[Diagnosis, Extended | None]:
+    """By `pipelines.diagnosis`: every joint and cause in one Gaussian model of reference logs and later ones."""
+    usual = DiagnosisConfig()
+    config = replace(usual, causes=chosen.most, cutoff_hz=chosen.cutoff_hz or usual.cutoff_hz)
+    prepared = memory.prepared(logs, replace(chosen, cutoff_hz=config.cutoff_hz), given.arm)
+    given.tell("comparing with the reference logs" if logs.reference else "looking for causes")
+    found = diagnose_prepared(prepared, config, chosen.without)
+    return answer(prepared, found, given.tell, chosen.blocks, chosen.evidence, chosen.without)
 
 
 def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:

@@ -120,7 +120,8 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     said, _ = memory.examined(chosen, settings.allow_mismatch)
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
                                min_speed=settings.min_speed)
-    found = extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)
+    done = inputs.material.extension if isinstance(inputs.material, Diagnosed) and not settings.causes else None
+    found = done or extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),
@@ -154,7 +155,7 @@ def _kept(arm: Arm | None) -> list[Wanted]:
 def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
     """What `diagnose` named, within `run`; what happened once has no place in a model, nor what did harm there."""
     named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings
-             if not one.doubt and not _once(find_effect(one.cause))]
+             if diagnosed.verdict == "cause" and not one.doubt and not _once(find_effect(one.cause))]
     if not named:
         raise NothingMatched("C06", f"{_found_instead(diagnosed)}: there is nothing to extend the model by", where=label,
                              remedy="to try a cause all the same, name it: rrrid extend LOGS --with CAUSE:JOINT")

@@ -16,11 +16,11 @@ from pipelines.diagnosis.screening import Baseline, baseline
 from pipelines.diagnosis.selection import Selection, select
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.given.compliance import compliance
+from pipelines.model.diagnosis.given.compliance import Compliance, compliance
 
-__all__ = ["Diagnosis", "diagnose"]
+__all__ = ["Diagnosis", "diagnose", "diagnose_prepared"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +30,9 @@ class Diagnosis:
     decision: Decision
     selection: Selection
     baseline: Baseline
+    later: Later
+    responses: Compliance | None  # None: there are no frequency responses
+    config: DiagnosisConfig
 
 
 def diagnose(
@@ -46,8 +49,15 @@ def diagnose(
         InputRejected: as `prepare`, logs that give no rows.
     """
     config = config or DiagnosisConfig()
-    roles = Logs.by_role(logs)
-    rough = load(prepare(roles, DiagnosisSettings(cutoff_hz=config.cutoff_hz)), roles.frf)
+    prepared = prepare(Logs.by_role(logs), DiagnosisSettings(cutoff_hz=config.cutoff_hz))
+    return diagnose_prepared(prepared, config, exclude)
+
+
+def diagnose_prepared(
+    prepared: Prepared, config: DiagnosisConfig, exclude: Sequence[str] = ()
+) -> Diagnosis:
+    """Return the same of rows that were prepared."""
+    rough = load(prepared, prepared.logs.frf)
     dataset, dictionary = settle(rough, Dictionary.of(rough, config, exclude), config)
     prior = prior_of(dataset, dictionary, config)
     later = Later.of(dataset, dictionary, prior, config)
@@ -56,4 +66,5 @@ def diagnose(
     )
     responses = compliance(dataset.frf, dataset.model.nominal, exclude)
     found = select(later, known, responses.named if responses else (), config)
-    return Diagnosis(decide(later, found, known, config), found, known)
+    decision = decide(later, found, known, config)
+    return Diagnosis(decision, found, known, later, responses, config)

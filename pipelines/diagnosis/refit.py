@@ -254,6 +254,14 @@ class Later:
         info = 0.5 * (info + info.T)
         return info, info @ np.linalg.solve(state.info, state.moment)
 
+    def information(self, state: State) -> Array:
+        """Return P (k, k) of nominal and standing numbers and those of the effects, of unit columns."""
+        return self._information(state.info, state.effects)
+
+    def slopes(self, state: State) -> tuple[Table, list[tuple[int, int, str]]]:
+        """Return the slopes by the numbers of the effects in their own units, and their names."""
+        return self._slopes(state.model)
+
     def _information(self, info: Array, effects: Table) -> Array:
         across = self.base.gram(effects)
         own = effects.gram(effects) + _RIDGE * np.eye(effects.width)

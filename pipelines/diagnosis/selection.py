@@ -22,7 +22,7 @@ from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Cause", "Selection", "select"]
+__all__ = ["Candidate", "Cause", "Round", "Selection", "select"]
 
 
 @dataclass(frozen=True)
@@ -68,16 +68,20 @@ class Selection:
     explained: float  # cost that the causes save
     stopped: str  # why a significant cause was not selected; "" where there was none
     follows: str  # what the rest follows; "" where nothing is significant
+    rounds: tuple[Round, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Round:
+@dataclass(frozen=True, eq=False)
+class Round:
     """The outcome of one round of the forward selection."""
 
+    before: State
     cause: Cause | None
     state: State | None
     stopped: str = ""
     follows: str = ""
+    significant: tuple[Screened, ...] = ()
+    tried: tuple[Candidate, ...] = ()
 
 
 def select(
@@ -92,10 +96,12 @@ def select(
     causes: list[Cause] = []
     stopped = follows = ""
     explained = 0.0
+    rounds: list[Round] = []
     while len(causes) < config.causes:
         found = _round(
             later, state, causes, explained, baseline, responses if not causes else (), config
         )
+        rounds.append(found)
         stopped, follows = found.stopped, found.follows
         if found.cause is None or found.state is None:
             break
@@ -103,7 +109,9 @@ def select(
         explained += max(state.cost - found.state.cost, 0.0)
         state = later.beside(found.state, config)
     causes, state = _backward(later, causes, state, config)
-    return Selection(tuple(causes), start, state, explained, stopped, follows)
+    return Selection(
+        tuple(causes), start, state, explained, stopped, follows, tuple(rounds)
+    )
 
 
 def _round(
@@ -114,7 +122,7 @@ def _round(
     baseline: Baseline,
     responses: Sequence[Acting],
     config: DiagnosisConfig,
-) -> _Round:
+) -> Round:
     """Return the cause that explains most of the residual of `state`, or why none is selected."""
     significant = _significant(
         later, state, [cause.key for cause in causes], explained, baseline, config
@@ -125,15 +133,17 @@ def _round(
         if one.state.losses.sum() < state.losses.sum()
     ]
     others = _unnamed(later, state, significant, bool(responses))
+    seen = Round(state, None, None, significant=tuple(significant.values()), tried=tuple(tried))
     if not tried:
-        return _Round(None, None, follows=_place(next(iter(others))) if others else "")
+        return replace(seen, follows=_place(next(iter(others))) if others else "")
     pick, alternatives, stopped = _contest(later, state, tried, others, config)
     if pick is None:  # perhaps by another law of the same cause
         tried = [_other_form(later, state, one) for one in tried]
         pick, alternatives, stopped = _contest(later, state, tried, others, config)
     if pick is None:
-        return _Round(None, None, stopped)
-    return _Round(Cause(pick.key, alternatives), _other_form(later, state, pick).state)
+        return replace(seen, stopped=stopped)
+    chosen = _other_form(later, state, pick).state
+    return replace(seen, cause=Cause(pick.key, alternatives), state=chosen)
 
 
 def _significant(

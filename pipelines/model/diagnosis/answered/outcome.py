@@ -10,6 +10,7 @@ from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
+from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
 
@@ -28,6 +29,7 @@ class Result(Diagnosis):
     calibrated_with: tuple[str, ...] = ()  # logs of an earlier diagnosis, whose thresholds were taken; none: its own
     laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
     memory: Memory | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)
+    extension: Extended | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)  # by all that was named
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,156 @@
+"""What these logs can tell: the smallest cause that would have been found, and what cannot be seen.
+
+    limits = limits_of(later, state, baseline)
+
+A cause of amplitude a adds a² h to T_c, h its share of H_c (`screening`). It is found with 95 % where
+
+    a √h > √threshold + 1.65     (the power of the test; Scharf & Friedlander 1994, with one sigma
+                                  of chance beside the threshold)
+
+Of shapes that differ, an order say, the limit is that of one that a quarter of them do not reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.diagnosis.candidates import Key
+from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.screening import Baseline
+from pipelines.diagnosis.table import Array, Table
+from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
+from pipelines.model.effects.base import Effect
+
+__all__ = ["Limits", "limits_of"]
+
+_SIDE = 1.65  # normal deviate of 95 %, one-sided
+_QUARTER = 0.25  # of the shapes of a cause, that may be seen worse than its limit says
+_VISIBLE = 0.02  # share of a column that the model does not imitate, below which nothing is seen
+_MAIN = 0.1  # of a column: a parameter that makes up less of it does not hide it
+_TOO_MUCH = "these logs cannot show it: no arm has so much of it that they would"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What would have been found, and what not however large."""
+
+    detectable: tuple[Detectable, ...]
+    not_testable: tuple[NotTestable, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Shape:
+    """One shape of a cause."""
+
+    effect: Effect
+    hidden: Array  # H_c, of its amplitudes
+    length: Array  # of its columns
+    cross: Array  # coefficients by which the model imitates them, of unit columns
+    freedom: int
+
+    def power(self, amplitudes: Array) -> float:
+        """Return what these amplitudes add to T_c."""
+        return float(amplitudes @ self.hidden @ amplitudes)
+
+    @property
+    def visibility(self) -> float:
+        """Share of its first column that the model cannot imitate."""
+        return float(np.sqrt(max(self.hidden[0, 0], 0.0)) / max(self.length[0], 1e-300))
+
+
+def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
+    """Return the limits beside the model that was found."""
+    shapes: dict[Key, list[_Shape]] = {}
+    both = Table.stacked([later.base, state.effects])
+    cross = np.concatenate([later.cross, state.effects.gram(later.candidates)])
+    solved = np.linalg.solve(later.information(state), cross)
+    for group, square in zip(later.dictionary.groups, later.squares, strict=True):
+        at, family = group.columns, later.dictionary.families.get(group.key)
+        if group.kind != "named" or family is None:
+            continue
+        length = np.sqrt(np.maximum(np.diag(square), 0.0))
+        part = np.abs(solved[:, at]) * both.norms[:, None] / np.maximum(length, 1e-300)
+        hidden = square - cross[:, at].T @ solved[:, at]
+        shapes.setdefault(group.key, []).append(
+            _Shape(family.shapes[group.shape], hidden, length, part, group.width)
+        )
+    there = {(one.effect.name, one.effect.joint) for one in state.model.effects}
+    told = [_limit(later, own, baseline) for key, own in shapes.items() if key not in there]
+    return Limits(
+        tuple(one for one in told if isinstance(one, Detectable)),
+        tuple(one for one in told if isinstance(one, NotTestable)),
+    )
+
+
+def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> Detectable | NotTestable:
+    """Return the smallest of a cause that would have been found, or why none would."""
+    visible = max(one.visibility for one in shapes)
+    first = shapes[0].effect
+    if visible < _VISIBLE:
+        reason = f"absorbed by {_hiding(later, shapes[0])}; needs other motion"
+        return NotTestable(first.name, first.joint, reason, first.experiment)
+    needed = {
+        k: np.sqrt(baseline.threshold("named", k, later.rows.count)) + _SIDE
+        for k in {one.freedom for one in shapes}
+    }
+    if first.fixed_amplitudes is None:
+        reach = [np.sqrt(max(s.hidden[0, 0], 0.0)) / needed[s.freedom] for s in shapes]
+        one = shapes[int(np.argsort(reach)[int(_QUARTER * (len(reach) - 1))])]
+        least = needed[one.freedom] / np.sqrt(max(one.hidden[0, 0], 1e-300))
+        return _told(later, one, least * np.eye(one.freedom)[0], visible)
+    amplitudes = np.array(first.fixed_amplitudes)
+    seen = [s for s in shapes if s.power(amplitudes) > needed[s.freedom] ** 2]
+    if not seen:
+        return NotTestable(first.name, first.joint, _TOO_MUCH, first.experiment)
+    return _told(later, min(seen, key=lambda s: s.effect.strength), amplitudes, visible)
+
+
+def _told(
+    later: Later, one: _Shape, amplitudes: Array, visible: float
+) -> Detectable | NotTestable:
+    """Return the parameter that goes with the amplitudes, where an arm can have as much of it."""
+    effect = one.effect
+    values = effect.values(amplitudes)
+    joint = effect.joint
+    turning = joint is None or later.dataset.arm.robot.revolute[joint - 1]
+    beyond = NotTestable(effect.name, joint, _TOO_MUCH, effect.experiment)
+    if effect.fixed_amplitudes is not None:
+        q = next(q for q in effect.parameters if q.name == effect.grows_with)
+        size = Value(values[q.name], None, q.unit_at(turning))
+        less = effect.strength < 0.0
+        return Detectable(effect.name, joint, q.name, size, {}, "analytic", visible, less)
+    main = next(
+        (
+            q
+            for q in effect.parameters
+            if not q.shape and not q.derived and values.get(q.name) and np.isfinite(values[q.name])
+        ),
+        None,
+    )
+    if main is None:
+        return beyond
+    size = Value(abs(values[main.name]), None, main.unit_at(turning))
+    most = max(abs(main.low), main.high)
+    if main.unit == "N m":  # no torque beyond the largest that the machine has given
+        most = min(most, later.rows.data.largest_torque(joint))
+    if abs(values[main.name]) > most:
+        return beyond
+    shown = effect.reported(values)
+    at = {
+        q.name: Value(values[q.name], None, q.unit_at(turning))
+        for q in effect.parameters
+        if q.shape and q.name in shown and np.isfinite(values.get(q.name, np.nan))
+    }
+    return Detectable(effect.name, joint, main.name, size, at, "analytic", visible)
+
+
+def _hiding(later: Later, one: _Shape) -> str:
+    """Return the names of the nominal parameters that imitate a shape."""
+    names = [column.name for column in later.dataset.model.columns.names]
+    share = one.cross[: len(names)].max(axis=1)
+    return ", ".join(n for n, x in zip(names, share, strict=True) if x > _MAIN) or (
+        "all base parameters together"
+    )

@@ -1,0 +1,166 @@
+"""Models of a diagnosis fitted to the rows of role "identify" alone, and what they leave of the others.
+
+    trained = train(prepared, later, causes)
+    trained.models                         nominal, with the first cause, …, with all of them
+    trained.held_out(0)                    what the nominal model leaves of rows that it has not seen
+
+A model for simulation has no standing dictionary: the prior is that of its nominal numbers alone,
+
+    N(m_n, (A_nn - A_ns A_ss⁻¹ A_sn)⁻¹),   the marginal of N(m, A⁻¹).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.diagnosis.candidates import Dictionary
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import Rows
+from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.table import Array, Table
+from pipelines.model.diagnosis.asked.inputs import Prepared
+from pipelines.model.diagnosis.fitted.exact import Named
+from pipelines.model.diagnosis.fitted.nominal import rigid_rows
+from pipelines.model.diagnosis.fitted.refit import Refined
+from pipelines.model.diagnosis.fitted.slopes import slopes_of
+from pipelines.model.diagnosis.rows.data import Data
+
+__all__ = ["Trained", "covariance", "train"]
+
+_UNSEEN = 1e6  # numerics: variance of a number of unit columns, from which the rows do not tell it
+
+
+@dataclass(frozen=True, eq=False)
+class Trained:
+    """Models, each with one cause more than the one before."""
+
+    models: tuple[Refined, ...]  # over the identify rows, as they are logged
+    judge: Data | None
+    states: tuple[State, ...]  # the same over whitened rows
+    later: Later
+    blocks: int
+
+    @property
+    def data(self) -> Data:
+        """The rows that judge: of role "validate", or else those that were fitted."""
+        return self.models[0].data if self.judge is None else self.judge
+
+    def held_out(self, place: int) -> Array:
+        """Return the residual (rows,) [N m] of model number `place` on rows it was not fitted to.
+
+        Without logs that judge, each block of time is predicted from all others, to first order:
+        θ_-b - θ = -(P - J_b J_bᵀ)⁻¹ J_b r_b. An event keeps its numbers, which no other block tells.
+        """
+        done, state = self.models[place], self.states[place]
+        if self.judge is not None:
+            return np.asarray(self.judge.y - done.model.torque(self.judge))
+        first, size = len(done.model.beta), self._sizes(state)
+        lasting = np.r_[np.arange(first), first + state.lasting]
+        columns = Table.stacked([self.later.base, state.effects]).take(lasting)
+        own = [k for k in range(len(done.slopes)) if k < first or done.names[k - first][0] == 1]
+        slopes = (done.slopes[own] / size[:, None])[lasting]
+        info = self.later.information(state)[np.ix_(lasting, lasting)]
+        block, left = done.data.blocks(self.blocks), done.left.copy()
+        parts = [block[done.data.joint == j] for j in range(done.data.n_joints)]
+        for b in range(int(block.max()) + 1):
+            here = [part == b for part in parts]
+            gradient = -columns.moments(state.residual, here)
+            step = np.linalg.solve(info - columns.gram(columns, here), gradient)
+            left[block == b] -= np.asarray(step @ slopes[:, block == b])
+        return left
+
+    def _sizes(self, state: State) -> Array:
+        """(numbers,) by which each number is scaled."""
+        slopes, _ = self.later.slopes(state)
+        size: Array = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
+        return np.concatenate([self.later.prior.scale, size])
+
+
+def train(prepared: Prepared, later: Later, causes: Sequence[Named], blocks: int) -> Trained:
+    """Return the nominal model and those with causes, in their order, without the held-out rows."""
+    own = _later(later, len(prepared.data.logs))
+    states = [own.start()]
+    for one in causes:
+        before = states[-1]
+        info, moment = own.freed(before, one.effect)
+        model = replace(before.model, effects=(*before.model.effects, one))
+        states.append(own.fit(model, before.theta, info, moment))
+    data = prepared.data
+    weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
+    models = tuple(_refined(own, state, data, weight) for state in states)
+    return Trained(models, prepared.judge, tuple(states), own, blocks)
+
+
+def _later(later: Later, logs: int) -> Later:
+    """Return the rows of the first logs beside the prior of nominal numbers."""
+    rows = later.rows
+    known = rows.data.log_of < logs
+    parts = [known[rows.joint == j] for j in range(rows.n_joints)]
+    some = Table(
+        rows.nominal.width,
+        rows.nominal.index,
+        tuple(v[:, part] for v, part in zip(rows.nominal.values, parts, strict=True)),
+    )
+    data = replace(rows.data, logs=rows.data.logs[:logs])
+    fewer = Rows(data, rows.columns, rows.weight[known], some, rows.level)
+    none = some.take(np.zeros(0, dtype=np.intp))
+    dataset = replace(later.dataset, later=fewer)
+    dictionary = Dictionary((), {}, none, None)
+    return Later.of(dataset, dictionary, _nominal(later.prior), DiagnosisConfig())
+
+
+def _nominal(prior: Prior) -> Prior:
+    """Return what the prior says of the nominal numbers alone."""
+    info, moment = prior.start
+    n = prior.n_nominal
+    mean = np.linalg.solve(info, moment)[:n]
+    side = info[:n, n:]
+    own = info[:n, :n] - side @ np.linalg.solve(info[n:, n:], side.T)
+    own = 0.5 * (own + own.T)
+    none = np.zeros(0, dtype=np.intp)
+    return replace(prior, standing=none, groups=(), start=(own, own @ mean))
+
+
+def _refined(later: Later, state: State, data: Data, weight: Array) -> Refined:
+    """Return a state over rows as they are logged, with the covariance of all its numbers."""
+    model = state.model
+    slopes, names = slopes_of(model, data, rigid_rows(data, model.columns))
+    first = len(model.beta)
+    fitted = np.array([k < first or names[k - first][0] == 1 for k in range(len(slopes))])
+    known = np.zeros((len(slopes), len(slopes)))
+    known[np.ix_(fitted, fitted)] = covariance(later, state)
+    left = data.y - model.torque(data)
+    return Refined(model, data, weight, left, slopes, tuple(names), known)
+
+
+def covariance(later: Later, state: State) -> Array:
+    """Return the covariance of the nominal numbers and those of the effects, in their own units.
+
+    That of white noise of unit variance, P⁻¹; of a number that blocks of time together tell worse,
+    by the scores of the blocks, P⁻¹ Σ_b J_b r_b r_bᵀ J_bᵀ P⁻¹ (White 1980; Liang & Zeger 1986).
+    Numbers that the rows do not tell have the variance 0.
+    """
+    slopes, _ = later.slopes(state)
+    size = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
+    columns = Table.stacked([later.base, state.effects])
+    white = np.linalg.inv(later.information(state))
+    count = len(later.block_rows)
+    scores = np.zeros((columns.width, count))
+    for j, (index, values) in enumerate(zip(columns.index, columns.values, strict=True)):
+        weighted = values * state.residual[j]
+        own = [np.bincount(later.block[j], row, count) for row in weighted]
+        scores[index] += np.array(own).reshape(len(index), count)
+    moved = white @ scores
+    robust = np.sqrt(np.sum(moved**2, axis=1))
+    wider = np.maximum(robust / np.sqrt(np.diag(white)), 1.0)
+    numbers = np.r_[np.arange(later.prior.n_nominal), np.arange(later.base.width, len(white))]
+    scale = np.r_[later.prior.scale, size]
+    wider = wider[numbers] / scale
+    out = white[np.ix_(numbers, numbers)] * wider * wider[:, None]
+    told = np.diag(white)[numbers] < _UNSEEN
+    told[: later.prior.n_nominal] = True
+    return np.asarray(out * told * told[:, None])
