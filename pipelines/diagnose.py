@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
-from pipelines.diagnosis.answer import answer
+from pipelines.diagnosis.answer import WITHOUT_REFERENCE, answer
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.errors import Check, UsageError
@@ -37,8 +37,6 @@ from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
-
-WITHOUT_REFERENCE = False  # whether logs without reference logs are diagnosed by one model as well
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipelines.diagnosis.answer import WITHOUT_REFERENCE
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.extension import extend as extend_by_one_model
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.log.canonical import digest_of
 from pipelines.log.derive import derive, recording
@@ -121,7 +124,16 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
                                min_speed=settings.min_speed)
     done = inputs.material.extension if isinstance(inputs.material, Diagnosed) and not settings.causes else None
-    found = done or extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)
+    if done is not None:
+        found = done
+    elif chosen.reference or WITHOUT_REFERENCE:
+        usual = DiagnosisConfig()
+        config = replace(usual, cutoff_hz=settings.filter or usual.cutoff_hz)
+        prepared = memory.prepared(chosen, replace(engine, cutoff_hz=config.cutoff_hz), given.arm)
+        given.tell(f"fitting {', '.join(dict.fromkeys(one.place for one in wanted))}")
+        found = extend_by_one_model(prepared, _each(wanted), config, settings.blocks)
+    else:
+        found = extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),

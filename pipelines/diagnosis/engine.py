@@ -20,7 +20,7 @@ from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.given.compliance import Compliance, compliance
 
-__all__ = ["Diagnosis", "diagnose", "diagnose_prepared"]
+__all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,17 +53,20 @@ def diagnose(
     return diagnose_prepared(prepared, config, exclude)
 
 
+def pose(prepared: Prepared, config: DiagnosisConfig, exclude: Sequence[str] = ()) -> Later:
+    """Return the rows of later logs beside their prior, with all candidates."""
+    rough = load(prepared, prepared.logs.frf)
+    dataset, dictionary = settle(rough, Dictionary.of(rough, config, exclude), config)
+    return Later.of(dataset, dictionary, prior_of(dataset, dictionary, config), config)
+
+
 def diagnose_prepared(
     prepared: Prepared, config: DiagnosisConfig, exclude: Sequence[str] = ()
 ) -> Diagnosis:
     """Return the same of rows that were prepared."""
-    rough = load(prepared, prepared.logs.frf)
-    dataset, dictionary = settle(rough, Dictionary.of(rough, config, exclude), config)
-    prior = prior_of(dataset, dictionary, config)
-    later = Later.of(dataset, dictionary, prior, config)
-    known = baseline(
-        dataset, dictionary, prior, event_threshold(dataset, dictionary, prior, config), config
-    )
+    later = pose(prepared, config, exclude)
+    dataset, parts = later.dataset, (later.dataset, later.dictionary, later.prior)
+    known = baseline(*parts, event_threshold(*parts, config), config)
     responses = compliance(dataset.frf, dataset.model.nominal, exclude)
     found = select(later, known, responses.named if responses else (), config)
     decision = decide(later, found, known, config)

@@ -22,7 +22,7 @@ from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Candidate", "Cause", "Round", "Selection", "select"]
+__all__ = ["Candidate", "Cause", "Round", "Selection", "refit", "select"]
 
 
 @dataclass(frozen=True)
@@ -344,3 +344,11 @@ def _event_price(one: Candidate, later: Later) -> float:
 
 def _place(key: Key) -> str:
     return key[0] if key[1] is None else f"{key[0]}:{key[1]}"
+
+
+def refit(
+    later: Later, state: State, key: Key, effect: Effect, amplitudes: Array
+) -> Candidate | None:
+    """Return a cause that somebody names, refitted, by the law of it that predicts best."""
+    one = _candidate(later, state, key, 0.0, effect, amplitudes)
+    return None if one is None else _other_form(later, state, one)

@@ -37,6 +37,8 @@ def laws_words(laws_of: str, in_run: str = "", fewer: Sequence[FewerTerms] = ())
     return ("Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run: no earlier fit of friction is "
             f"taken. --model FILE takes the laws of a model{other}.")
 
+_PARTS = "parts of "  # how the origin of thresholds begins that come from parts of the logs themselves
+
 
 def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
     """One sentence for all joints at which the same laws stand in place of the same one."""
@@ -55,6 +57,8 @@ def threshold_words(result: Diagnosed) -> str:
     told = "; ".join(map(_by, origins)) or "none, for no cause was looked for"
     if result.calibrated_with:
         return f"Thresholds: {told}. An earlier diagnosis has stored them, of {', '.join(result.calibrated_with)}."
+    if origins and all(origin.startswith(_PARTS) for origin in origins):
+        return f"Thresholds: {told}. They were made here."
     return f"Thresholds: {told}. They were made here; --calibration DIR takes those of an earlier diagnosis."
 
 
@@ -64,5 +68,8 @@ def _by(origin: str) -> str:
         return (f"a cause has to take {100.0 * SHARE:g} % off the mean square of the residual, all joints together, each in units "
                 "of its own rms: a fixed number, for nothing here tells what an arm in order would show; and time that it was not "
                 "chosen by has to bear it out")
+    if origin.startswith(_PARTS):
+        return (f"a cause has to exceed what chance gives any cause with a probability of 1 %, and what {origin} differ by; and "
+                "blocks of time that it was not fitted to have to bear it out")
     return (f"a cause has to take off {TIMES:g} times what it, or its like, takes off by chance where nothing is wrong, by "
             f"{origin}")

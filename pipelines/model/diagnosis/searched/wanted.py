@@ -14,7 +14,7 @@ from pipelines.model.diagnosis.screened.candidates import Family, families, plac
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Wanted", "wanted_families"]
+__all__ = ["Wanted", "usable", "wanted_families"]
 
 
 @dataclass(frozen=True)
@@ -45,26 +45,36 @@ def wanted_families(case: Case, wanted: Sequence[Wanted]) -> tuple[Family, ...]:
 def _family(case: Case, one: Wanted) -> Family:
     every = families(case.model.columns.laws, whole_motion(case.data), case.model.arm)
     mine = next((f for f in every if (f.cause, f.joint) == (one.effect.name, one.effect.joint)), None)
-    if mine is None:
-        why, remedy = _missing(case, one)
-        raise UsageError("C02", f"{one.place}: {why}", where="--with", remedy=remedy)
-    if mine.event:
-        raise UsageError("C02", f"{one.place} happens once: no model of the arm holds it", where="--with",
-                         remedy="leave the moment out of the logs instead")
+    mine = usable(mine, one, case.model.columns.laws, case.model.arm.robot.revolute)
     shape: dict[str, Any] = dict(one.start)
     return replace(mine, shapes=tuple(dict.fromkeys(replace(s, **shape) for s in mine.shapes)))
 
 
-def _missing(case: Case, one: Wanted) -> tuple[str, str]:
+def usable(mine: Family | None, one: Wanted, laws: Sequence[Effect], revolute: Sequence[bool]) -> Family:
+    """The shapes of a wanted cause, `mine`, where a model with such friction `laws` can take it up.
+
+    Raises:
+        UsageError: C02, it cannot.
+    """
+    if mine is None:
+        why, remedy = _missing(one, laws, revolute)
+        raise UsageError("C02", f"{one.place}: {why}", where="--with", remedy=remedy)
+    if mine.event:
+        raise UsageError("C02", f"{one.place} happens once: no model of the arm holds it", where="--with",
+                         remedy="leave the moment out of the logs instead")
+    return mine
+
+
+def _missing(one: Wanted, laws: Sequence[Effect], revolute: Sequence[bool]) -> tuple[str, str]:
     """Why nothing can be fitted there, and what to do."""
     effect = one.effect
-    if effect.name in {law.name for law in case.model.columns.laws}:
+    if effect.name in {law.name for law in laws}:
         return "the nominal model has it already", "name a cause that the nominal model lacks"
     if effect.evidence == "none":
         return "it is a law of friction for a nominal model, and no cause", "extend a model that has it: --model FILE"
     if effect.evidence == "base parameters":
         return ("the base parameters take it up, and no reference logs show that they moved as it moves them",
                 "name reference logs from before it: --reference PATH")
-    places = [place_of(other.name, other.joint) for other in effect.everywhere(case.model.arm.robot.revolute)]
+    places = [place_of(other.name, other.joint) for other in effect.everywhere(revolute)]
     return ("this arm does not have it there",
             f"write {' or '.join(places)}" if places else "name another cause: no place of this arm has it")

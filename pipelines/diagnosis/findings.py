@@ -1,0 +1,228 @@
+"""Causes as they are told: their numbers, what they gain on held-out rows, what proves them.
+
+    worth = weigh(prepared, later, trained, simulated=True)
+    findings = findings_of(worth, later, end, rivals)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.selection import Round
+from pipelines.diagnosis.table import Array
+from pipelines.diagnosis.trained import Trained, covariance
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.diagnosis.asked.inputs import Prepared
+from pipelines.model.diagnosis.extend import Extended, with_uncertainty
+from pipelines.model.diagnosis.fitted.refit import Refined
+from pipelines.model.diagnosis.given.compliance import Compliance
+from pipelines.model.diagnosis.result import Answer, Finding, Gain, Proof, ResidualRms, Rival
+from pipelines.model.diagnosis.worth.gains import (
+    Simulation,
+    gain_of,
+    simulation_errors,
+    torque_gain_of,
+)
+from pipelines.model.diagnosis.worth.numbers import acting, parameters
+from pipelines.model.diagnosis.worth.proof import proof
+
+__all__ = ["Worth", "extended_arm", "extension_of", "findings_of", "rivals_of", "weigh"]
+
+
+@dataclass(frozen=True, eq=False)
+class Worth:
+    """Models without the held-out rows, and what each leaves of them."""
+
+    trained: Trained
+    left: tuple[Array, ...]  # (rows,) [N m] of each model, held out
+    simulated: tuple[Simulation, ...]  # each model, under the controllers of the held-out logs
+    floor: Array  # (joints,) [N m]
+    whole: bool  # with figures
+
+    def gain(self, before: int, after: int) -> Gain:
+        """Return what model number `after` gains over another."""
+        torque = torque_gain_of(self.trained.data, self.left[before], self.left[after])
+        return gain_of(torque, self.simulated[before], self.simulated[after])
+
+    def rms(self, place: int) -> ResidualRms:
+        """Return what a model leaves."""
+        held_out = self.trained.data.rms(self.left[place])
+        return ResidualRms(self.trained.models[place].rms, held_out, self.floor)
+
+
+def weigh(prepared: Prepared, later: Later, trained: Trained, whole: bool) -> Worth:
+    """Return what the models are worth on held-out rows.
+
+    The floor is what the nominal model leaves of the machine in order; without reference logs, what
+    the last model leaves of the rows it was fitted to.
+    """
+    arms = [one.model.arm for one in trained.models]
+    simulated = (
+        simulation_errors(arms, prepared.judging or prepared.motions)
+        if whole
+        else [Simulation.none(arm.n_joints) for arm in arms]
+    )
+    rows, nominal = prepared.reference, later.dataset.model
+    floor = trained.models[-1].rms if rows is None else rows.rms(rows.y - nominal.torque(rows))
+    left = tuple(trained.held_out(k) for k in range(len(arms)))
+    return Worth(trained, left, tuple(simulated), floor, whole)
+
+
+def findings_of(
+    worth: Worth,
+    later: Later,
+    end: State,
+    rivals: Sequence[tuple[Rival, ...]],
+    responses: Compliance | None,
+) -> tuple[Finding, ...]:
+    """Return the causes of a model, strongest first, their numbers by all rows.
+
+    Args:
+        rivals: of each cause.
+    """
+    if not rivals:
+        return ()
+    _, names = later.slopes(end)
+    every = Refined(
+        end.model,
+        later.rows.data,
+        worth.trained.models[0].weight,
+        np.zeros(0),
+        np.zeros((len(end.model.beta) + len(names), 0)),
+        tuple(names),
+        covariance(later, end),
+    )
+    out = []
+    for place, others in enumerate(rivals):
+        one = end.model.effects[place]
+        effect, data = one.effect, later.rows.data
+        size, joint, of_rated = _size(worth, place)
+        answers: tuple[Answer, ...] = ()
+        if effect.evidence == "frequency responses" and responses is not None and worth.whole:
+            answers = responses.answers(Acting.of(effect, one.values))
+        out.append(
+            Finding(
+                effect.name,
+                effect.joint,
+                effect.title,
+                parameters(every, place),
+                _explained(worth, place),
+                _visibility(later, end, place),
+                others,
+                effect.experiment if others else None,
+                worth.gain(place, place + 1),
+                _ORIGINS.get(effect.evidence, "residual"),
+                size,
+                of_rated,
+                _proof(worth, place, joint),
+                answers=answers,
+                log=None if one.log is None else data.logs[one.log - data.first].log.name,
+            )
+        )
+    return tuple(sorted(out, key=lambda one: -one.explained))
+
+
+Origin = Literal["residual", "base parameters", "frequency responses", "reversals"]
+_ORIGINS: dict[str, Origin] = {
+    "base parameters": "base parameters",
+    "frequency responses": "frequency responses",
+    "reversals": "reversals",
+}
+
+
+def _proof(worth: Worth, place: int, joint: int) -> Proof | None:
+    """Return the figure of a cause; None where it happened in a held-out log."""
+    before, after = worth.trained.models[place : place + 2]
+    one = after.model.effects[place]
+    log = None if one.log is None else one.log - before.data.first
+    if not worth.whole or (log is not None and log >= len(before.data.logs)):
+        return None
+    compliant = one.effect.evidence == "frequency responses"
+    shown = joint + 1 if compliant else one.effect.joint
+    return proof(before, after, shown, log, bool(one.effect.per_log) and log is not None)
+
+
+def _size(worth: Worth, place: int) -> tuple[float, int, float]:
+    """Return the rms [N m] of a cause's torque at its joint or where it stands highest.
+
+    And that joint, from 0, and the share of its rated torque.
+    """
+    done = worth.trained.models[-1]
+    effect, data = done.model.effects[place].effect, done.data
+    own = data.rms(done.model.torque(data) - done.model.without(place).torque(data))
+    joint = int(np.argmax(own / worth.floor)) if effect.joint is None else effect.joint - 1
+    rated = data.logs[0].log.robot.joints[joint].torque
+    share = float(own[joint] / rated) if np.isfinite(rated) and rated > 0.0 else np.nan
+    return float(own[joint]), joint, share
+
+
+def _explained(worth: Worth, place: int) -> float:
+    """Return the share of the nominal residual's power above the floor that a cause takes away."""
+
+    def above(k: int) -> float:
+        power = np.square(worth.trained.models[k].rms / worth.floor)
+        return float(np.sum(np.maximum(power - 1.0, 0.0)))
+
+    taken = (above(place) - above(place + 1)) / max(above(0), 1e-12)
+    return float(np.clip(taken, 0.0, 1.0))
+
+
+def _visibility(later: Later, end: State, place: int) -> float:
+    """Return the part of a cause's torque that nominal and standing numbers cannot imitate."""
+    rows, model = later.rows, end.model
+    without = rows.torque(model.without(place))
+    own = [a - b for a, b in zip(rows.torque(model), without, strict=True)]
+    moments = later.base.moments(own)
+    power = sum(float(x @ x) for x in own)
+    imitated = float(moments @ np.linalg.solve(end.info + later.gram, moments))
+    return float(np.sqrt(np.clip(1.0 - imitated / max(power, 1e-300), 0.0, 1.0)))
+
+
+def rivals_of(own: Round) -> tuple[Rival, ...]:
+    """Return the causes that the data do not tell from the one selected in a round."""
+    if own.cause is None or own.state is None:
+        return ()
+
+    def taken(state: State) -> Array:
+        parts = zip(own.before.residual, state.residual, strict=True)
+        return np.concatenate([a - b for a, b in parts])
+
+    mine, out = taken(own.state), []
+    for one in own.tried:
+        if one.key in own.cause.alternatives:
+            theirs = taken(one.state)
+            size = float(np.linalg.norm(mine) * np.linalg.norm(theirs))
+            out.append(Rival(*one.key, float(mine @ theirs) / max(size, 1e-300)))
+    return tuple(sorted(out, key=lambda one: -one.similarity))
+
+
+def extension_of(prepared: Prepared, worth: Worth, findings: Sequence[Finding]) -> Extended:
+    """Return the model with every cause that lasts, all numbers with their standard deviations."""
+    last = len(worth.trained.models) - 1
+    return Extended(
+        extended_arm(worth.trained),
+        tuple(one for one in findings if one.log is None),
+        (),
+        worth.gain(0, last),
+        worth.rms(0),
+        worth.rms(last),
+        "blocks" if prepared.judge is None else "logs",
+        (),
+        (*prepared.motions, *prepared.judging),
+        len(prepared.motions),
+        prepared.fewer,
+    )
+
+
+def extended_arm(trained: Trained) -> Arm:
+    """Return the arm with every cause that lasts, all numbers with their standard deviations."""
+    done = trained.models[-1]
+    known = done.covariance()
+    kept = [k for k, one in enumerate(done.model.effects) if one.log is None]
+    arm = done.model.nominal.extended(*(acting(done, k, known) for k in kept))
+    return with_uncertainty(arm, done)
