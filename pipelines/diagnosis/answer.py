@@ -13,7 +13,6 @@ import numpy as np
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.engine import Diagnosis as Found
 from pipelines.diagnosis.findings import (
-    extended_arm,
     extension_of,
     findings_of,
     rivals_of,
@@ -22,12 +21,13 @@ from pipelines.diagnosis.findings import (
 from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.diagnosis.screening import best_of
 from pipelines.diagnosis.selection import Candidate
+from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import Trained, train
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.answered.judgeable import limited_by_estimate
 from pipelines.model.diagnosis.answered.words import beside, how_much, taken_in, where
 from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.extend import Extended, with_uncertainty
+from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.given.compliance import gaps_untold, untold
 from pipelines.model.diagnosis.result import (
     Diagnosis,
@@ -76,8 +76,10 @@ def answer(
     """
     tell("weighing what was found, and what these logs would have shown")
     causes, end = found.decision.causes, found.selection.end
-    trained = train(prepared, found.later, end.model.effects if causes else (), blocks)
-    worth = weigh(prepared, found.later, trained, whole)
+    standing = standing_of(prepared.reference, found.later, found.config)
+    named_effects = end.model.effects if causes else ()
+    trained = train(prepared, found.later, named_effects, blocks, standing)
+    worth = weigh(prepared, trained, standing.floor, whole)
     last, floor = len(causes), worth.floor
     rounds = {one.cause.key: one for one in found.selection.rounds if one.cause is not None}
     rivals = [rivals_of(rounds[one.key]) for one in causes]
@@ -91,7 +93,7 @@ def answer(
         verdict,
         _sentence(verdict, found.decision.reason, findings, trained, found),
         findings,
-        (),
+        standing.told,
         _rejected(found),
         limits.detectable,
         (*limits.not_testable, *(one for one in open_to if whole and one.cause not in named)),
@@ -107,8 +109,8 @@ def answer(
         0,
         np.full(len(floor), np.nan),
         None,
-        with_uncertainty(trained.models[0].model.arm, trained.models[0]),
-        extended_arm(trained),
+        trained.arm(0),
+        trained.arm(last),
         fewer_terms=prepared.fewer,
     )
     followed = as_simulated((worth.simulated[0], worth.simulated[last]))

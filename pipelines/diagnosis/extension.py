@@ -19,6 +19,7 @@ from pipelines.diagnosis.findings import Worth, extension_of, findings_of, weigh
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.screening import best_of
 from pipelines.diagnosis.selection import Candidate, refit
+from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import train
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Prepared
@@ -54,14 +55,15 @@ def extend(
         usable(later.dictionary.families.get(key), one, model.columns.laws, revolute)
     responses = compliance(prepared.logs.frf, model.nominal)
     named = {one.place: one for one in (responses.named if responses else ())}
+    standing = standing_of(prepared.reference, later, config)
     refused: list[Rejected] = []
     left = list(wanted)
     while True:
         state, taken, impossible = _fitted(later, left, named)
         refused += impossible
         left = taken
-        trained = train(prepared, later, state.model.effects, blocks)
-        worth = weigh(prepared, later, trained, whole=True)
+        trained = train(prepared, later, state.model.effects, blocks, standing)
+        worth = weigh(prepared, trained, standing.floor, whole=True)
         doubts = [_doubt(worth, place) for place in range(len(left))]
         if not any(doubts):
             break

@@ -1,6 +1,6 @@
 """Causes as they are told: their numbers, what they gain on held-out rows, what proves them.
 
-    worth = weigh(prepared, later, trained, simulated=True)
+    worth = weigh(prepared, trained, floor, whole=True)
     findings = findings_of(worth, later, end, rivals)
 """
 
@@ -16,9 +16,9 @@ from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.selection import Round
 from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.trained import Trained, covariance
-from pipelines.model.arm import Acting, Arm
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.extend import Extended, with_uncertainty
+from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.given.compliance import Compliance
 from pipelines.model.diagnosis.result import Answer, Finding, Gain, Proof, ResidualRms, Rival
@@ -28,10 +28,10 @@ from pipelines.model.diagnosis.worth.gains import (
     simulation_errors,
     torque_gain_of,
 )
-from pipelines.model.diagnosis.worth.numbers import acting, parameters
+from pipelines.model.diagnosis.worth.numbers import parameters
 from pipelines.model.diagnosis.worth.proof import proof
 
-__all__ = ["Worth", "extended_arm", "extension_of", "findings_of", "rivals_of", "weigh"]
+__all__ = ["Worth", "extension_of", "findings_of", "rivals_of", "weigh"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,20 +55,20 @@ class Worth:
         return ResidualRms(self.trained.models[place].rms, held_out, self.floor)
 
 
-def weigh(prepared: Prepared, later: Later, trained: Trained, whole: bool) -> Worth:
+def weigh(prepared: Prepared, trained: Trained, floor: Array | None, whole: bool) -> Worth:
     """Return what the models are worth on held-out rows.
 
-    The floor is what the nominal model leaves of the machine in order; without reference logs, what
-    the last model leaves of the rows it was fitted to.
+    Args:
+        floor: (joints,) [N m] what a model leaves of the machine in order; None, without reference
+            logs: what the last model leaves of the rows it was fitted to.
     """
-    arms = [one.model.arm for one in trained.models]
+    arms = [trained.arm(k) for k in range(len(trained.models))]
     simulated = (
         simulation_errors(arms, prepared.judging or prepared.motions)
         if whole
         else [Simulation.none(arm.n_joints) for arm in arms]
     )
-    rows, nominal = prepared.reference, later.dataset.model
-    floor = trained.models[-1].rms if rows is None else rows.rms(rows.y - nominal.torque(rows))
+    floor = trained.models[-1].rms if floor is None else floor
     left = tuple(trained.held_out(k) for k in range(len(arms)))
     return Worth(trained, left, tuple(simulated), floor, whole)
 
@@ -205,24 +205,15 @@ def extension_of(prepared: Prepared, worth: Worth, findings: Sequence[Finding]) 
     """Return the model with every cause that lasts, all numbers with their standard deviations."""
     last = len(worth.trained.models) - 1
     return Extended(
-        extended_arm(worth.trained),
+        worth.trained.arm(last),
         tuple(one for one in findings if one.log is None),
         (),
         worth.gain(0, last),
         worth.rms(0),
         worth.rms(last),
         "blocks" if prepared.judge is None else "logs",
-        (),
+        worth.trained.standing,
         (*prepared.motions, *prepared.judging),
         len(prepared.motions),
         prepared.fewer,
     )
-
-
-def extended_arm(trained: Trained) -> Arm:
-    """Return the arm with every cause that lasts, all numbers with their standard deviations."""
-    done = trained.models[-1]
-    known = done.covariance()
-    kept = [k for k, one in enumerate(done.model.effects) if one.log is None]
-    arm = done.model.nominal.extended(*(acting(done, k, known) for k in kept))
-    return with_uncertainty(arm, done)

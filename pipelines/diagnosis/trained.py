@@ -22,16 +22,31 @@ from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.table import Array, Table
+from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.fitted.exact import Named
-from pipelines.model.diagnosis.fitted.nominal import rigid_rows
+from pipelines.model.diagnosis.extend import with_uncertainty
+from pipelines.model.diagnosis.fitted.exact import Exact, Named
+from pipelines.model.diagnosis.fitted.nominal import rigid_rows, rows_of
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.fitted.slopes import slopes_of
+from pipelines.model.diagnosis.result import Standing as Told
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.worth.numbers import acting
+from pipelines.model.rigid.body import Motion
 
-__all__ = ["Trained", "covariance", "train"]
+__all__ = ["Standing", "Trained", "covariance", "train"]
 
 _UNSEEN = 1e6  # numerics: variance of a number of unit columns, from which the rows do not tell it
+
+
+@dataclass(frozen=True, eq=False)
+class Standing:
+    """Effects that the reference logs show, and the nominal model beside them."""
+
+    nominal: Exact
+    effects: tuple[Acting, ...] = ()
+    told: tuple[Told, ...] = ()
+    floor: Array | None = None  # (joints,) [N m] what both leave of the reference; None: there is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +58,15 @@ class Trained:
     states: tuple[State, ...]  # the same over whitened rows
     later: Later
     blocks: int
+    standing: tuple[Acting, ...] = ()  # effects that the models have beside those of their own
+
+    def arm(self, place: int) -> Arm:
+        """Return an arm with what stands and every cause that lasts, with their deviations."""
+        done = self.models[place]
+        known = done.covariance()
+        kept = [k for k, one in enumerate(done.model.effects) if one.log is None]
+        own = (acting(done, k, known) for k in kept)
+        return with_uncertainty(done.model.nominal.extended(*self.standing, *own), done)
 
     @property
     def data(self) -> Data:
@@ -80,35 +104,55 @@ class Trained:
         return np.concatenate([self.later.prior.scale, size])
 
 
-def train(prepared: Prepared, later: Later, causes: Sequence[Named], blocks: int) -> Trained:
-    """Return the nominal model and those with causes, in their order, without the held-out rows."""
-    own = _later(later, len(prepared.data.logs))
+def train(
+    prepared: Prepared,
+    later: Later,
+    causes: Sequence[Named],
+    blocks: int,
+    standing: Standing,
+) -> Trained:
+    """Return the nominal model and those with causes, in their order, without the held-out rows.
+
+    Args:
+        standing: effects that the models have beside the causes, as the reference has them.
+    """
+    own = _later(later, len(prepared.data.logs), standing)
     states = [own.start()]
     for one in causes:
         before = states[-1]
         info, moment = own.freed(before, one.effect)
         model = replace(before.model, effects=(*before.model.effects, one))
         states.append(own.fit(model, before.theta, info, moment))
-    data = prepared.data
+    data = _less(prepared.data, standing)
+    judge = None if prepared.judge is None else _less(prepared.judge, standing)
     weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
     models = tuple(_refined(own, state, data, weight) for state in states)
-    return Trained(models, prepared.judge, tuple(states), own, blocks)
+    return Trained(models, judge, tuple(states), own, blocks, standing.effects)
 
 
-def _later(later: Later, logs: int) -> Later:
+def _less(data: Data, standing: Standing) -> Data:
+    """Return rows less the torque of what stands."""
+    if not standing.effects:
+        return data
+    arm = standing.nominal.nominal
+
+    def torque(motion: Motion) -> Array:
+        every = [one.effect.torque(motion, arm, one.values) for one in standing.effects]
+        return np.asarray(np.sum(every, axis=0), dtype=np.float64)
+
+    return replace(data, known=data.lay(torque))
+
+
+def _later(later: Later, logs: int, standing: Standing) -> Later:
     """Return the rows of the first logs beside the prior of nominal numbers."""
-    rows = later.rows
+    rows, columns = later.rows, standing.nominal.columns
     known = rows.data.log_of < logs
-    parts = [known[rows.joint == j] for j in range(rows.n_joints)]
-    some = Table(
-        rows.nominal.width,
-        rows.nominal.index,
-        tuple(v[:, part] for v, part in zip(rows.nominal.values, parts, strict=True)),
-    )
-    data = replace(rows.data, logs=rows.data.logs[:logs])
-    fewer = Rows(data, rows.columns, rows.weight[known], some, rows.level)
+    weight = rows.weight[known]
+    data = _less(replace(rows.data, logs=rows.data.logs[:logs]), standing)
+    some = Table.of(rows_of(data, columns) * weight, data.joint, data.n_joints)
+    fewer = Rows(data, columns, weight, some, rows.level)
+    dataset = replace(later.dataset, later=fewer, model=standing.nominal)
     none = some.take(np.zeros(0, dtype=np.intp))
-    dataset = replace(later.dataset, later=fewer)
     dictionary = Dictionary((), {}, none, None)
     return Later.of(dataset, dictionary, _nominal(later.prior), DiagnosisConfig())
 
