@@ -117,17 +117,28 @@ def train(
         standing: effects that the models have beside the causes, as the reference has them.
     """
     own = _later(later, len(prepared.data.logs), standing)
+    data = _less(prepared.data, standing)
+    if causes:  # the noise was found beside their torque, as far as the dictionary left it
+        rough = Rows.of(data, standing.nominal)
+        left = data.y - _chain(own, causes)[-1].model.torque(data)
+        rows, _ = rough.whitened(rough.signal(left), DiagnosisConfig().noise_bins)
+        own = _beside(later, rows, standing)
+    states = _chain(own, causes)
+    judge = None if prepared.judge is None else _less(prepared.judge, standing)
+    weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
+    models = tuple(_refined(own, state, data, weight) for state in states)
+    return Trained(models, judge, tuple(states), own, blocks, standing.effects)
+
+
+def _chain(own: Later, causes: Sequence[Named]) -> list[State]:
+    """Return the nominal model and those with one cause more each."""
     states = [own.start()]
     for one in causes:
         before = states[-1]
         info, moment = own.freed(before, one.effect)
         model = replace(before.model, effects=(*before.model.effects, one))
         states.append(own.fit(model, before.theta, info, moment))
-    data = _less(prepared.data, standing)
-    judge = None if prepared.judge is None else _less(prepared.judge, standing)
-    weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
-    models = tuple(_refined(own, state, data, weight) for state in states)
-    return Trained(models, judge, tuple(states), own, blocks, standing.effects)
+    return states
 
 
 def _less(data: Data, standing: Standing) -> Data:
@@ -150,9 +161,13 @@ def _later(later: Later, logs: int, standing: Standing) -> Later:
     weight = rows.weight[known]
     data = _less(replace(rows.data, logs=rows.data.logs[:logs]), standing)
     some = Table.of(rows_of(data, columns) * weight, data.joint, data.n_joints)
-    fewer = Rows(data, columns, weight, some, rows.level)
-    dataset = replace(later.dataset, later=fewer, model=standing.nominal)
-    none = some.take(np.zeros(0, dtype=np.intp))
+    return _beside(later, Rows(data, columns, weight, some, rows.level), standing)
+
+
+def _beside(later: Later, rows: Rows, standing: Standing) -> Later:
+    """Return rows beside the prior of nominal numbers."""
+    dataset = replace(later.dataset, later=rows, model=standing.nominal)
+    none = rows.nominal.take(np.zeros(0, dtype=np.intp))
     dictionary = Dictionary((), {}, none, None)
     return Later.of(dataset, dictionary, _nominal(later.prior), DiagnosisConfig())
 
