@@ -33,6 +33,7 @@ from pipelines.model.words import plain_number
 __all__ = ["extend"]
 
 _NOTHING = "it takes nothing off the held-out error"
+_NOT_MOVED = "since the reference logs the base parameters have not moved as it moves them"
 _IMPOSSIBLE = "fitted exactly, its numbers are none that it can have"
 
 
@@ -113,7 +114,8 @@ def _doubt(worth: Worth, place: int) -> str:
     """Return why the held-out rows do not bear a cause out; empty where they do."""
     gain = worth.gain(place, place + 1).validate_torque_rms
     if not (gain.ci95[:, 1] < 0.0).any():
-        return _NOTHING
+        effect = worth.trained.models[-1].model.effects[place].effect
+        return _NOT_MOVED if effect.evidence == "base parameters" else _NOTHING
     return worse_log(worth.trained.data, worth.left[place], worth.left[place + 1])
 
 

@@ -5,7 +5,8 @@
 
 The diagnosis itself has columns for all of it (`prior`). A model for simulation has causes instead:
 those that together predict the reference best, one after the other by the predictive score, as long
-as each takes more than a share `relevance` of what is left and pays on blocks of time.
+as each pays on blocks of time, no shape without a name predicts better, a joint is left too much
+without it, and later logs do not go where the reference says nothing of it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.diagnosis.candidates import FORM
 from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores
@@ -42,7 +45,7 @@ def standing_of(prepared: Data | None, later: Later, config: DiagnosisConfig) ->
     own = _reference(later, config)
     states = [own.start()]
     for _ in range(own.rows.n_joints * config.causes):
-        best = _best(own, states[-1], config)
+        best = _best(own, states[-1], later.rows, config)
         if best is None:
             break
         states.append(best.state)
@@ -67,9 +70,12 @@ def _reference(later: Later, config: DiagnosisConfig) -> Later:
     groups = tuple(
         group
         for group in dictionary.groups
-        if group.kind == "named"
-        and (effect := dictionary.families[group.key].shapes[group.shape]).evidence == "residual"
-        and effect.adds
+        if (group.kind == "unnamed" and group.key[0] != FORM)  # standing laws may have its form
+        or (
+            group.kind == "named"
+            and (shape := dictionary.families[group.key].shapes[group.shape]).evidence == "residual"
+            and shape.adds
+        )
     )
     assert dictionary.reference is not None
     return Later.of(
@@ -88,24 +94,31 @@ def _flat(prior: Prior) -> Prior:
     )
 
 
-def _best(own: Later, state: State, config: DiagnosisConfig) -> Candidate | None:
+def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Candidate | None:
     """Return the cause that predicts best, None where none pays."""
     taken = {(one.effect.name, one.effect.joint) for one in state.model.effects}
-    seen = sorted(
-        (one for key, one in best_of(own.screened(state)).items() if key not in taken),
-        key=lambda one: -one.gain,
-    )
+    every = best_of(own.screened(state))
+    seen = [s for key, s in every.items() if s.group.kind == "named" and key not in taken]
+    known, motions = ([one.motion for one in rows.data.logs] for rows in (own.rows, later))
     tried = []
-    for one in seen[:_REFITS]:
-        if one.gain > config.relevance * state.cost:
-            effect = own.dictionary.families[one.group.key].shapes[one.group.shape].full()
-            done = refit(own, state, one.group.key, effect, one.amplitudes)
-            tried += [done] if done is not None and done.possible else []
+    for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
+        effect = own.dictionary.families[one.group.key].shapes[one.group.shape].full()
+        done = refit(own, state, one.group.key, effect, one.amplitudes)
+        if done is None or not done.possible:
+            continue
+        without = state.mean_squares / done.state.mean_squares
+        beyond = done.state.model.effects[-1].effect.beyond(motions, known)
+        if without.max() > config.excess and not beyond:
+            tried.append(done)
     if not tried:
         return None
     best = min(tried, key=lambda one: float(one.state.losses.sum()))
-    scores = {
-        name: log_scores(some.losses, own.block_rows)
-        for name, some in (("with", best.state), ("without", state))
-    }
-    return None if "without" in confidence_set(scores, config) else best
+    plain = max(
+        (one for one in every.values() if one.group.kind == "unnamed"),
+        key=lambda one: one.gain - one.freedom * np.log(own.rows.count),
+    )
+    unnamed = own.with_columns(state, own.candidates.take(plain.group.columns))
+    models = {"with": best.state, "without": state, "unnamed": unnamed}
+    scores = {name: log_scores(one.losses, own.block_rows) for name, one in models.items()}
+    kept = confidence_set(scores, config)
+    return best if "with" in kept and "without" not in kept else None

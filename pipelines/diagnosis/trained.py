@@ -4,7 +4,8 @@
     trained.models                         nominal, with the first cause, …, with all of them
     trained.held_out(0)                    what the nominal model leaves of rows that it has not seen
 
-A model for simulation has no standing dictionary: the prior is that of its nominal numbers alone,
+A model for simulation has no standing dictionary, but in its place causes that the reference logs
+show. The prior is that of its nominal numbers alone,
 
     N(m_n, (A_nn - A_ns A_ss⁻¹ A_sn)⁻¹),   the marginal of N(m, A⁻¹).
 """
@@ -47,6 +48,24 @@ class Standing:
     effects: tuple[Acting, ...] = ()
     told: tuple[Told, ...] = ()
     floor: Array | None = None  # (joints,) [N m] what both leave of the reference; None: there is none
+
+    def rows(self, rows: Rows) -> Rows:
+        """Return whitened rows less the torque of what stands, with columns of the nominal model."""
+        data, columns = self.less(rows.data), self.nominal.columns
+        table = Table.of(rows_of(data, columns) * rows.weight, data.joint, data.n_joints)
+        return Rows(data, columns, rows.weight, table, rows.level)
+
+    def less(self, data: Data) -> Data:
+        """Return rows less the torque of what stands."""
+        if not self.effects:
+            return data
+        arm = self.nominal.nominal
+
+        def torque(motion: Motion) -> Array:
+            every = [one.effect.torque(motion, arm, one.values) for one in self.effects]
+            return np.asarray(np.sum(every, axis=0), dtype=np.float64)
+
+        return replace(data, known=data.lay(torque))
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +135,18 @@ def train(
     Args:
         standing: effects that the models have beside the causes, as the reference has them.
     """
-    own = _later(later, len(prepared.data.logs), standing)
-    data = _less(prepared.data, standing)
+    rows, logs = later.rows, len(prepared.data.logs)
+    some = replace(rows.data, logs=rows.data.logs[:logs])
+    known = rows.weight[rows.data.log_of < logs]
+    first = standing.rows(Rows(some, rows.columns, known, rows.nominal, rows.level))
+    own, data = _beside(later, first, standing), standing.less(prepared.data)
     if causes:  # the noise was found beside their torque, as far as the dictionary left it
         rough = Rows.of(data, standing.nominal)
         left = data.y - _chain(own, causes)[-1].model.torque(data)
-        rows, _ = rough.whitened(rough.signal(left), DiagnosisConfig().noise_bins)
-        own = _beside(later, rows, standing)
+        white, _ = rough.whitened(rough.signal(left), DiagnosisConfig().noise_bins)
+        own = _beside(later, white, standing)
     states = _chain(own, causes)
-    judge = None if prepared.judge is None else _less(prepared.judge, standing)
+    judge = None if prepared.judge is None else standing.less(prepared.judge)
     weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
     models = tuple(_refined(own, state, data, weight) for state in states)
     return Trained(models, judge, tuple(states), own, blocks, standing.effects)
@@ -139,29 +161,6 @@ def _chain(own: Later, causes: Sequence[Named]) -> list[State]:
         model = replace(before.model, effects=(*before.model.effects, one))
         states.append(own.fit(model, before.theta, info, moment))
     return states
-
-
-def _less(data: Data, standing: Standing) -> Data:
-    """Return rows less the torque of what stands."""
-    if not standing.effects:
-        return data
-    arm = standing.nominal.nominal
-
-    def torque(motion: Motion) -> Array:
-        every = [one.effect.torque(motion, arm, one.values) for one in standing.effects]
-        return np.asarray(np.sum(every, axis=0), dtype=np.float64)
-
-    return replace(data, known=data.lay(torque))
-
-
-def _later(later: Later, logs: int, standing: Standing) -> Later:
-    """Return the rows of the first logs beside the prior of nominal numbers."""
-    rows, columns = later.rows, standing.nominal.columns
-    known = rows.data.log_of < logs
-    weight = rows.weight[known]
-    data = _less(replace(rows.data, logs=rows.data.logs[:logs]), standing)
-    some = Table.of(rows_of(data, columns) * weight, data.joint, data.n_joints)
-    return _beside(later, Rows(data, columns, weight, some, rows.level), standing)
 
 
 def _beside(later: Later, rows: Rows, standing: Standing) -> Later:

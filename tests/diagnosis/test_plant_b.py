@@ -18,7 +18,6 @@ _ALONE = (
     "07",
     "08",
     "09",
-    "11",
     "12",
     "15",
     "16",
@@ -31,9 +30,8 @@ def _found(shared: Path, arm: str) -> tuple[Diagnosis, dict[str, Any]]:
     return diagnose(logs), answers[f"arm-{arm}"]
 
 
-@pytest.mark.parametrize(
-    "arm", ["11", *(pytest.param(arm, marks=pytest.mark.slow) for arm in _ALONE if arm != "11")]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("arm", _ALONE)
 def test_a_cause_is_named_with_its_joint(shared: Path, arm: str) -> None:
     found, answer = _found(shared, arm)
     (truth,) = answer["truth"]
