@@ -25,11 +25,11 @@ from pipelines.model.diagnosis.asked.gates import logs_of_roles
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.model.diagnosis.floor.calibration_file import calibration_files, read_calibration, write_calibration
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.named_cause import refuse_unknown
 from pipelines.report.diagnosis_report import diagnosis_report

@@ -33,9 +33,10 @@ from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.asked.gates import logs_of_roles
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.extend import Extended, extend
+from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit

@@ -27,7 +27,6 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.answered.judgeable import limited_by_estimate
 from pipelines.model.diagnosis.answered.words import beside, how_much, taken_in, where
 from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.given.compliance import gaps_untold, untold
 from pipelines.model.diagnosis.result import (
     Diagnosis,
@@ -40,6 +39,7 @@ from pipelines.model.diagnosis.result import (
 )
 from pipelines.model.diagnosis.unseen.without_limit import without_limit
 from pipelines.model.diagnosis.worth.evidence import evidence
+from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.diagnosis.worth.numbers import told
 from pipelines.model.diagnosis.worth.simulated import as_simulated, with_simulation
 from pipelines.model.words import within

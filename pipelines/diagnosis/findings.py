@@ -18,10 +18,10 @@ from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.trained import Trained, covariance
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.given.compliance import Compliance
 from pipelines.model.diagnosis.result import Answer, Finding, Gain, Proof, ResidualRms, Rival
+from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.diagnosis.worth.gains import (
     Simulation,
     gain_of,

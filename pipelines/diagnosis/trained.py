@@ -25,13 +25,13 @@ from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.table import Array, Table
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.extend import with_uncertainty
 from pipelines.model.diagnosis.fitted.exact import Exact, Named
 from pipelines.model.diagnosis.fitted.nominal import rigid_rows, rows_of
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.fitted.slopes import slopes_of
 from pipelines.model.diagnosis.result import Standing as Told
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.worth.extended import with_uncertainty
 from pipelines.model.diagnosis.worth.numbers import acting
 from pipelines.model.rigid.body import Motion
 

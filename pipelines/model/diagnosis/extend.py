@@ -11,18 +11,16 @@ nearer to the measured one, if anything can be simulated.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array
-from pipelines.model.arm import Acting, Arm
+from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.answered.impossible import numbers_of
 from pipelines.model.diagnosis.answered.unbiased import unbiased
 from pipelines.model.diagnosis.asked.fitted_too import (
-    JudgedBy,
     at_floor,
     fitted_too,
     of_those_held_out,
@@ -31,7 +29,6 @@ from pipelines.model.diagnosis.asked.fitted_too import (
 )
 from pipelines.model.diagnosis.asked.inputs import GAP_HZ, Logs, Prepared, narrowed
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.believed.chance import BY_CHANCE
 from pipelines.model.diagnosis.believed.fewer import all_but
 from pipelines.model.diagnosis.believed.repeated import at_odds, vague
@@ -39,7 +36,6 @@ from pipelines.model.diagnosis.believed.steadied import steadied, steady
 from pipelines.model.diagnosis.believed.straying import strays
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
-from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.drive_noise import white
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
 from pipelines.model.diagnosis.given.change_of_sign import clearly_less, loosened, shows
@@ -50,42 +46,24 @@ from pipelines.model.diagnosis.named.carried import carried
 from pipelines.model.diagnosis.named.findings import extended_arm, findings, held_finding
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.reference.absorbed import Absorbed
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import Finding, Rejected, ResidualRms
 from pipelines.model.diagnosis.screened.candidates import place_of
 from pipelines.model.diagnosis.searched.beside import Held, acted, judged
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.ledger import IMPOSSIBLE, UNBELIEVABLE
 from pipelines.model.diagnosis.searched.search import Found, search
 from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
+from pipelines.model.diagnosis.worth.extended import Extended, with_uncertainty
 from pipelines.model.diagnosis.worth.gains import gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import held_out_left
-from pipelines.model.estimation.logs import Motions
-from pipelines.model.parameter import Parameter
 
-__all__ = ["Extended", "extend"]
+__all__ = ["extend"]
 
 _STANDS = "the reference logs show it too, so that it stands in the model already, as it was"
 _NOTHING = "it takes nothing off the held-out error"
 _NOT_MOVED = "since the reference logs the base parameters have not moved as it moves them"
 _REFUSED = {UNBELIEVABLE: UNBELIEVABLE, IMPOSSIBLE: "fitted exactly, its numbers are none that it can have"}
 _ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
-
-
-@dataclass(frozen=True, eq=False)
-class Extended:
-    """A model extended."""
-
-    arm: Arm | None  # with everything refitted; None where no cause was accepted
-    findings: tuple[Finding, ...]  # accepted
-    rejected: tuple[Rejected, ...]
-    gain: Gain | None  # of all accepted together
-    before: ResidualRms
-    after: ResidualRms
-    held_out: JudgedBy
-    standing: tuple[Acting, ...]  # what the reference logs show as well
-    motions: Motions  # fitted, then judging
-    fitted: int  # of them
-    fewer: tuple[FewerTerms, ...] = ()  # laws of friction that gave way to plainer ones
 
 
 def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | None = None, arm: Arm | None = None,
@@ -262,33 +240,3 @@ def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, 
     return Extended(arm, tuple(sorted(every, key=lambda one: -one.explained)), rejected, gain, rms[0], rms[1],
                     "blocks" if judge is None else "logs", standing, (*prepared.motions, *prepared.judging), len(prepared.motions),
                     prepared.fewer)
-
-
-def with_uncertainty(arm: Arm, done: Refined) -> Arm:
-    """The arm with the standard deviations of its base parameters and friction laws."""
-    std = np.sqrt(np.maximum(np.diagonal(done.covariance()), 0.0))
-    columns = done.model.columns
-    place = {i: k for k, i in enumerate(columns.kept)}
-    base = tuple(replace(p, std=float(std[place[i]])) if i in place else p for i, p in enumerate(arm.base))
-    return replace(arm, base=base, friction=_friction(arm, done, std))
-
-
-def _friction(arm: Arm, done: Refined, std: Array) -> tuple[Acting, ...]:
-    """Amplitudes have the deviation of their column; a shape moves by its logarithm."""
-    columns = done.model.columns
-    first, count = len(columns.kept), len(done.model.beta)
-    shapes = {(place, name): float(std[count + k]) for k, (kind, place, name) in enumerate(done.names) if kind == 0}
-    found, kept = [], iter(arm.friction)
-    for place, law in enumerate(columns.laws):
-        linear = [q.name for q in law.parameters if not q.shape]
-        own = {name: float(std[first + k]) for k, name in enumerate(linear)}
-        first += len(linear)
-        if not law.friction:
-            continue
-        acting = next(kept)
-
-        def deviation(p: Parameter, own: Mapping[str, float] = own, place: int = place) -> float | None:
-            return own[p.name] if p.name in own else shapes[place, p.name] * abs(p.value) if (place, p.name) in shapes else p.std
-
-        found.append(replace(acting, parameters=tuple(replace(p, std=deviation(p)) for p in acting.parameters)))
-    return tuple(found)

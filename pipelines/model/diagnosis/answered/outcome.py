@@ -10,9 +10,9 @@ from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
-from pipelines.model.diagnosis.extend import Extended
 from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.worth.extended import Extended
 
 __all__ = ["Extension", "Result"]
 
