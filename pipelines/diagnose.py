@@ -136,7 +136,7 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     engine = DiagnosisSettings(settings.replicas, settings.most, settings.blocks, settings.without, settings.filter,
                                settings.decimate, settings.min_speed, settings.seed, evidence=whole, limits=whole)
     extension = None
-    if given.calibration is None and (chosen.reference or WITHOUT_REFERENCE):
+    if chosen.reference or WITHOUT_REFERENCE:
         found, extension = _by_one_model(chosen, engine, given, memory)
     else:
         found = diagnose(chosen, engine, given.arm, given.tell, given.calibration, memory)

@@ -16,9 +16,10 @@ from pipelines.diagnosis.screening import Baseline, baseline
 from pipelines.diagnosis.selection import Selection, select
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.given.compliance import Compliance, compliance
+from pipelines.model.diagnosis.given.compliance import Compliance, compared, compliance
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
@@ -68,6 +69,16 @@ def diagnose_prepared(
     dataset, parts = later.dataset, (later.dataset, later.dictionary, later.prior)
     known = baseline(*parts, event_threshold(*parts, config), config)
     responses = compliance(dataset.frf, dataset.model.nominal, exclude)
-    found = select(later, known, responses.named if responses else (), config)
+    found = select(later, known, _new(responses, later, prepared, exclude), config)
     decision = decide(later, found, known, config)
     return Diagnosis(decision, found, known, later, responses, config)
+
+
+def _new(
+    now: Compliance | None, later: Later, prepared: Prepared, exclude: Sequence[str]
+) -> tuple[Acting, ...]:
+    """Return what frequency responses name, and those of the reference did not."""
+    if now is None:
+        return ()
+    before = compliance(prepared.logs.frf_before, later.dataset.model.nominal, exclude)
+    return now.named if before is None else compared(now, before).new

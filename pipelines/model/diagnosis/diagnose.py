@@ -33,7 +33,6 @@ from pipelines.model.diagnosis.believed.doubted import (
 )
 from pipelines.model.diagnosis.believed.pruned import settled
 from pipelines.model.diagnosis.believed.second_look import looked_again
-from pipelines.model.diagnosis.changed import changed
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.own_motion import put_right
@@ -139,16 +138,14 @@ class _Seen:
     first: Responding
     case: Case
     prepared: Prepared
-    rough: tuple[Explored, ...]  # the greatest causes; empty where there are reference logs to compare with
+    rough: tuple[Explored, ...]  # the greatest causes
 
 
 def _looked_at(prepared: Prepared, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None, memory: Memory) -> _Seen:
     if prepared.logs.frf:
         say("looking at the frequency responses")
-    first = responding(_plain(prepared, chosen, calibration, memory), prepared, chosen.without)
+    first = responding(_case(prepared, chosen), prepared, chosen.without)
     case, prepared = first.nameable(first.held.case), first.held.prepared
-    if prepared.reference is not None:
-        return _Seen(first, case, prepared, ())
     say("looking for the greatest causes")
     seen = glance(case)
     if first.stiff is not None and not first.stiff.named and gives_way(seen):
@@ -166,9 +163,6 @@ def _looked_at(prepared: Prepared, chosen: DiagnosisSettings, say: Tell, calibra
 
 def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: Calibration | None, memory: Memory) -> Diagnosis:
     first, case, prepared, rough = seen.first, seen.case, seen.prepared, seen.rough
-    if prepared.reference is not None:
-        say("comparing with the reference logs")
-        return changed(first, prepared.reference, chosen, calibration, memory)
     say("simulating the twin" if calibration is None else "taking the stored thresholds")
     floored = floored_by(prepared, case, rough, chosen, calibration)
     say("looking for causes")
@@ -188,13 +182,6 @@ def _diagnosed(seen: _Seen, chosen: DiagnosisSettings, say: Tell, calibration: C
         done = louder_than_logs(unlike_noise(done, partial(of_replicas, floored.twin)), floored.rms)
     say("weighing what was found, and what these logs would have shown" if chosen.limits else "weighing what was found")
     return diagnosis_of(first, case, done if usual is None else unlike_motion(done, usual), floored, chosen)
-
-
-def _plain(prepared: Prepared, chosen: DiagnosisSettings, given: Calibration | None, memory: Memory) -> Case:
-    """With nothing taken out: of the comparison with the reference logs, where there is no more to do before it."""
-    if prepared.reference is None or prepared.logs.frf or given is not None:
-        return _case(prepared, chosen)
-    return replace(memory.since(prepared, chosen).case, beside=())
 
 
 def _case(prepared: Prepared, chosen: DiagnosisSettings) -> Case:

@@ -40,12 +40,9 @@ from pipelines.model.diagnosis.floor.drive_noise import white
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
 from pipelines.model.diagnosis.given.change_of_sign import clearly_less, loosened, shows
 from pipelines.model.diagnosis.given.responding import Responding, responding
-from pipelines.model.diagnosis.given.since import Moved, since_reference
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.named.carried import carried
 from pipelines.model.diagnosis.named.findings import extended_arm, findings, held_finding
 from pipelines.model.diagnosis.named.verdict import Ruling
-from pipelines.model.diagnosis.reference.absorbed import Absorbed
 from pipelines.model.diagnosis.result import Finding, Rejected, ResidualRms
 from pipelines.model.diagnosis.screened.candidates import place_of
 from pipelines.model.diagnosis.searched.beside import Held, acted, judged
@@ -59,9 +56,7 @@ from pipelines.model.diagnosis.worth.held_out import held_out_left
 
 __all__ = ["extend"]
 
-_STANDS = "the reference logs show it too, so that it stands in the model already, as it was"
 _NOTHING = "it takes nothing off the held-out error"
-_NOT_MOVED = "since the reference logs the base parameters have not moved as it moves them"
 _REFUSED = {UNBELIEVABLE: UNBELIEVABLE, IMPOSSIBLE: "fitted exactly, its numbers are none that it can have"}
 _ALL = ("residual", "frequency responses", "reversals")  # kinds of evidence: somebody has it
 
@@ -85,7 +80,7 @@ def extend(logs: Logs, wanted: Sequence[Wanted], settings: DiagnosisSettings | N
     before = found.before
     unseen = found.arm is None and all(one.reason == _NOTHING for one in found.rejected)
     # Nobody knows a floor here: what the model leaves of the logs it was fitted to stands for it.
-    if not unseen or not logs.validate or logs.reference or not only_held_out(
+    if not unseen or not logs.validate or not only_held_out(
             before.identify, before.identify, before.validate, before.identify):
         return found
     say("fitting the held-out logs too, which alone show what is wrong")
@@ -119,12 +114,9 @@ def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSet
     if any(one.effect.evidence == "reversals" for one in wanted):
         prepared = narrowed(prepared, GAP_HZ, [0.0] * prepared.data.n_joints)
     first = _responding(prepared, wanted, chosen)
-    case, prepared, ask = _case(first, chosen, memory)
+    case, prepared = first.held.case, first.held.prepared
     given = {one.place for one in case.beside}
-    rest = [one for one in wanted if one.place not in given]
-    stands = given - {one.place for one in first.held.acting}
-    taken_in = [one for one in rest if ask is not None and one.effect.evidence == "base parameters"]
-    every = wanted_families(case, [one for one in rest if one not in taken_in])
+    every = wanted_families(case, [one for one in wanted if one.place not in given])
     left, refused = list(every), dict[tuple[str, int | None], str]()
     while True:
         say(f"fitting {', '.join(place_of(f.cause, f.joint) for f in left) or 'the nominal model'}")
@@ -133,18 +125,7 @@ def _extended(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSet
         if not why:
             break
         left = [one for one in left if (one.cause, one.joint) not in why]
-    laws = () if left else every  # what the residual does not show may be in the base parameters
-    seen = ask(found.final, laws) if ask is not None and (taken_in or laws) else None
-    moved = seen if isinstance(seen, Absorbed) and any(_is(one, seen) for one in rest) else None
-    refused = {place: why for place, why in refused.items() if moved is None or place != (moved.effect.name, moved.effect.joint)}
-    unmoved = [one for one in taken_in if moved is None or not _is(one, moved)]
-    refused |= {(one.effect.name, one.effect.joint): _NOT_MOVED for one in unmoved}
-    refused |= {(one.effect.name, one.effect.joint): _STANDS for one in wanted if one.place in stands}
-    return _told(found, named, refused, replace(first, held=replace(first.held, case=case, prepared=prepared)), moved, chosen)
-
-
-def _is(one: Wanted, moved: Absorbed) -> bool:
-    return (one.effect.name, one.effect.joint) == (moved.effect.name, moved.effect.joint)
+    return _told(found, named, refused, replace(first, held=replace(first.held, case=case, prepared=prepared)), chosen)
 
 
 def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisSettings) -> Responding:
@@ -155,18 +136,6 @@ def _responding(prepared: Prepared, wanted: Sequence[Wanted], chosen: DiagnosisS
     if not places or not prepared.logs.frf:
         return Responding(None, Held(plain, prepared))
     return responding(plain, prepared, only=places)
-
-
-def _case(first: Responding, chosen: DiagnosisSettings, memory: Memory,
-          ) -> tuple[Case, Prepared, Moved | None]:
-    """The nominal model on these logs, beside what the reference logs show as well; and what says what base parameters took in
-    since, less a torque (rows,)."""
-    case, prepared = first.held.case, first.held.prepared
-    if prepared.reference is None:
-        return case, prepared, None
-    since = since_reference(prepared, prepared.reference, chosen, case.beside) if case.beside else memory.since(prepared, chosen)
-    case = replace(since.case, changed=None, nameable=_ALL)
-    return case, replace(prepared, data=case.data, judge=case.judge), since.absorbed
 
 
 def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: bool = True,
@@ -208,32 +177,25 @@ def _tried(case: Case, prepared: Prepared, chosen: DiagnosisSettings, again: boo
 
 
 def _told(found: Found, named: tuple[Finding, ...], refused: Mapping[tuple[str, int | None], str], first: Responding,
-          moved: Absorbed | None, chosen: DiagnosisSettings) -> Extended:
+          chosen: DiagnosisSettings) -> Extended:
     """Everything that was accepted, in one model."""
     prepared, done = first.held.prepared, judged(first.held, found.final, paying=True)
     judge, final = done.judge, done.final
     floor = white(final.data, final.left)
     steps = tuple(range(sum(step.best is not None for step in found.steps)))  # of one finding there may be several
     whole = acted(with_uncertainty(extended_arm(replace(found, final=final), Ruling("cause", steps, "")), final), done.acting)
-    ready = replace(prepared, data=final.data, judge=judge)
-    load = None if moved is None else carried(moved, final, whole, ready, done.acting, chosen.blocks, chosen.evidence)
     refused = dict(refused) | {(part.acting.effect.name, part.acting.effect.joint): part.doubt for part in done.parts if part.doubt}
-    if load is not None and load.doubt:
-        refused[load.finding.cause, load.finding.joint] = load.doubt
-        load = None
     kept = [part for part in done.parts if not part.doubt]
     plain, before = (steady(first.held.plain), first.held.judge) if first.held.plain is not None else (found.nominal, judge)
-    every = (*(held_finding(part, plain.rms, floor, chosen.evidence, first.answers(part.acting)) for part in kept), *named,
-             *((load.finding,) if load is not None else ()))
+    every = (*(held_finding(part, plain.rms, floor, chosen.evidence, first.answers(part.acting)) for part in kept), *named)
     rows = final.data if judge is None else judge
     now = held_out_left(final, judge, chosen.blocks)
-    was = held_out_left(plain, before, chosen.blocks) if load is None else load.left
+    was = held_out_left(plain, before, chosen.blocks)
     rms = [ResidualRms(plain.rms, rows.rms(was), floor), ResidualRms(final.rms, rows.rms(now), floor)]
     standing = tuple(one for one in done.acting if one not in first.held.acting)
     arm = gain = None
     if every:
-        arm = whole if load is None else load.arm
-        bare = acted(plain.model.arm, standing) if load is None else load.bare
+        arm, bare = whole, acted(plain.model.arm, standing)
         gain = every[0].gain if len(every) == 1 else gain_of(
             torque_gain_of(rows, was, now), *simulation_errors([bare, arm], prepared.judging or prepared.motions))
     rejected = tuple(Rejected(cause, joint, reason) for (cause, joint), reason in refused.items())

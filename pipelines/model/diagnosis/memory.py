@@ -14,7 +14,6 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.gates import examined
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.given.since import Since, since_reference
 from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
 
 __all__ = ["Memory"]
@@ -55,9 +54,3 @@ class Memory:
         """As `examined` of all that a diagnosis looks at."""
         every = (*logs.identify, *logs.validate, *logs.reference, *logs.frf, *logs.frf_before)
         return self.of("said", every, allow_mismatch, lambda: examined(every, allow_mismatch))
-
-    def since(self, prepared: Prepared, chosen: DiagnosisSettings) -> Since:
-        """As `since_reference` of rows that nothing was taken out of."""
-        reference = prepared.reference
-        assert reference is not None  # who has none does not ask
-        return self.of("since", (prepared,), (chosen.blocks, chosen.without), lambda: since_reference(prepared, reference, chosen))

@@ -7,7 +7,7 @@ Before it is told, it is held against the logs that nothing was fitted to: they 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
@@ -28,7 +28,6 @@ from pipelines.model.diagnosis.floor.motion_floor import motion_floor
 from pipelines.model.diagnosis.given.compliance import gaps_untold, untold
 from pipelines.model.diagnosis.given.floored import Floored
 from pipelines.model.diagnosis.given.responding import Responding
-from pipelines.model.diagnosis.given.since import Probed
 from pipelines.model.diagnosis.named.findings import extended_arm, findings, held_finding, rejected
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.result import Detectable, Diagnosis, Finding, NotTestable, ResidualRms, Threshold
@@ -40,7 +39,7 @@ from pipelines.model.diagnosis.unseen.limits import detectable, not_testable
 from pipelines.model.diagnosis.worth.evidence import evidence
 from pipelines.model.diagnosis.worth.extrapolated import extrapolated
 from pipelines.model.diagnosis.worth.held_out import held_out_left
-from pipelines.model.diagnosis.worth.simulated import arms_of, as_simulated, followed_by, with_simulation
+from pipelines.model.diagnosis.worth.simulated import arms_of, followed_by, with_simulation
 
 __all__ = ["Limits", "diagnosis_of", "limits_of", "sentence", "strongest"]
 
@@ -48,13 +47,8 @@ Limits = tuple[tuple[Detectable, ...], tuple[NotTestable, ...]]
 
 
 def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored, chosen: DiagnosisSettings,
-                 limits: Callable[[], Limits] | None = None, moved: bool = False, hinted: bool = False) -> Diagnosis:
-    """What was found, as a result tells it.
-
-    Args:
-        limits: asks for those that another process looks for; by default they are worked out here.
-        moved: whether there is a cause that the base parameters show; `hinted`: or something of which they do not tell what it is.
-    """
+                 ) -> Diagnosis:
+    """What was found, as a result tells it."""
     done = replace(done, found=steady_nominal(done.found))
     held, prepared = replace(first.held, case=case), first.held.prepared
     floor_of = partial(_own_floor, first=first, case=case, floored=floored, chosen=chosen)
@@ -68,16 +62,14 @@ def diagnosis_of(first: Responding, case: Case, done: Settled, floored: Floored,
             done = replace(done, found=unbiased(done.found, prepared, case, chosen.seed))
             own = floor()
         responded = judged(held, done.found.final)
-    done, responded = _held_against(first, case, done, responded, own, chosen, (moved, hinted), floored.rms)
+    done, responded = _held_against(first, case, done, responded, own, chosen, floored.rms)
     plain = done.found.nominal if held.plain is None else steady(held.plain)  # nothing taken out for what responses name
     named = findings(done.found, done.ruling, done.simulated, prepared, plain.rms, floored.rms, chosen.blocks, chosen.evidence,
                      case.beside)
     told = _told(first, case, done, responded, floored, chosen, own, plain, named.findings)
-    known = as_simulated(named.simulated) if case.changed is not None and not responded.parts else None
-    arms = arms_of(told) if chosen.evidence and known is None else ()
-    with meanwhile(partial(followed_by, arms, first.held.prepared.logs)) if arms else nullcontext(lambda: known) as followed:
-        limits = limits or partial(limits_of, done.found.steps[-1], case, first)
-        found, beyond = limits() if chosen.limits else ((), ())
+    arms = arms_of(told) if chosen.evidence else ()
+    with meanwhile(partial(followed_by, arms, first.held.prepared.logs)) if arms else nullcontext(lambda: None) as followed:
+        found, beyond = limits_of(done.found.steps[-1], case, first) if chosen.limits else ((), ())
         hidden = (*told.not_testable, *beyond, *untold(first.stiff, chosen.without),
                   *gaps_untold(first.stiff, chosen.without))
         return with_simulation(replace(told, detectable=found, not_testable=hidden), followed())
@@ -136,10 +128,9 @@ def _own_floor(responded: Judged, first: Responding, case: Case, floored: Floore
 
 
 def _held_against(first: Responding, case: Case, done: Settled, responded: Judged, own: Array | None, chosen: DiagnosisSettings,
-                  moved: tuple[bool, bool], fitted: Array) -> tuple[Settled, Judged]:
+                  fitted: Array) -> tuple[Settled, Judged]:
     """What is believed beside the floor of the held-out logs, `own` (joints,) [N m], that of the fitted ones, and what responses
     have named beside that."""
-    sure, hinted = moved
     held, prepared = replace(first.held, case=case), first.held.prepared
     judge = first.held.judge if responded.parts else prepared.judge
     if own is None or judge is None or responded.judge is None:
@@ -149,11 +140,9 @@ def _held_against(first: Responding, case: Case, done: Settled, responded: Judge
 
     def believed(floor: Array) -> Settled:
         asked = done
-        if done.ruling.verdict == "nothing-wrong" and not sure:
-            asked = done if hinted or responded.parts else above_in_both(done, plain, floor, fitted, case.unlike)
-            if case.changed is not None:
-                return asked  # what motion shows that the reference logs do not have, they may have had as well
-        return asked if asked is not done else unlike_held_out(done, left, floor, plain, sure, bool(responded.parts), fitted)
+        if done.ruling.verdict == "nothing-wrong":
+            asked = done if responded.parts else above_in_both(done, plain, floor, fitted)
+        return asked if asked is not done else unlike_held_out(done, left, floor, plain, bool(responded.parts), fitted)
 
     told = believed(own)
     if told is not done and done.ruling.verdict == "nothing-wrong":  # fitted to other motion, an arm in order leaves more
@@ -161,18 +150,13 @@ def _held_against(first: Responding, case: Case, done: Settled, responded: Judge
     return told, responded if told.found is done.found else judged(held, told.found.final)
 
 
-def limits_of(last: Step, case: Case, first: Responding, probed: Probed | None = None) -> Limits:
+def limits_of(last: Step, case: Case, first: Responding) -> Limits:
     """What would have been found, and what not however large, by hiding causes in what the model leaves that the last look of a
-    search was at.
-
-    Args:
-        probed: with reference logs beside these.
-    """
+    search was at."""
     arms = case.arms(last.before.model)
-    probe, bounds = ((Probe.of(last.before, case.judge, arms), last.thresholds) if probed is None else
-                     probed(last.before, case.judge, arms))
-    return detectable(last.screened, bounds, first.held.prepared.data.logs[0].log.robot.revolute, probe, case.nameable,
-                      slight=case.thresholds is not None and case.changed is None)
+    probe = Probe.of(last.before, case.judge, arms)
+    return detectable(last.screened, last.thresholds, first.held.prepared.data.logs[0].log.robot.revolute, probe, case.nameable,
+                      slight=case.thresholds is not None)
 
 
 def sentence(ruling: Ruling, named: tuple[Finding, ...], revolute: Sequence[bool], left: Array,

@@ -12,7 +12,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -24,10 +24,10 @@ from pipelines.model.diagnosis.fitted.own_motion import following, lasting, stan
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.thresholds import LOUDER
 from pipelines.model.diagnosis.floor.twin import Twin
-from pipelines.model.diagnosis.named.verdict import Ruling, at_floor, held_out_high, takes_most, without_steps
+from pipelines.model.diagnosis.named.verdict import Ruling, held_out_high, takes_most
 
 __all__ = ["above_in_both", "louder_than_logs", "of_replicas", "told_why", "unlike_held_out", "unlike_motion", "unlike_noise",
-           "unnamed", "without_twin"]
+           "without_twin"]
 
 # Times the floor of the held-out logs. The right cause, a spring turned farther than it was fitted, has been seen to leave 5.1, a
 # wrong one 16; of 114 arms in order none left more than 1.9. Of what the nominal model leaves there a wrong name leaves more than a
@@ -50,33 +50,24 @@ _MOST_LEFT = "what explains the fitted logs leaves more than half of what stands
 _LINE, _TIMES = 10.0, 3.0
 
 
-def unnamed(done: Settled, floor: Array) -> Settled:
-    """The same where the base parameters tell what has changed: what is left near the floor, and has no name, is no alarm then."""
-    alone = without_steps(done.found, floor, True, named=True)
-    if alone.verdict == "unknown" and not at_floor(done.found.nominal.rms, floor):
-        return done
-    return replace(done, ruling=Ruling("nothing-wrong", (), "", done.ruling.doubts), simulated=())
-
-
-def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, moved: bool = False, parts: bool = False,
+def unlike_held_out(done: Settled, rms: Array, floor: Array, nominal: Array, parts: bool = False,
                     fitted: Array | None = None) -> Settled:
     """"unknown" where the model leaves, (joints,) [N m], many times the `floor` of the very logs held out, and not little of what
     the `nominal` model leaves there, or more than half of what that leaves above it at the joints of the causes: what was found is
     something else, or what is wrong does not show in the fitted logs.
 
     Args:
-        moved: whether there is a cause that the base parameters show.
         parts: whether `rms` lacks what responses have named, and `nominal` has it.
         fitted: (joints,) [N m] floor of the fitted logs. What the final model leaves above it there, of a twin that is a little too
             quiet, is no sign against the name where held-out logs show as much and their error falls.
     """
     verdict = done.ruling.verdict
-    far = _WRONG if verdict == "cause" or moved else _STRANGE
+    far = _WRONG if verdict == "cause" else _STRANGE
     high = held_out_high(rms, np.maximum(floor, _TENTH / far * nominal), far)
     if verdict == "unknown":
         return done
     if not high:
-        told = moved or parts or _shown(done, rms, np.maximum(floor, 1e-12), nominal, fitted)
+        told = parts or _shown(done, rms, np.maximum(floor, 1e-12), nominal, fitted)
         return done if told else _not_believed(done, _MOST_LEFT)
     model = "what explains the fitted logs" if verdict == "cause" else "the nominal model, which the fitted logs bear out,"
     times = f"{float((rms / np.maximum(floor, 1e-12)).max()):.2g} times what an arm in order leaves there"
@@ -105,18 +96,16 @@ def _not_believed(done: Settled, reason: str) -> Settled:
     return Settled(replace(done.found, final=done.found.nominal), Ruling("unknown", (), reason, doubts), ())
 
 
-def above_in_both(done: Settled, rms: Array, floor: Array, fitted: Array, but: Collection[int] = ()) -> Settled:
+def above_in_both(done: Settled, rms: Array, floor: Array, fitted: Array) -> Settled:
     """"unknown" where nothing was found, and a joint leaves more than an arm in order, in the fitted logs and in those held out.
 
     Args:
         rms, floor: (joints,) [N m] what the nominal model leaves of the held-out logs, and what an arm in order does; `fitted`: the
             floor of the fitted ones.
-        but: joints that are not asked, of whose floor in this motion nobody knows enough.
     """
     if done.ruling.verdict != "nothing-wrong":
         return done
     times = np.minimum(rms / np.maximum(floor, 1e-12), done.found.nominal.rms / np.maximum(fitted, 1e-12))
-    times[list(but)] = 0.0
     high = held_out_high(times, np.ones(len(times)), _BOTH)
     if not high:
         return done

@@ -21,7 +21,6 @@ from pipelines.model.diagnosis.believed.momentary import AT_OTHER_TIMES, ONLY_TH
 from pipelines.model.diagnosis.believed.repeated import at_odds
 from pipelines.model.diagnosis.believed.steadied import steadied
 from pipelines.model.diagnosis.believed.straying import simulated_steps, strays
-from pipelines.model.diagnosis.believed.unchanged import near_other_motion, no_change
 from pipelines.model.diagnosis.believed.which_joint import at_which
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.named.verdict import (
@@ -75,17 +74,17 @@ class Settled:
 def settled(found: Found, ruling: Ruling, case: Case, prepared: Prepared, floor: Array, known: bool = True) -> Settled:
     """Only causes that keep every rule of acceptance; `floor` and `known` as in `rule`."""
     if ruling.verdict != "cause":
-        alone = near_other_motion(replace(ruling, named=()), found, case, floor)
+        alone = replace(ruling, named=())
         return Settled(replace(found, final=found.nominal), _elsewhere(alone, found, case, floor, known), ())
     plain, (found, case) = found, steadied(found, case)
     simulated = simulated_steps(found, case, prepared)
-    there = {k: at_which(plain.steps[k], case.shared) for k in ruling.named}
+    there = {k: at_which(plain.steps[k]) for k in ruling.named}
     asked = [k for k in ruling.named if not there[k]]
     doubts = dict(ruling.doubts) | there | _refused(found, plain, asked, simulated, case, prepared, floor)
     last = _believed(found, ruling.named, {k: why for k, why in doubts.items() if why}, case)
     last.drop_idle()
     last.drop_small()
-    slight = known and case.changed is None and last.drop_slight()  # what has changed was measured by the same sensors before
+    slight = known and last.drop_slight()
     last.drop_harmful()
     if not known:
         last.drop_unseen(floor)
@@ -105,8 +104,7 @@ def _refused(found: Found, plain: Found, asked: Sequence[int], simulated: Sequen
              floor: Array) -> dict[int, str]:
     """Why steps are not believed, each by itself: empty words for those that are."""
     late = any(step.best is not None and step.best.effect.last for step in found.steps)
-    doubts = {k: ONLY_THEN if only_then(found.final, k) else no_change(found, k, case, floor) or
-              at_odds(found, k, prepared, case) or
+    doubts = {k: ONLY_THEN if only_then(found.final, k) else at_odds(found, k, prepared, case) or
               strays(found, plain, k, simulated, prepared, case, late, partial(all_but, found, k, case)) for k in asked}
     if case.floored:  # the search has asked it where there is no floor
         doubts |= {k: BY_CHANCE for k in asked if not doubts[k] and _not_told(found.steps[k], simulated, case, late)}
@@ -182,14 +180,14 @@ def _nothing(found: Found, plain: Found, elsewhere: str, doubts: dict[int, str],
         elsewhere: why one of them may as well act at another joint; empty where none does.
         few: why what keeps all the rules is no noise, and yet is not named; empty where nothing does.
     """
-    alone = _elsewhere(near_other_motion(without_steps(plain, floor, known), plain, case, floor), plain, case, floor, known)
+    alone = _elsewhere(without_steps(plain, floor, known), plain, case, floor, known)
     reason = alone.reason
     if alone.verdict == "unknown":
         said = "" if alone.reason.endswith(_NO_MODEL) else next(iter(doubts.values()), "")
         reason = elsewhere or (TOO_SLIGHT if few == TOO_SLIGHT else f"{alone.reason}: {said}" if said else alone.reason)
     if not known and alone.verdict == "nothing-wrong" and (where := much_without_name(found, doubts, floor)):
         alone, reason = replace(alone, verdict="unknown"), f"{where} {_LAW_WITHOUT_NAME}"
-    if few and alone.verdict == "nothing-wrong" and case.changed is None:  # of what has changed, other motion may leave a little
+    if few and alone.verdict == "nothing-wrong":
         alone, reason = replace(alone, verdict="unknown"), elsewhere or few
     return Settled(replace(plain, final=plain.nominal), replace(alone, reason=reason, doubts=doubts), ())
 
@@ -197,11 +195,8 @@ def _nothing(found: Found, plain: Found, elsewhere: str, doubts: dict[int, str],
 def _elsewhere(ruling: Ruling, found: Found, case: Case, floor: Array, known: bool) -> Ruling:
     """Nothing wrong in the fitted logs is not enough where the held-out ones show something; or, where nobody knows the floor,
     where the model leaves most of the torque there.
-
-    Not so of what has changed: motion that the reference logs do not have shows what no law of friction has to the last, and
-    would have shown it before.
     """
-    if ruling.verdict != "nothing-wrong" or case.changed is not None or (known and case.judge is None):
+    if ruling.verdict != "nothing-wrong" or (known and case.judge is None):
         return ruling
     rows = case.data if case.judge is None else case.judge
     left = rows.rms(held_out_left(found.nominal, case.judge, case.blocks))

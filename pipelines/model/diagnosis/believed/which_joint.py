@@ -1,11 +1,11 @@
 """Whether logs tell at which joint a cause is; a name at the wrong one is worse than none.
 
-    why = at_which(step, shared)        empty where they do
+    why = at_which(step)        empty where they do
 """
 
 from __future__ import annotations
 
-from pipelines.model.diagnosis.searched.elsewhere import Shared, as_good_elsewhere, as_likely
+from pipelines.model.diagnosis.searched.elsewhere import as_good_elsewhere
 from pipelines.model.diagnosis.searched.ledger import Tried
 from pipelines.model.diagnosis.searched.search import Step
 from pipelines.model.words import within
@@ -13,22 +13,15 @@ from pipelines.model.words import within
 __all__ = ["at_which"]
 
 
-def at_which(step: Step, shared: Shared | None = None) -> str:
-    """Why the cause that `step` has found cannot be told at its joint; empty where it can.
-
-    Args:
-        shared: what tells it where there are reference logs.
-    """
+def at_which(step: Step) -> str:
+    """Why the cause that `step` has found cannot be told at its joint; empty where it can."""
     best = step.best
     others = [] if best is None else as_good_elsewhere(best, step.rivals, step.before)
-    if best is not None and shared is not None:
-        others = as_likely(best, others, step.before, shared)
     if best is None or not others:
         return ""
     places = " or ".join(f"at joint {one.effect.joint}{_number(one)}" for one in (best, *others))
-    before = "" if shared is not None else "give logs from before it happened, of role reference; or "
     return (f"{within(best.effect.title)} {places} explains it, and these logs do not tell at which. {best.effect.remedy} "
-            f"To tell: {before}{within(best.effect.experiment)}")
+            f"To tell: give logs from before it happened, of role reference; or {within(best.effect.experiment)}")
 
 
 def _number(one: Tried) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,21 +11,16 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
-from pipelines.model.diagnosis.reference.stood import Share
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.screened.arms_alike import Asked, alike, moving_alike
 from pipelines.model.diagnosis.screened.candidates import Arms, Family
-from pipelines.model.diagnosis.screened.screen import Screened
-from pipelines.model.diagnosis.searched.elsewhere import Shared
 from pipelines.model.diagnosis.worth.held_out import held_out_left
 
-__all__ = ["Case", "Changed", "HeldOut", "ShareOf", "held_out"]
+__all__ = ["Case", "HeldOut", "held_out"]
 
 _QUIETER = 0.5  # of what a joint leaves of the fitted logs: with less held out it is weighted by the held-out logs
 _ALIKE = 0.05  # of a joint's torque, by which two arms may differ and have the same columns to first order
 
-ShareOf = Callable[[Refined, int], Share]  # of an effect of a model, by its place
-Changed = Callable[[Refined, Sequence[bool]], tuple[Sequence[Screened], Thresholds]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,10 +35,6 @@ class Case:
     thresholds: Thresholds | None  # None: a share of the residual
     blocks: int = 10
     nameable: tuple[str, ...] = ("residual",)  # kinds of evidence there are
-    changed: Changed | None = None  # what has changed since the reference logs
-    before: ShareOf | None = None  # how much of a cause the reference logs have
-    unlike: frozenset[int] = frozenset()  # joints, from 0, at speeds at which reference logs leave more than on the whole
-    shared: Shared | None = None  # at which of several joints it has, masses being what they were
     again: bool = True  # a cause that may act more than once at its place may be found more than once
     named: bool = False  # by somebody, so that none has a threshold but what is found at its place once more
     white: bool = False  # its rows were whitened: little of them is signal, and every cause takes a small share
@@ -52,8 +42,8 @@ class Case:
 
     @property
     def floored(self) -> bool:
-        """Whether thresholds say what an arm in order shows of a cause: of a twin, or of reference logs."""
-        return self.thresholds is not None or self.changed is not None
+        """Whether thresholds say what an arm in order shows of a cause: of a twin."""
+        return self.thresholds is not None
 
     def arms(self, model: Exact) -> Arms:
         """By whose columns causes are screened beside `model`: what just adds its torque by those of the start, which are laid

@@ -1,7 +1,6 @@
 """The same cause at another joint, where it would explain as much by another torque.
 
     others = as_good_elsewhere(best, tried, before)
-    best = at_its_joint(best, tried, before, shared)        at which of them reference logs say it is
 
 Of two joints' torque scales only the ratio shows: a drive that gives a tenth too little is the other that gives a ninth too much,
 and masses that nobody knows fit either. Masses do not change by themselves: with reference logs it is where one set of base
@@ -11,23 +10,19 @@ them, is no such case.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.searched.ledger import Tried
-from pipelines.model.effects.base import Effect
 
-__all__ = ["Shared", "as_good_elsewhere", "as_likely", "at_its_joint"]
-
-Shared = Callable[[Refined, Effect], float]  # squared residual of one set of base parameters, with an effect after the reference
+__all__ = ["as_good_elsewhere"]
 
 _AS_LITTLE = 0.01  # of what the best leaves, fitted and held out, another leaves more at most
 _AS_MUCH = 0.05  # of what the best takes away, another takes less at most
 _ONE_TORQUE = 0.9  # cosine from which two are the same torque
-_DECIDED = 1.05  # times what the best leaves of before and after
 
 
 def as_good_elsewhere(best: Tried, tried: Sequence[Tried], before: Refined) -> list[Tried]:
@@ -35,18 +30,6 @@ def as_good_elsewhere(best: Tried, tried: Sequence[Tried], before: Refined) -> l
     if best.log is not None or best.effect.joint is None:
         return []
     return [one for one in tried if _elsewhere(one, best) and _as_good(one, best, before) and not _one_torque(one, best)]
-
-
-def at_its_joint(best: Tried, tried: Sequence[Tried], before: Refined, shared: Shared) -> Tried:
-    """The one of the joints at which `best` is as good that one set of base parameters fits best."""
-    others = as_good_elsewhere(best, tried, before)
-    return min((best, *others), key=lambda one: shared(before, one.effect)) if others else best
-
-
-def as_likely(best: Tried, others: Sequence[Tried], before: Refined, shared: Shared) -> list[Tried]:
-    """Those of the `others` that one set of base parameters fits as well as `best`."""
-    most = _DECIDED * shared(before, best.effect) if others else 0.0
-    return [one for one in others if shared(before, one.effect) <= most]
 
 
 def _elsewhere(one: Tried, best: Tried) -> bool:

@@ -56,23 +56,18 @@ class Gate:
 
 
 def gate_of(case: Case, now: Refined, screened: Sequence[Screened]) -> Gate:
-    """Thresholds of the twin or of the reference logs; without them a share of the residual, and time that bears a cause out."""
-    judged: Sequence[Screened] = screened
-    if case.changed is not None:
-        most = max((one.gain[0] for one in screened), default=0.0)
-        judged, thresholds = case.changed(now, [bool(one.gain[0] >= CLOSE**2 * most) for one in screened])
-    else:
-        thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
+    """Thresholds of the twin; without them a share of the residual, and time that bears a cause out."""
+    thresholds = without_twin(screened, now.rss, now.weight) if case.thresholds is None else case.thresholds.at(now.weight)
     again = once_more(case, now, screened)
     if again:
         bound = without_twin(screened, now.rss, now.weight).gain
         thresholds = replace(thresholds, gain=np.where([id(one) in again for one in screened], bound, thresholds.gain))
-    passed = tuple(one for one, seen, bound in zip(screened, judged, thresholds.gain, strict=True)
-                   if seen.gain[0] > bound and one.stands_out)
+    passed = tuple(one for one, bound in zip(screened, thresholds.gain, strict=True)
+                   if one.gain[0] > bound and one.stands_out)
     asked = passed if not case.floored else tuple(one for one in passed if id(one) in again)
     refused = frozenset(id(asked[k]) for k in not_borne_out(case, now, asked)) if asked else frozenset()
     stay = tuple(one for one in passed if id(one) not in refused)
-    return Gate(judged, thresholds, stay, refused, () if case.floored else _near(case, now, screened, thresholds, stay))
+    return Gate(screened, thresholds, stay, refused, () if case.floored else _near(case, now, screened, thresholds, stay))
 
 
 def _near(case: Case, now: Refined, screened: Sequence[Screened], thresholds: Thresholds,

@@ -1,4 +1,4 @@
-"""Every hypothesis of a step with what it gained, what it had to exceed, and why it was accepted or not; and of base parameters."""
+"""Every hypothesis of a step with what it gained, what it had to exceed, and why it was accepted or not."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import numpy as np
 
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.floor.thresholds import Thresholds
-from pipelines.model.diagnosis.reference.absorbed import Absorbed
 from pipelines.model.diagnosis.result import Trial
 from pipelines.model.diagnosis.screened.screen import Screened
 from pipelines.model.effects.base import Effect
 
-__all__ = ["ACCEPTED", "ENOUGH", "GIVES_WAY", "IMPOSSIBLE", "UNBELIEVABLE", "WEAKER", "Tried", "ledger", "line_of_moved"]
+__all__ = ["ACCEPTED", "ENOUGH", "GIVES_WAY", "IMPOSSIBLE", "UNBELIEVABLE", "WEAKER", "Tried", "ledger"]
 
 ACCEPTED = "accepted"
 WEAKER = "weaker than others"
@@ -99,16 +98,3 @@ def ledger(screened: Sequence[Screened], judged: Sequence[Screened], thresholds:
         rows.append(Trial(number, one.cause, one.joint, gain / now.rss, float(thresholds.gain[k] / now.rss),
                           float(one.visibility[0]), gained, accepted, reason))
     return tuple(rows)
-
-
-def line_of_moved(moved: Absorbed, trials: Sequence[Trial], held_out: float = np.nan, reason: str = ACCEPTED) -> Trial:
-    """The line of a cause that base parameters show, which is asked after the last search.
-
-    Args:
-        trials: of the searches.
-        held_out: share of the squared torque error that it takes away held out, each joint by its own; NaN where nobody asked.
-        reason: why it is not accepted.
-    """
-    last = max((one.step for one in trials), default=1)
-    return Trial(last, moved.effect.name, moved.effect.joint, moved.taken, moved.least, 0.0, held_out, reason == ACCEPTED, reason,
-                 "base parameters")

@@ -25,7 +25,6 @@ from pipelines.model.diagnosis.screened.screen import Screened, screen
 from pipelines.model.diagnosis.searched.barred import better_than
 from pipelines.model.diagnosis.searched.borne_out import borne_out
 from pipelines.model.diagnosis.searched.case import Case, HeldOut, held_out
-from pipelines.model.diagnosis.searched.elsewhere import at_its_joint
 from pipelines.model.diagnosis.searched.gate import CLOSE, Gate, gate_of, once_more
 from pipelines.model.diagnosis.searched.hypotheses import best_form, each_fitted, first_order_missed, plainer
 from pipelines.model.diagnosis.searched.ledger import ENOUGH, GIVES_WAY, Tried, ledger
@@ -286,8 +285,6 @@ def _step(case: Case, explored: Explored, gate: Gate, number: int, more: bool, c
     better = None if best is None or chosen is not None else better_than(best, case, now, screened, gate)
     if better is not None:
         best, tried = better, [better, *tried]
-    if best is not None and case.shared is not None:
-        best = at_its_joint(best, tried, now, case.shared)
     other = unnameable(gate.passed, best, explored.tried, now, case)
     best = None if other is not None else best
     fitted_there = explored.tried if better is None or best is not better else (better, *explored.tried)
