@@ -25,7 +25,7 @@ from pipelines.model.diagnosis.floor.calibration_file import calibration_schema,
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from rrrid_cli.settings import make_settings
-from tests.diagnose.sessions import but, healthy_again, session, written
+from tests.diagnose.sessions import but, session, written
 
 STAGES = tuple(module.replace("_", "-") for module in run.STEPS)
 FEW = but("cogging", "torque_offset", "gravity_tilt", "encoder_eccentricity")  # the last two act on several joints
@@ -135,20 +135,6 @@ def test_other_logs_of_the_arm_need_no_twin(place: Path, tmp_path: Path) -> None
     folder = written(tmp_path / "logs", session("torque_offset", 3))
     found = asked(folder, tmp_path / "out", calibration=str(place / "first/calibration.json")).result
     assert [(one.cause, one.joint) for one in found.findings] == [("torque_offset", 3)]
-
-
-@pytest.mark.slow
-def test_with_reference_logs_what_chance_gives_is_stored(tmp_path: Path) -> None:
-    """The same answer again; and it is refused where there are none."""
-    logs = session("cogging", 2)
-    folder = written(tmp_path / "logs", (*logs, *healthy_again(session(seed=5))))
-    asked(folder, tmp_path / "first")
-    asked(folder, tmp_path / "again", calibration=str(tmp_path / "first"))
-    first, second = (json.loads((tmp_path / name / "result.json").read_text()) for name in ("first", "again"))
-    assert without_origin(first) == without_origin(second)
-    jsonschema.validate(json.loads((tmp_path / "first/calibration.json").read_text()), calibration_schema())
-    with pytest.raises(UsageError, match="made with reference logs"):
-        asked(written(tmp_path / "alone", logs), tmp_path / "out", calibration=str(tmp_path / "first"))
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from pipelines import diagnose
+from pipelines.diagnosis import engine
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import encode
 from pipelines.model.diagnosis.asked.inputs import Logs
@@ -75,7 +76,7 @@ def test_a_model_that_leaves_next_to_nothing_needs_no_floor() -> None:
 def test_reference_logs_are_a_noise_floor() -> None:
     """The same friction before and after: nothing has changed, however much of it no model has."""
     logs = rubbing(undescribed(session()), 1.0)
-    assert asked([*logs, *healthy_again(logs)]).verdict == "nothing-wrong"
+    assert engine.diagnose([*logs, *healthy_again(logs)]).decision.verdict == "no-fault-found"
 
 
 @pytest.mark.parametrize(("repeated", "verdict"), [(True, "nothing-wrong"), (False, "cannot-judge")])

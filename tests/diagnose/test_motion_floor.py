@@ -43,18 +43,6 @@ def test_a_healthy_arm_leaves_of_held_out_logs_what_the_simulated_one_does() -> 
     np.testing.assert_allclose(found.residual_rms.validate / found.held_out_floor, 1.0, rtol=0.33)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("times", [0, 2])
-def test_reference_logs_do_without_a_twin(times: int) -> None:
-    """The noise of the drives then comes of the reference logs: a short one, or many, of which one replica each says as much."""
-    before = tuple(replace(log, name=f"{log.name}-before-{k}", role="reference") for k in range(max(times, 1))
-                   for log in recorded() if times or log.role == "identify")
-    found = asked((*before, *recorded()))
-    assert found.floor_origin == "reference logs"
-    assert found.held_out_floor is not None
-    np.testing.assert_allclose(found.residual_rms.validate / found.held_out_floor, 1.0, rtol=0.33)
-
-
 def test_without_a_controller_nobody_can_tell() -> None:
     """What was driven by nobody knows what cannot be simulated."""
     logs = tuple(log if log.role == "identify" else replace(log, controller=None) for log in recorded())

@@ -34,19 +34,16 @@ def test_nothing_wrong_is_not_said_where_held_out_logs_show_something(held_out: 
     """Six times the floor at joint 2 is far above it; a fifth above it is other motion."""
     monkeypatch.setattr(pruned, "held_out_left", lambda done, judge, blocks: np.array(held_out))
     judge = SimpleNamespace(rms=lambda rms: rms)
-    case: Any = SimpleNamespace(judge=judge, changed=None, blocks=10)
+    case: Any = SimpleNamespace(judge=judge, blocks=10)
     ruling = pruned._elsewhere(Ruling("nothing-wrong", (), ""), searched(left(0.01, 0.01, 0.01)), case, FLOOR, True)
     assert ruling.verdict == verdict
     assert ("joint 2" in ruling.reason) == (verdict == "unknown")
 
 
-@pytest.mark.parametrize(("judge", "changed", "known"), [
-    (None, None, True),  # blocks of the fitted logs: the same motion
-    (object(), object(), True)])  # what has changed
-def test_held_out_motion_is_asked_only_where_it_can_tell(judge: Any, changed: Any, known: bool) -> None:
-    case: Any = SimpleNamespace(judge=judge, changed=changed, blocks=10)
+def test_blocks_of_the_fitted_logs_are_the_same_motion_and_are_not_asked() -> None:
+    case: Any = SimpleNamespace(judge=None, blocks=10)
     said = Ruling("nothing-wrong", (), "")
-    assert pruned._elsewhere(said, searched(left(0.01, 0.01, 0.01)), case, FLOOR, known) is said
+    assert pruned._elsewhere(said, searched(left(0.01, 0.01, 0.01)), case, FLOOR, True) is said
 
 
 @pytest.mark.parametrize(("torque", "verdict"), [(0.9, "unknown"), (1.5, "nothing-wrong"), (0.01, "nothing-wrong")])
@@ -55,7 +52,7 @@ def test_a_model_that_leaves_most_of_the_torque_is_none(torque: float, verdict: 
     noise = 1.0 if torque < 0.1 else 1e-3
     monkeypatch.setattr(pruned, "held_out_left", lambda done, judge, blocks: np.array([0.01, 0.6, 0.01]))
     judge = SimpleNamespace(rms=lambda rms: rms, y=np.array([1.0, torque, 1.0]))
-    case: Any = SimpleNamespace(judge=judge, changed=None, blocks=10)
+    case: Any = SimpleNamespace(judge=judge, blocks=10)
     found = searched(left(0.01, 0.01, 0.01))
     ruling = pruned._elsewhere(Ruling("nothing-wrong", (), ""), found, case, np.full(3, noise), False)
     assert ruling.verdict == verdict
@@ -161,8 +158,7 @@ def test_what_stays_has_to_explain_half_without_what_was_dropped(nominal: float,
     monkeypatch.setattr(pruned, "of_no_size", lambda done: [])
     monkeypatch.setattr(pruned, "too_slight", lambda done: [])
     monkeypatch.setattr(pruned, "without", lambda *args: left(rest, 0.01, 0.01))
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
-                                unlike=())
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, beside=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", ruled, ""), case, case, FLOOR)
     assert done.ruling.verdict == verdict
     assert done.ruling.named == ((1,) if verdict == "cause" else ())
@@ -182,20 +178,19 @@ def test_a_cause_whose_numbers_are_impossible_in_the_end_has_no_name(monkeypatch
     dip = SimpleNamespace(effects=(SimpleNamespace(possible=True), SimpleNamespace(possible=False)))
     both, one = SimpleNamespace(rms=np.array([0.01, 0.01, 0.01]), model=dip), left(0.02, 0.01, 0.01)
     monkeypatch.setattr(pruned, "without", lambda found, kept, *_: both if len(kept) == 2 else one)
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
-                                unlike=())
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, beside=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
     assert done.ruling.named == (0,)
     assert done.ruling.doubts == {1: pruned._IMPOSSIBLE}
 
 
-@pytest.mark.parametrize(("much", "slight", "changed", "verdict", "named"), [
-    (0.015, [], None, "cause", (0, 1)), (0.0115, [0], None, "cause", (1,)), (0.015, [0, 1], None, "unknown", ()),
-    (0.04, [0], None, "unknown", ()), (0.04, [0, 1], None, "unknown", ()), (0.015, [0, 1], object(), "cause", (0, 1))])
-def test_what_arms_in_order_have_as_much_of_has_no_name(much: float, slight: list[int], changed: object, verdict: str,
+@pytest.mark.parametrize(("much", "slight", "verdict", "named"), [
+    (0.015, [], "cause", (0, 1)), (0.0115, [0], "cause", (1,)), (0.015, [0, 1], "unknown", ()),
+    (0.04, [0], "unknown", ()), (0.04, [0, 1], "unknown", ())])
+def test_what_arms_in_order_have_as_much_of_has_no_name(much: float, slight: list[int], verdict: str,
                                                         named: tuple[int, ...], monkeypatch: pytest.MonkeyPatch) -> None:
     """It keeps every rule, so that it is no noise: alone something else may be what shows, and beside another too where it took
-    most of what was wrong. What has changed was measured by the same sensors before."""
+    most of what was wrong."""
     made = searched(left(much, 0.013, 0.01), (effect("torque_gain", 1), left(0.01, 0.013, 0.01)),
                     (effect("torque_gain", 2), left(0.01, 0.01, 0.01)))
     for step in made.steps:
@@ -207,13 +202,11 @@ def test_what_arms_in_order_have_as_much_of_has_no_name(much: float, slight: lis
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
     rest = {(0, 1): made.final, (0,): left(0.01, 0.013, 0.01), (1,): left(much, 0.01, 0.01)}
     monkeypatch.setattr(pruned, "without", lambda found, kept, *_: rest[tuple(kept)])
-    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, changed=changed, shared=None, beside=(), before=None,
-                                unlike=())
+    case: Any = SimpleNamespace(floored=True, blocks=10, judge=None, beside=())
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0, 1), ""), case, case, FLOOR)
     assert (done.ruling.verdict, done.ruling.named) == (verdict, named)
-    if changed is None:
-        assert [done.ruling.doubts[k] for k in slight] == [pruned._SO_LITTLE] * len(slight)
-    assert (done.ruling.reason == pruned.TOO_SLIGHT) is (slight == [0, 1] and changed is None)
+    assert [done.ruling.doubts[k] for k in slight] == [pruned._SO_LITTLE] * len(slight)
+    assert (done.ruling.reason == pruned.TOO_SLIGHT) is (slight == [0, 1])
 
 
 @pytest.mark.parametrize(("after", "unseen"), [(0.1, []), (0.17, []), (0.185, [0])])
@@ -243,8 +236,7 @@ def test_without_a_floor_a_trifle_beside_what_has_no_name_is_no_answer(elsewhere
     monkeypatch.setattr(pruned, "steadied", lambda found, case: (found, case))
     monkeypatch.setattr(pruned, "held_out_left", lambda done, *_: done.rms)
     torque: Any = SimpleNamespace(rms=lambda rms: rms, y=np.ones(3))
-    case: Any = SimpleNamespace(floored=False, blocks=10, judge=None, changed=None, shared=None, beside=(), before=None,
-                                unlike=(), data=torque)
+    case: Any = SimpleNamespace(floored=False, blocks=10, judge=None, beside=(), data=torque)
     done = pruned.settled(Found(made.nominal, tuple(made.steps), made.final), Ruling("cause", (0,), ""), case, case, FLOOR, False)
     assert done.ruling.named == named
     assert done.ruling.verdict == ("cause" if named else "nothing-wrong")

@@ -4,7 +4,6 @@ numbers given (that they are found is tested in test_compliance). With reference
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,7 +22,7 @@ from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.searched.wanted import Wanted
 from pipelines.model.effects.base_resonance import BaseResonance
 from pipelines.report.diagnosis_finding import finding_section
-from tests.diagnose.sessions import but, healthy_again, session
+from tests.diagnose.sessions import but, session
 
 SETTINGS = DiagnosisSettings(without=but("base_resonance", "torque_offset"), replicas=0, most=1, evidence=False, limits=False)
 
@@ -44,9 +43,9 @@ def told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(responding, "compliance", compliance)
 
 
-def asked(reference: tuple[ExperimentLog, ...] = ()) -> Diagnosis:
+def asked() -> Diagnosis:
     fitted, judging = session("base_resonance", None)
-    return diagnose(Logs((fitted,), (judging,), reference, (fitted,)), SETTINGS)
+    return diagnose(Logs((fitted,), (judging,), (), (fitted,)), SETTINGS)
 
 
 @pytest.mark.slow
@@ -91,30 +90,6 @@ def test_the_extension_takes_the_responses_numbers() -> None:
     assert found.arm is not None
     assert found.arm.effects[0].values["frequency"] == pytest.approx(base().values["frequency"], rel=0.06)
     assert np.all(found.after.validate <= 1.05 * found.before.validate)
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("told")
-@pytest.mark.parametrize(("before", "news"), [("base_resonance", False), ("", True)])
-def test_without_responses_of_the_reference_its_motion_tells_whether_the_base_was_soft(before: str, news: bool) -> None:
-    there = healthy_again([replace(log, role="identify") for log in session(before, None, seed=21)])
-    found = asked(there)
-    assert [one.cause for one in found.findings] == (["base_resonance"] if news else [])
-    assert ("base_resonance" in [one.cause for one in found.standing]) is not news
-    assert found.verdict == ("cause" if news else "nothing-wrong")
-
-
-def test_responses_of_the_reference_that_leave_it_open_make_no_news(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its responses are of no use, or leave it open what gives way: its motion tells that the base was as soft before."""
-    def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance:
-        return Compliance((), False, "base or joint") if logs[0].role == "reference" else Compliance((base(),), False, "")
-
-    monkeypatch.setattr(responding, "compliance", compliance)
-    there = healthy_again([replace(log, role="identify") for log in session("base_resonance", None, seed=21)])
-    fitted, judging = session("base_resonance", None)
-    found = diagnose(Logs((fitted,), (judging,), there, (fitted,), there[:1]), SETTINGS)
-    assert found.verdict == "nothing-wrong"
-    assert [one.cause for one in found.standing] == ["base_resonance"]
 
 
 def test_a_base_that_was_always_soft_is_no_news_by_its_responses() -> None:
