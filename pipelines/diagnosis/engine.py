@@ -3,24 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.dataset import load
+from pipelines.diagnosis.dataset import Dataset, load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.events import event_threshold
 from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.screening import Baseline, baseline
 from pipelines.diagnosis.selection import Selection, select
+from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.given.compliance import compliance
 
 __all__ = ["Diagnosis", "diagnose"]
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """One search, with the noise that the causes found before it leave."""
+
+    later: Later
+    baseline: Baseline
+    selection: Selection
+
+    @classmethod
+    def of(
+        cls,
+        rough: Dataset,
+        every: Dictionary,
+        responses: Sequence[Acting],
+        config: DiagnosisConfig,
+        before: Selection | None = None,
+    ) -> Look:
+        """Return the causes in rows that no noise is known of, beside those found before."""
+        cause = None
+        if before is not None and before.causes:
+            cause = _torque(rough, before.end.model)
+        dataset, dictionary = settle(rough, every, config, cause)
+        prior = prior_of(dataset, dictionary, config)
+        later = Later.of(dataset, dictionary, prior, config)
+        event = event_threshold(dataset, dictionary, prior, config)
+        known = baseline(dataset, dictionary, prior, event, config)
+        return cls(later, known, select(later, known, responses, config, before))
+
+
+def _torque(rough: Dataset, model: Exact) -> Array:
+    """Return the torque (rows,) [N m] that the effects of a model add to it."""
+    data = rough.later.data
+    return np.asarray(model.torque(data) - replace(model, effects=()).torque(data))
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,8 +68,7 @@ class Diagnosis:
     """Everything that was computed."""
 
     decision: Decision
-    selection: Selection
-    baseline: Baseline
+    look: Look
 
 
 def diagnose(
@@ -48,12 +87,14 @@ def diagnose(
     config = config or DiagnosisConfig()
     roles = Logs.by_role(logs)
     rough = load(prepare(roles, DiagnosisSettings(cutoff_hz=config.cutoff_hz)), roles.frf)
-    dataset, dictionary = settle(rough, Dictionary.of(rough, config, exclude), config)
-    prior = prior_of(dataset, dictionary, config)
-    later = Later.of(dataset, dictionary, prior, config)
-    known = baseline(
-        dataset, dictionary, prior, event_threshold(dataset, dictionary, prior, config), config
-    )
-    responses = compliance(dataset.frf, dataset.model.nominal, exclude)
-    found = select(later, known, responses.named if responses else (), config)
-    return Diagnosis(decide(later, found, known, config), found, known)
+    every = Dictionary.of(rough, config, exclude)
+    responses = compliance(rough.frf, rough.model.nominal, exclude)
+    named = responses.named if responses else ()
+    found = Look.of(rough, every, named, config)
+    while True:  # what the causes leave tells the noise and what is typical of the machine
+        again = Look.of(rough, every, named, config, found.selection)
+        if len(again.selection.causes) <= len(found.selection.causes):
+            break
+        found = again
+    last = again if again.selection.causes else found
+    return Diagnosis(decide(last.later, last.selection, last.baseline, config), last)

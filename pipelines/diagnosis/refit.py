@@ -15,7 +15,7 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.prior import Prior, typical
+from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.score import block_losses
 from pipelines.diagnosis.screening import Screened, screen
 from pipelines.diagnosis.table import Array, Indices, Table
@@ -114,11 +114,13 @@ class Later:
     def y(self) -> tuple[Array, ...]:
         return self.rows.y
 
-    def start(self) -> State:
-        """Return the nominal model, fitted under the prior alone."""
+    def start(self, found: Exact | None = None) -> State:
+        """Return the nominal model, or one with causes found before, fitted under the prior."""
+        model = found or self.dataset.model
         info, moment = self.prior.start
+        for one in model.effects:
+            info, moment = self.freed(info, moment, one.effect)
         theta = np.zeros(self.base.width)
-        model = self.dataset.model
         theta[: len(model.beta)] = model.beta * self.prior.scale
         return self.fit(model, theta, info, moment)
 
@@ -154,21 +156,6 @@ class Later:
         lasting = np.flatnonzero([model.effects[place].log is None for _, place, _ in names])
         state = State(model, theta, info, moment, residual, effects, lasting, np.zeros(0))
         return replace(state, losses=self.losses(state))
-
-    def beside(self, state: State, config: DiagnosisConfig) -> State:
-        """Return the state with what is typical of the machine beside its causes.
-
-        What a cause leaks into other families is typical of nothing. Reference logs know better.
-        """
-        if self.prior.learned:
-            return state
-        columns = Table.stacked([state.effects, self.base])
-        linear = self.base.times(state.theta)
-        target = tuple(r + t for r, t in zip(state.residual, linear, strict=True))
-        info, moment = typical(
-            self.prior, columns.gram(columns), columns.moments(target), self.rows.count, config
-        )
-        return self.fit(state.model, state.theta, info, moment)
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
@@ -237,22 +224,22 @@ class Later:
             columns, self._information(state.info, lasting), state.residual, self.block
         )
 
-    def freed(self, state: State, effect: Effect) -> tuple[Array, Array]:
+    def freed(self, info: Array, moment: Array, effect: Effect) -> tuple[Array, Array]:
         """Return the prior free along base parameters that the effect moves by unknown numbers."""
         directions = effect.moving(self.dataset.arm)
         if directions is None or not directions.shape[1]:
-            return state.info, state.moment
+            return info, moment
         kept = list(self.dataset.model.columns.kept)
-        along = np.zeros((len(state.info), directions.shape[1]))
+        along = np.zeros((len(info), directions.shape[1]))
         along[: len(kept)] = directions[kept] * self.prior.scale[: len(kept), None]
         along = along[:, np.linalg.norm(along, axis=0) > 0.0]
         along = along / np.linalg.norm(along, axis=0)
-        side = state.info @ along
+        side = info @ along
         inner = along.T @ side
         inner = inner + _FREE * np.trace(inner) * np.eye(len(inner))
-        info = state.info - side @ np.linalg.solve(inner, side.T)
-        info = 0.5 * (info + info.T)
-        return info, info @ np.linalg.solve(state.info, state.moment)
+        free = info - side @ np.linalg.solve(inner, side.T)
+        free = 0.5 * (free + free.T)
+        return free, free @ np.linalg.solve(info, moment)
 
     def _information(self, info: Array, effects: Table) -> Array:
         across = self.base.gram(effects)

@@ -81,17 +81,24 @@ class _Round:
 
 
 def select(
-    later: Later, baseline: Baseline, responses: Sequence[Acting], config: DiagnosisConfig
+    later: Later,
+    baseline: Baseline,
+    responses: Sequence[Acting],
+    config: DiagnosisConfig,
+    before: Selection | None = None,
 ) -> Selection:
     """Return the causes that explain the later rows.
 
     Args:
         responses: causes that frequency responses name, with their numbers; candidates like others.
+        before: what was selected before the noise was known beside it.
     """
     start = state = later.start()
     causes: list[Cause] = []
+    if before is not None:
+        causes, state = list(before.causes), later.start(before.end.model)
     stopped = follows = ""
-    explained = 0.0
+    explained = max(start.cost - state.cost, 0.0)
     while len(causes) < config.causes:
         found = _round(
             later, state, causes, explained, baseline, responses if not causes else (), config
@@ -101,7 +108,7 @@ def select(
             break
         causes.append(found.cause)
         explained += max(state.cost - found.state.cost, 0.0)
-        state = later.beside(found.state, config)
+        state = found.state
     causes, state = _backward(later, causes, state, config)
     return Selection(tuple(causes), start, state, explained, stopped, follows)
 
@@ -177,6 +184,8 @@ def _contest(
     free = {key: _scores(later, other) for key, other in others.items()}
     kept = confidence_set(scores | free, config)
     named = [one for one in tried if one.key in kept]
+    if not named and (near := _nearly(later, state, tried, others, config)):
+        named = [near]
     if not named:
         best = min(scores, key=lambda key: scores[key].sum())
         return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
@@ -185,6 +194,20 @@ def _contest(
     if "without" in pays and not pick.event:
         return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
     return pick, tuple(one.key for one in named if one is not pick), ""
+
+
+def _nearly(
+    later: Later,
+    state: State,
+    tried: Sequence[Candidate],
+    others: Mapping[Key, State],
+    config: DiagnosisConfig,
+) -> Candidate | None:
+    """Return the cause that explains as much as any shape without a name, as far as laws are exact."""
+    best = min(tried, key=lambda one: _loss(later, one.state))
+    free = min(_loss(later, other) for other in others.values())
+    missing = _loss(later, best.state) - free
+    return best if missing < config.relevance * (_loss(later, state) - free) else None
 
 
 def _refitted(
@@ -246,7 +269,7 @@ def _candidate(
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
     start = np.zeros(max(len(amplitudes), _width(later, effect)))
     start[: len(amplitudes)] = amplitudes
-    info, moment = later.freed(state, effect)
+    info, moment = later.freed(state.info, state.moment, effect)
     try:
         fitted = later.fit(
             state.model.with_effect(effect, start, log=log), state.theta, info, moment
@@ -291,13 +314,18 @@ def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
         return best
     for form in one.effect.forms():
         other = _candidate(later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes))
-        if other is not None and other.possible and _loss(other) < _loss(best):
+        if (
+            other is not None
+            and other.possible
+            and _loss(later, other.state) < _loss(later, best.state)
+        ):
             best = other
     return best
 
 
-def _loss(one: Candidate) -> float:
-    return float(one.state.losses.sum())
+def _loss(later: Later, state: State) -> float:
+    """Return the squared predictive error and what the prior says against the numbers."""
+    return float(state.losses.sum()) + state.cost - state.rss
 
 
 def _backward(
