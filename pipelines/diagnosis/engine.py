@@ -90,11 +90,10 @@ def diagnose(
     every = Dictionary.of(rough, config, exclude)
     responses = compliance(rough.frf, rough.model.nominal, exclude)
     named = responses.named if responses else ()
-    found = Look.of(rough, every, named, config)
-    while True:  # what the causes leave tells the noise and what is typical of the machine
-        again = Look.of(rough, every, named, config, found.selection)
-        if len(again.selection.causes) <= len(found.selection.causes):
+    last = found = Look.of(rough, every, named, config)
+    while last.selection.causes:  # what these leave tells the noise, and what is typical
+        last = Look.of(rough, every, named, config, found.selection)
+        if len(last.selection.causes) <= len(found.selection.causes):
             break
-        found = again
-    last = again if again.selection.causes else found
+        found = last
     return Diagnosis(decide(last.later, last.selection, last.baseline, config), last)

@@ -107,18 +107,13 @@ def _typical(found: Components, of: Sequence[Group]) -> Components:
     """
     largest: dict[str, dict[int, float]] = {}  # of each family and joint
     for group, value in zip(of, found.variance, strict=True):
-        at = largest.setdefault(_word(group), {})
+        at = largest.setdefault(group.family, {})
         at[group.key[1] or 0] = max(value, at.get(group.key[1] or 0, 0.0))
     median = {word: _lower_median(at.values()) for word, at in largest.items()}
     several = [value for word, value in median.items() if len(largest[word]) > 1]
     other = _lower_median(several or median.values())
-    usual = [median[w] if len(largest[w]) > 1 else other for w in map(_word, of)]
+    usual = [median[w] if len(largest[w]) > 1 else other for w in (g.family for g in of)]
     return replace(found, variance=np.minimum(found.variance, usual))
-
-
-def _word(group: Group) -> str:
-    """Return the family of a group: of a ripple that of any order."""
-    return group.key[0].split()[0]
 
 
 def _lower_median(values: Iterable[float]) -> float:

@@ -167,29 +167,24 @@ class Later:
         moments = self.candidates.moments(state.residual) - cross.T @ np.linalg.solve(info, slope)
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
-    def resemblance(self, state: State) -> Array:
-        """Return, of each group, the share of its columns that the effects of a state can imitate.
+    def acting(self, state: State) -> Array:
+        """Return the share of each joint (joints,) in the torque of a state's effects."""
+        if not state.model.effects:
+            return np.zeros(self.rows.n_joints)
+        plain = self.rows.torque(replace(state.model, effects=()))
+        torque = [a - b for a, b in zip(self.rows.torque(state.model), plain, strict=True)]
+        power = np.array([float(x @ x) for x in torque])
+        return power / max(float(power.sum()), 1e-300)
 
-        ρ² = tr(H_cc⁻¹ H_ce H_ee⁻¹ H_ec) / k, beside the columns B: the mean squared canonical
-        correlation (Hotelling 1936).
-        """
-        if not state.effects.width:
-            return np.zeros(len(self.dictionary.groups))
-        info = state.info + self.gram
-        cross_effects = self.base.gram(state.effects)
-        solved = np.linalg.solve(info, np.c_[self.cross, cross_effects])
-        of_columns, of_effects = np.split(solved, [self.cross.shape[1]], axis=1)
-        own = state.effects.gram(state.effects) - cross_effects.T @ of_effects
-        own += _RIDGE * np.eye(len(own))
-        shared = self.candidates.gram(state.effects) - self.cross.T @ of_effects
-        out = []
-        for group, square in zip(self.dictionary.groups, self.squares, strict=True):
-            at = group.columns
-            left = square - self.cross[:, at].T @ of_columns[:, at]
-            imitated = shared[at] @ np.linalg.solve(own, shared[at].T)
-            inverse = np.linalg.pinv(left, rcond=1e-9, hermitian=True)
-            out.append(float(np.trace(inverse @ imitated)) / len(at))
-        return np.clip(out, 0.0, 1.0)
+    @cached_property
+    def shares(self) -> Array:
+        """(groups, joints) share of each joint in the columns of a group."""
+        power = np.zeros((self.candidates.width, self.rows.n_joints))
+        each = zip(self.candidates.index, self.candidates.values, strict=True)
+        for j, (index, values) in enumerate(each):
+            power[index, j] = np.einsum("ij,ij->i", values, values)
+        own = np.array([power[g.columns].sum(axis=0) for g in self.dictionary.groups])
+        return own / np.maximum(own.sum(axis=1, keepdims=True), 1e-300)
 
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""

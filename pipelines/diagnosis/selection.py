@@ -130,6 +130,7 @@ def _round(
         one
         for one in _refitted(later, state, significant, baseline, responses, config)
         if one.state.losses.sum() < state.losses.sum()
+        and not (one.event and one.gain < config.relevance * explained)
     ]
     others = _unnamed(later, state, significant, bool(responses))
     if not tried:
@@ -153,21 +154,21 @@ def _significant(
 ) -> dict[Key, Screened]:
     """Return the candidates above the family-wise threshold, the best shape of each.
 
-    No law is exact: what resembles the causes found so far has to gain more than a share of what
-    these explain, weighed by the resemblance.
+    No law is exact: at the joints of the causes found so far, what remains of these is larger than
+    the noise, and a further cause has to gain more than a share of what they explain there.
     """
     rows = later.rows.count
-    alike = later.resemblance(state)
+    overlap = later.shares @ later.acting(state)
     inexact = {
-        group: config.relevance * explained * max(float(share), config.relevance)
-        for group, share in zip(later.dictionary.groups, alike, strict=True)
+        group: config.relevance * explained * float(share)
+        for group, share in zip(later.dictionary.groups, overlap, strict=True)
     }
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
         if key not in taken
         and one.gain > inexact[one.group]
-        and one.gain > baseline.threshold(one.group.kind, one.freedom, rows)
+        and one.gain > baseline.threshold(one.group, one.freedom, rows)
     }
 
 

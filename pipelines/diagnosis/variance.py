@@ -90,7 +90,7 @@ def _numbered(names: Sequence[Hashable]) -> Indices:
 
 def _family(group: Group) -> tuple[str, int | None]:
     """Return the key that shares a variance: of a ripple its joint, of any order."""
-    return (group.key[0].split()[0], group.key[1])
+    return (group.family, group.key[1])
 
 
 def settle(
