@@ -95,7 +95,8 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
     )
     if dataset.reference is not None:
         return replace(out, start=out.of(range(len(parts))))
-    found = components(sum(out.grams), sum(out.moments), rows.count, kept, config)
+    gram, moment = np.sum(out.grams, axis=0), np.sum(out.moments, axis=0)
+    found = components(gram, moment, rows.count, kept, config)
     return replace(out, start=(np.diag(_typical(found, kept).precision), np.zeros(len(keep))))
 
 

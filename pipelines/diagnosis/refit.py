@@ -174,7 +174,7 @@ class Later:
         plain = self.rows.torque(replace(state.model, effects=()))
         torque = [a - b for a, b in zip(self.rows.torque(state.model), plain, strict=True)]
         power = np.array([float(x @ x) for x in torque])
-        return power / max(float(power.sum()), 1e-300)
+        return np.asarray(power / max(float(power.sum()), 1e-300))
 
     @cached_property
     def shares(self) -> Array:
@@ -184,7 +184,7 @@ class Later:
         for j, (index, values) in enumerate(each):
             power[index, j] = np.einsum("ij,ij->i", values, values)
         own = np.array([power[g.columns].sum(axis=0) for g in self.dictionary.groups])
-        return own / np.maximum(own.sum(axis=1, keepdims=True), 1e-300)
+        return np.asarray(own / np.maximum(own.sum(axis=1, keepdims=True), 1e-300))
 
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""

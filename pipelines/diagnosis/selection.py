@@ -191,8 +191,10 @@ def _contest(
         best = min(scores, key=lambda key: scores[key].sum())
         return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
     pick = min(named, key=lambda one: scores[one.key].sum() + one.numbers * size)  # BIC
-    pays = confidence_set({"with": scores[pick.key], "without": _scores(later, state)}, config)
-    if "without" in pays and not pick.event:
+    without = _scores(later, state)
+    pays = confidence_set({"with": scores[pick.key], "without": without}, config)
+    saved = float(without.sum() - scores[pick.key].sum())
+    if saved <= 0.0 if pick.event else "without" in pays:
         return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
     return pick, tuple(one.key for one in named if one is not pick), ""
 

@@ -38,7 +38,7 @@ class Components:
     @property
     def precision(self) -> Array:
         """(nominal + standing,)"""
-        return np.r_[self.flat, self.mean_square / self.variance]
+        return np.asarray(np.r_[self.flat, self.mean_square / self.variance])
 
 
 def components(
