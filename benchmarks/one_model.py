@@ -36,7 +36,7 @@ def answer(folder: Path, exclude: tuple[str, ...]) -> dict[str, Any]:
         "simulation": "none",
         "simulated_position_rms": None,
     }
-    effects = found.selection.end.model.effects
+    effects = found.look.selection.end.model.effects
     findings = [
         {
             "cause": cause.key[0],

@@ -75,16 +75,16 @@ def answer(
         exclude: causes that were not considered.
     """
     tell("weighing what was found, and what these logs would have shown")
-    causes, end = found.decision.causes, found.selection.end
-    standing = standing_of(prepared.reference, found.later, found.config)
+    causes, end = found.decision.causes, found.look.selection.end
+    standing = standing_of(prepared.reference, found.look.later, found.config)
     named_effects = end.model.effects if causes else ()
-    trained = train(prepared, found.later, named_effects, blocks, standing)
+    trained = train(prepared, found.look.later, named_effects, blocks, standing)
     worth = weigh(prepared, trained, standing.floor, whole)
     last, floor = len(causes), worth.floor
-    rounds = {one.cause.key: one for one in found.selection.rounds if one.cause is not None}
+    rounds = {one.cause.key: one for one in found.look.selection.rounds if one.cause is not None}
     rivals = [rivals_of(rounds[one.key]) for one in causes]
-    findings = findings_of(worth, found.later, end, rivals, found.responses)
-    limits = limits_of(found.later, end, found.baseline) if whole else Limits((), ())
+    findings = findings_of(worth, found.look.later, end, rivals, found.responses)
+    limits = limits_of(found.look.later, end, found.look.baseline) if whole else Limits((), ())
     open_to = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
     named = {one.cause for one in findings}
     reference = prepared.reference is not None
@@ -149,7 +149,7 @@ def _sentence(
 def _others(first: Finding, found: Found) -> list[str]:
     """Return the alternatives of a finding, each with its number."""
     keys = {(one.cause, one.joint) for one in first.rivals}
-    own = [one for one in found.selection.rounds if one.cause is not None]
+    own = [one for one in found.look.selection.rounds if one.cause is not None]
     same = [one for one in own if one.cause and one.cause.key == (first.cause, first.joint)]
     return [
         f"{within(effect.effect.title)}{how_much(like)}{where(like)}"
@@ -173,7 +173,7 @@ def _rejected(found: Found) -> tuple[Rejected, ...]:
     named = {one.key for one in found.decision.causes}
     alike = {key for one in found.decision.causes for key in one.alternatives}
     out: dict[Key, Rejected] = {}
-    for one in found.selection.rounds:
+    for one in found.look.selection.rounds:
         for trial in one.tried:
             if trial.key not in named | alike:
                 out[trial.key] = Rejected(*trial.key, one.stopped or _WORSE)
@@ -182,8 +182,8 @@ def _rejected(found: Found) -> tuple[Rejected, ...]:
 
 def _ledger(found: Found) -> tuple[Trial, ...]:
     """Return every candidate above the threshold of its round, and how it fared."""
-    rows, out = found.later.rows.count, []
-    for step, one in enumerate(found.selection.rounds, 1):
+    rows, out = found.look.later.rows.count, []
+    for step, one in enumerate(found.look.selection.rounds, 1):
         power = one.before.cost
         exact = {trial.key: 1.0 - trial.state.cost / power for trial in one.tried}
         alike = () if one.cause is None else one.cause.alternatives
@@ -201,7 +201,7 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
                 if key not in exact
                 else one.stopped or _WORSE
             )
-            bound = found.baseline.threshold(group.kind, screened.freedom, rows)
+            bound = found.look.baseline.threshold(group, screened.freedom, rows)
             out.append(
                 Trial(
                     step,
@@ -219,11 +219,11 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
 
 def _thresholds(found: Found, origin: str) -> tuple[Threshold, ...]:
     """Return what each cause had to exceed in the last round, in its best shape."""
-    end, later = found.selection.end, found.later
+    end, later = found.look.selection.end, found.look.later
     rows, best = later.rows.count, best_of(later.screened(end))
     return tuple(
         Threshold(
-            *key, found.baseline.threshold(one.group.kind, one.freedom, rows) / end.cost, origin
+            *key, found.look.baseline.threshold(one.group, one.freedom, rows) / end.cost, origin
         )
         for key, one in best.items()
         if one.group.kind != "unnamed"

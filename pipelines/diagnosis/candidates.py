@@ -53,6 +53,11 @@ class Group:
     kind: Kind
 
     @property
+    def family(self) -> str:
+        """The cause, or of shapes without a name their kind."""
+        return self.key[0].split()[0]
+
+    @property
     def columns(self) -> Indices:
         return np.arange(self.first, self.first + self.width)
 

@@ -126,6 +126,10 @@ class Rows:
         _, numbered = np.unique(which, return_inverse=True)
         return tuple(numbered[self.joint == j] for j in range(self.n_joints))
 
+    def less(self, torque: Array | None) -> Rows:
+        """Return the rows less a torque (rows,) [N m] that has passed no whitening; None: as measured."""
+        return replace(self, data=replace(self.data, known=torque))
+
     @cached_property
     def speed(self) -> Array:
         """(rows,) |dq| of each row's joint."""
@@ -178,6 +182,7 @@ class Dataset:
     later: Rows
     frf: tuple[ExperimentLog, ...]
     session_start: float  # [s] clock time at which the later logs begin
+    cleared: Rows | None = None  # the later rows less the causes found before
 
     @property
     def arm(self) -> Arm:
@@ -191,7 +196,7 @@ class Dataset:
     @property
     def known(self) -> Rows:
         """The rows that tell what is usual on this machine."""
-        return self.later if self.reference is None else self.reference
+        return self.reference or self.cleared or self.later
 
     @property
     def noise_ratio(self) -> Array:

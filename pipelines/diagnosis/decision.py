@@ -44,7 +44,7 @@ def decide(
         return Decision("unknown", "several causes explain it", causes, explained)
     if causes:
         return Decision("cause", "", causes, explained)
-    if selection.stopped:
+    if not fits and selection.stopped:
         return Decision("unknown", selection.stopped, (), explained)
     if not fits:
         more = f"; it follows {selection.follows}" if selection.follows else ""

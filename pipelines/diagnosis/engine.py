@@ -3,25 +3,64 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.dataset import load
+from pipelines.diagnosis.dataset import Dataset, load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.events import event_threshold
 from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.screening import Baseline, baseline
 from pipelines.diagnosis.selection import Selection, select
+from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.given.compliance import Compliance, compared, compliance
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """One search, with the noise that the causes found before it leave."""
+
+    later: Later
+    baseline: Baseline
+    selection: Selection
+
+    @classmethod
+    def of(
+        cls,
+        rough: Dataset,
+        every: Dictionary,
+        responses: Sequence[Acting],
+        config: DiagnosisConfig,
+        before: Selection | None = None,
+    ) -> Look:
+        """Return the causes in rows that no noise is known of, beside those found before."""
+        cause = None
+        if before is not None and before.causes:
+            cause = _torque(rough, before.end.model)
+        dataset, dictionary = settle(rough, every, config, cause)
+        prior = prior_of(dataset, dictionary, config)
+        later = Later.of(dataset, dictionary, prior, config)
+        event = event_threshold(dataset, dictionary, prior, config)
+        known = baseline(dataset, dictionary, prior, event, config)
+        return cls(later, known, select(later, known, responses, config, before))
+
+
+def _torque(rough: Dataset, model: Exact) -> Array:
+    """Return the torque (rows,) [N m] that the effects of a model add to it."""
+    data = rough.later.data
+    return np.asarray(model.torque(data) - replace(model, effects=()).torque(data))
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +68,7 @@ class Diagnosis:
     """Everything that was computed."""
 
     decision: Decision
-    selection: Selection
-    baseline: Baseline
-    later: Later
+    look: Look
     responses: Compliance | None  # None: there are no frequency responses
     config: DiagnosisConfig
 
@@ -54,10 +91,10 @@ def diagnose(
     return diagnose_prepared(prepared, config, exclude)
 
 
-def pose(prepared: Prepared, config: DiagnosisConfig, exclude: Sequence[str] = ()) -> Later:
+def pose(prepared: Prepared, config: DiagnosisConfig) -> Later:
     """Return the rows of later logs beside their prior, with all candidates."""
     rough = load(prepared, prepared.logs.frf)
-    dataset, dictionary = settle(rough, Dictionary.of(rough, config, exclude), config)
+    dataset, dictionary = settle(rough, Dictionary.of(rough, config), config)
     return Later.of(dataset, dictionary, prior_of(dataset, dictionary, config), config)
 
 
@@ -65,20 +102,25 @@ def diagnose_prepared(
     prepared: Prepared, config: DiagnosisConfig, exclude: Sequence[str] = ()
 ) -> Diagnosis:
     """Return the same of rows that were prepared."""
-    later = pose(prepared, config, exclude)
-    dataset, parts = later.dataset, (later.dataset, later.dictionary, later.prior)
-    known = baseline(*parts, event_threshold(*parts, config), config)
-    responses = compliance(dataset.frf, dataset.model.nominal, exclude)
-    found = select(later, known, _new(responses, later, prepared, exclude), config)
-    decision = decide(later, found, known, config)
-    return Diagnosis(decision, found, known, later, responses, config)
+    rough = load(prepared, prepared.logs.frf)
+    every = Dictionary.of(rough, config, exclude)
+    responses = compliance(rough.frf, rough.model.nominal, exclude)
+    named = _new(responses, rough, prepared, exclude)
+    last = found = Look.of(rough, every, named, config)
+    while last.selection.causes:  # what these leave tells the noise, and what is typical
+        last = Look.of(rough, every, named, config, found.selection)
+        if len(last.selection.causes) <= len(found.selection.causes):
+            break
+        found = last
+    decision = decide(last.later, last.selection, last.baseline, config)
+    return Diagnosis(decision, last, responses, config)
 
 
 def _new(
-    now: Compliance | None, later: Later, prepared: Prepared, exclude: Sequence[str]
+    now: Compliance | None, rough: Dataset, prepared: Prepared, exclude: Sequence[str]
 ) -> tuple[Acting, ...]:
     """Return what frequency responses name, and those of the reference did not."""
     if now is None:
         return ()
-    before = compliance(prepared.logs.frf_before, later.dataset.model.nominal, exclude)
+    before = compliance(prepared.logs.frf_before, rough.model.nominal, exclude)
     return now.named if before is None else compared(now, before).new

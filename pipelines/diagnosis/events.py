@@ -52,7 +52,7 @@ def best_window(
         for shape in dictionary.event.shapes[0].promising(one.motion, arm, full):
             columns = one.lay(shape.columns(one.motion, arm)) * here
             x = columns.reshape(len(columns), -1)
-            amplitudes = np.linalg.lstsq(x.T, own.ravel(), rcond=1e-6)[0]
+            amplitudes = np.asarray(np.linalg.lstsq(x.T, own.ravel(), rcond=1e-6)[0], np.float64)
             gain = float((x @ own.ravel()) @ amplitudes)
             if best is None or gain > best.gain:
                 best = Window(gain, shape, amplitudes, data.first + place)

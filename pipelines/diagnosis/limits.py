@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import Key
+from pipelines.diagnosis.candidates import Group, Key
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.screening import Baseline
 from pipelines.diagnosis.table import Array, Table
@@ -49,7 +49,11 @@ class _Shape:
     hidden: Array  # H_c, of its amplitudes
     length: Array  # of its columns
     cross: Array  # coefficients by which the model imitates them, of unit columns
-    freedom: int
+    group: Group
+
+    @property
+    def freedom(self) -> int:
+        return self.group.width
 
     def power(self, amplitudes: Array) -> float:
         """Return what these amplitudes add to T_c."""
@@ -75,7 +79,7 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
         part = np.abs(solved[:, at]) * both.norms[:, None] / np.maximum(length, 1e-300)
         hidden = square - cross[:, at].T @ solved[:, at]
         shapes.setdefault(group.key, []).append(
-            _Shape(family.shapes[group.shape], hidden, length, part, group.width)
+            _Shape(family.shapes[group.shape], hidden, length, part, group)
         )
     there = {(one.effect.name, one.effect.joint) for one in state.model.effects}
     told = [_limit(later, own, baseline) for key, own in shapes.items() if key not in there]
@@ -93,8 +97,8 @@ def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> Detect
         reason = f"absorbed by {_hiding(later, shapes[0])}; needs other motion"
         return NotTestable(first.name, first.joint, reason, first.experiment)
     needed = {
-        k: np.sqrt(baseline.threshold("named", k, later.rows.count)) + _SIDE
-        for k in {one.freedom for one in shapes}
+        one.freedom: np.sqrt(baseline.threshold(one.group, one.freedom, later.rows.count)) + _SIDE
+        for one in shapes
     }
     if first.fixed_amplitudes is None:
         reach = [np.sqrt(max(s.hidden[0, 0], 0.0)) / needed[s.freedom] for s in shapes]

@@ -23,7 +23,7 @@ from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.diagnosis.variance import Components, components
 
-__all__ = ["Prior", "prior_of", "typical"]
+__all__ = ["Prior", "prior_of"]
 
 _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot be seen in 1e5 rows
 
@@ -41,7 +41,6 @@ class Prior:
     grams: tuple[Array, ...]  # (k, k) of each part
     moments: tuple[Array, ...]
     start: tuple[Array, Array]  # information A and A m before the later logs
-    learned: bool  # from reference logs
 
     @property
     def n_nominal(self) -> int:
@@ -93,25 +92,12 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
         tuple(g[at] for g in grams),
         tuple(m[keep] for m in moments),
         (np.zeros((0, 0)), np.zeros(0)),
-        dataset.reference is not None,
     )
-    if out.learned:
+    if dataset.reference is not None:
         return replace(out, start=out.of(range(len(parts))))
-    return replace(out, start=typical(out, sum(out.grams), sum(out.moments), rows.count, config))
-
-
-def typical(
-    prior: Prior, gram: Array, moment: Array, rows: int, config: DiagnosisConfig
-) -> tuple[Array, Array]:
-    """Return information A and A m of a machine whose standing numbers are typical of its joints.
-
-    Args:
-        gram: of the columns of the prior, behind those of causes that were selected.
-        moment: of the same.
-    """
-    found = _typical(components(gram, moment, rows, prior.groups, config), prior.groups)
-    precision = found.precision[len(gram) - len(prior.precision) :]
-    return np.diag(precision), np.zeros(len(precision))
+    gram, moment = np.sum(out.grams, axis=0), np.sum(out.moments, axis=0)
+    found = components(gram, moment, rows.count, kept, config)
+    return replace(out, start=(np.diag(_typical(found, kept).precision), np.zeros(len(keep))))
 
 
 def _typical(found: Components, of: Sequence[Group]) -> Components:
@@ -122,18 +108,13 @@ def _typical(found: Components, of: Sequence[Group]) -> Components:
     """
     largest: dict[str, dict[int, float]] = {}  # of each family and joint
     for group, value in zip(of, found.variance, strict=True):
-        at = largest.setdefault(_word(group), {})
+        at = largest.setdefault(group.family, {})
         at[group.key[1] or 0] = max(value, at.get(group.key[1] or 0, 0.0))
     median = {word: _lower_median(at.values()) for word, at in largest.items()}
     several = [value for word, value in median.items() if len(largest[word]) > 1]
     other = _lower_median(several or median.values())
-    usual = [median[w] if len(largest[w]) > 1 else other for w in map(_word, of)]
+    usual = [median[w] if len(largest[w]) > 1 else other for w in (g.family for g in of)]
     return replace(found, variance=np.minimum(found.variance, usual))
-
-
-def _word(group: Group) -> str:
-    """Return the family of a group: of a ripple that of any order."""
-    return group.key[0].split()[0]
 
 
 def _lower_median(values: Iterable[float]) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.prior import Prior, typical
+from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.score import block_losses
 from pipelines.diagnosis.screening import Screened, screen
 from pipelines.diagnosis.table import Array, Indices, Table
@@ -114,11 +114,13 @@ class Later:
     def y(self) -> tuple[Array, ...]:
         return self.rows.y
 
-    def start(self) -> State:
-        """Return the nominal model, fitted under the prior alone."""
+    def start(self, found: Exact | None = None) -> State:
+        """Return the nominal model, or one with causes found before, fitted under the prior."""
+        model = found or self.dataset.model
         info, moment = self.prior.start
+        for one in model.effects:
+            info, moment = self.freed(info, moment, one.effect)
         theta = np.zeros(self.base.width)
-        model = self.dataset.model
         theta[: len(model.beta)] = model.beta * self.prior.scale
         return self.fit(model, theta, info, moment)
 
@@ -155,21 +157,6 @@ class Later:
         state = State(model, theta, info, moment, residual, effects, lasting, np.zeros(0))
         return replace(state, losses=self.losses(state))
 
-    def beside(self, state: State, config: DiagnosisConfig) -> State:
-        """Return the state with what is typical of the machine beside its causes.
-
-        What a cause leaks into other families is typical of nothing. Reference logs know better.
-        """
-        if self.prior.learned:
-            return state
-        columns = Table.stacked([state.effects, self.base])
-        linear = self.base.times(state.theta)
-        target = tuple(r + t for r, t in zip(state.residual, linear, strict=True))
-        info, moment = typical(
-            self.prior, columns.gram(columns), columns.moments(target), self.rows.count, config
-        )
-        return self.fit(state.model, state.theta, info, moment)
-
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
         both = Table.stacked([self.base, state.effects])
@@ -180,29 +167,24 @@ class Later:
         moments = self.candidates.moments(state.residual) - cross.T @ np.linalg.solve(info, slope)
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
-    def resemblance(self, state: State) -> Array:
-        """Return, of each group, the share of its columns that the effects of a state can imitate.
+    def acting(self, state: State) -> Array:
+        """Return the share of each joint (joints,) in the torque of a state's effects."""
+        if not state.model.effects:
+            return np.zeros(self.rows.n_joints)
+        plain = self.rows.torque(replace(state.model, effects=()))
+        torque = [a - b for a, b in zip(self.rows.torque(state.model), plain, strict=True)]
+        power = np.array([float(x @ x) for x in torque])
+        return np.asarray(power / max(float(power.sum()), 1e-300))
 
-        ρ² = tr(H_cc⁻¹ H_ce H_ee⁻¹ H_ec) / k, beside the columns B: the mean squared canonical
-        correlation (Hotelling 1936).
-        """
-        if not state.effects.width:
-            return np.zeros(len(self.dictionary.groups))
-        info = state.info + self.gram
-        cross_effects = self.base.gram(state.effects)
-        solved = np.linalg.solve(info, np.c_[self.cross, cross_effects])
-        of_columns, of_effects = np.split(solved, [self.cross.shape[1]], axis=1)
-        own = state.effects.gram(state.effects) - cross_effects.T @ of_effects
-        own += _RIDGE * np.eye(len(own))
-        shared = self.candidates.gram(state.effects) - self.cross.T @ of_effects
-        out = []
-        for group, square in zip(self.dictionary.groups, self.squares, strict=True):
-            at = group.columns
-            left = square - self.cross[:, at].T @ of_columns[:, at]
-            imitated = shared[at] @ np.linalg.solve(own, shared[at].T)
-            inverse = np.linalg.pinv(left, rcond=1e-9, hermitian=True)
-            out.append(float(np.trace(inverse @ imitated)) / len(at))
-        return np.clip(out, 0.0, 1.0)
+    @cached_property
+    def shares(self) -> Array:
+        """(groups, joints) share of each joint in the columns of a group."""
+        power = np.zeros((self.candidates.width, self.rows.n_joints))
+        each = zip(self.candidates.index, self.candidates.values, strict=True)
+        for j, (index, values) in enumerate(each):
+            power[index, j] = np.einsum("ij,ij->i", values, values)
+        own = np.array([power[g.columns].sum(axis=0) for g in self.dictionary.groups])
+        return np.asarray(own / np.maximum(own.sum(axis=1, keepdims=True), 1e-300))
 
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""
@@ -237,22 +219,22 @@ class Later:
             columns, self._information(state.info, lasting), state.residual, self.block
         )
 
-    def freed(self, state: State, effect: Effect) -> tuple[Array, Array]:
+    def freed(self, info: Array, moment: Array, effect: Effect) -> tuple[Array, Array]:
         """Return the prior free along base parameters that the effect moves by unknown numbers."""
         directions = effect.moving(self.dataset.arm)
         if directions is None or not directions.shape[1]:
-            return state.info, state.moment
+            return info, moment
         kept = list(self.dataset.model.columns.kept)
-        along = np.zeros((len(state.info), directions.shape[1]))
+        along = np.zeros((len(info), directions.shape[1]))
         along[: len(kept)] = directions[kept] * self.prior.scale[: len(kept), None]
         along = along[:, np.linalg.norm(along, axis=0) > 0.0]
         along = along / np.linalg.norm(along, axis=0)
-        side = state.info @ along
+        side = info @ along
         inner = along.T @ side
         inner = inner + _FREE * np.trace(inner) * np.eye(len(inner))
-        info = state.info - side @ np.linalg.solve(inner, side.T)
-        info = 0.5 * (info + info.T)
-        return info, info @ np.linalg.solve(state.info, state.moment)
+        free = info - side @ np.linalg.solve(inner, side.T)
+        free = 0.5 * (free + free.T)
+        return free, free @ np.linalg.solve(info, moment)
 
     def information(self, state: State) -> Array:
         """Return P (k, k) of nominal and standing numbers and those of the effects, of unit columns."""

@@ -86,14 +86,14 @@ class Baseline:
 
     alpha: float
     families: int  # causes at joints, that are compared at once
-    bias: dict[str, float]  # of each class, a row: what T_c exceeds its χ² bound by
+    bias: dict[str, float]  # of each family, a row: what T_c exceeds its χ² bound by
     worst_fit: float  # cost of a row, that a healthy session exceeds rarely
     usual_fit: float
     event: float  # gain that a contact has to exceed
 
-    def threshold(self, kind: str, freedom: int, rows: int) -> float:
+    def threshold(self, group: Group, freedom: int, rows: int) -> float:
         """Return the T_c that a healthy machine exceeds with probability `alpha` in all."""
-        return chi2_bound(self.alpha / self.families, freedom) + rows * self.bias[kind]
+        return chi2_bound(self.alpha / self.families, freedom) + rows * self.bias[group.family]
 
 
 def baseline(
@@ -102,24 +102,18 @@ def baseline(
     """Return what screening and residual are between parts of the reference."""
     parts = _Parts.of(dataset, dictionary, prior)
     families = len({group.key for group in dictionary.groups})
-    excess: dict[str, list[float]] = {"named": [], "compliance": [], "unnamed": []}
+    excess: dict[str, list[float]] = {}
     fits: list[float] = []
     for before, after in _splits(len(prior.parts)):
         found, fit, rows = parts.compared(before, list(after))
         fits.append(fit)
-        for kind, values in excess.items():
-            values.append(
-                max(
-                    (
-                        one.gain - chi2_bound(config.alpha / families, one.freedom)
-                        for one in found
-                        if one.group.kind == kind
-                    ),
-                    default=0.0,
-                )
-                / rows
-            )
-    bias = {kind: max(0.0, _upper(values, config.alpha)) for kind, values in excess.items()}
+        for one in best_of(found).values():
+            bound = chi2_bound(config.alpha / families, one.freedom)
+            excess.setdefault(one.group.family, []).append((one.gain - bound) / rows)
+    bias = {family: max(0.0, _upper(values, config.alpha)) for family, values in excess.items()}
+    if dataset.reference is None:  # a fault is part of what its own family leaves
+        second = sorted(bias.values())[-2]
+        bias = {family: min(value, second) for family, value in bias.items()}
     return Baseline(
         config.alpha, families, bias, _upper(fits, config.alpha), float(np.median(fits)), event
     )

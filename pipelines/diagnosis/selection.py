@@ -85,18 +85,25 @@ class Round:
 
 
 def select(
-    later: Later, baseline: Baseline, responses: Sequence[Acting], config: DiagnosisConfig
+    later: Later,
+    baseline: Baseline,
+    responses: Sequence[Acting],
+    config: DiagnosisConfig,
+    before: Selection | None = None,
 ) -> Selection:
     """Return the causes that explain the later rows.
 
     Args:
         responses: causes that frequency responses name, with their numbers; candidates like others.
+        before: what was selected before the noise was known beside it.
     """
     start = state = later.start()
     causes: list[Cause] = []
+    if before is not None:
+        causes, state = list(before.causes), later.start(before.end.model)
     stopped = follows = ""
-    explained = 0.0
-    rounds: list[Round] = []
+    explained = max(start.cost - state.cost, 0.0)
+    rounds = [] if before is None else [one for one in before.rounds if one.cause is not None]
     while len(causes) < config.causes:
         found = _round(
             later, state, causes, explained, baseline, responses if not causes else (), config
@@ -107,7 +114,7 @@ def select(
             break
         causes.append(found.cause)
         explained += max(state.cost - found.state.cost, 0.0)
-        state = later.beside(found.state, config)
+        state = found.state
     causes, state = _backward(later, causes, state, config)
     return Selection(
         tuple(causes), start, state, explained, stopped, follows, tuple(rounds)
@@ -131,6 +138,7 @@ def _round(
         one
         for one in _refitted(later, state, significant, baseline, responses, config)
         if one.state.losses.sum() < state.losses.sum()
+        and not (one.event and one.gain < config.relevance * explained)
     ]
     others = _unnamed(later, state, significant, bool(responses))
     seen = Round(state, None, None, significant=tuple(significant.values()), tried=tuple(tried))
@@ -156,21 +164,21 @@ def _significant(
 ) -> dict[Key, Screened]:
     """Return the candidates above the family-wise threshold, the best shape of each.
 
-    No law is exact: what resembles the causes found so far has to gain more than a share of what
-    these explain, weighed by the resemblance.
+    No law is exact: at the joints of the causes found so far, what remains of these is larger than
+    the noise, and a further cause has to gain more than a share of what they explain there.
     """
     rows = later.rows.count
-    alike = later.resemblance(state)
+    overlap = later.shares @ later.acting(state)
     inexact = {
-        group: config.relevance * explained * max(float(share), config.relevance)
-        for group, share in zip(later.dictionary.groups, alike, strict=True)
+        group: config.relevance * explained * float(share)
+        for group, share in zip(later.dictionary.groups, overlap, strict=True)
     }
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
         if key not in taken
         and one.gain > inexact[one.group]
-        and one.gain > baseline.threshold(one.group.kind, one.freedom, rows)
+        and one.gain > baseline.threshold(one.group, one.freedom, rows)
     }
 
 
@@ -187,14 +195,32 @@ def _contest(
     free = {key: _scores(later, other) for key, other in others.items()}
     kept = confidence_set(scores | free, config)
     named = [one for one in tried if one.key in kept]
+    if not named and (near := _nearly(later, state, tried, others, config)):
+        named = [near]
     if not named:
         best = min(scores, key=lambda key: scores[key].sum())
         return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
     pick = min(named, key=lambda one: scores[one.key].sum() + one.numbers * size)  # BIC
-    pays = confidence_set({"with": scores[pick.key], "without": _scores(later, state)}, config)
-    if "without" in pays and not pick.event:
+    without = _scores(later, state)
+    pays = confidence_set({"with": scores[pick.key], "without": without}, config)
+    saved = float(without.sum() - scores[pick.key].sum())
+    if saved <= 0.0 if pick.event else "without" in pays:
         return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
     return pick, tuple(one.key for one in named if one is not pick), ""
+
+
+def _nearly(
+    later: Later,
+    state: State,
+    tried: Sequence[Candidate],
+    others: Mapping[Key, State],
+    config: DiagnosisConfig,
+) -> Candidate | None:
+    """Return the cause that explains as much as any shape without a name, as far as laws are exact."""
+    best = min(tried, key=lambda one: _loss(later, one.state))
+    free = min(_loss(later, other) for other in others.values())
+    missing = _loss(later, best.state) - free
+    return best if missing < config.relevance * (_loss(later, state) - free) else None
 
 
 def _refitted(
@@ -256,7 +282,7 @@ def _candidate(
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
     start = np.zeros(max(len(amplitudes), _width(later, effect)))
     start[: len(amplitudes)] = amplitudes
-    info, moment = later.freed(state, effect)
+    info, moment = later.freed(state.info, state.moment, effect)
     try:
         fitted = later.fit(
             state.model.with_effect(effect, start, log=log), state.theta, info, moment
@@ -301,13 +327,18 @@ def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
         return best
     for form in one.effect.forms():
         other = _candidate(later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes))
-        if other is not None and other.possible and _loss(other) < _loss(best):
+        if (
+            other is not None
+            and other.possible
+            and _loss(later, other.state) < _loss(later, best.state)
+        ):
             best = other
     return best
 
 
-def _loss(one: Candidate) -> float:
-    return float(one.state.losses.sum())
+def _loss(later: Later, state: State) -> float:
+    """Return the squared predictive error and what the prior says against the numbers."""
+    return float(state.losses.sum()) + state.cost - state.rss
 
 
 def _backward(

@@ -90,7 +90,7 @@ def _flat(prior: Prior) -> Prior:
     n = prior.n_nominal
     none = np.zeros(0, dtype=np.intp)
     return replace(
-        prior, standing=none, groups=(), start=(prior.precision[:n, :n], np.zeros(n)), learned=True
+        prior, standing=none, groups=(), start=(prior.precision[:n, :n], np.zeros(n))
     )
 
 

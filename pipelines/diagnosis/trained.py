@@ -157,7 +157,7 @@ def _chain(own: Later, causes: Sequence[Named]) -> list[State]:
     states = [own.start()]
     for one in causes:
         before = states[-1]
-        info, moment = own.freed(before, one.effect)
+        info, moment = own.freed(before.info, before.moment, one.effect)
         model = replace(before.model, effects=(*before.model.effects, one))
         states.append(own.fit(model, before.theta, info, moment))
     return states

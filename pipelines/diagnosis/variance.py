@@ -24,7 +24,6 @@ __all__ = ["Components", "components", "settle"]
 
 _FLAT = 1e-10  # numerics: of a column's information
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
-_NOISE_ROUNDS = 3  # numerics: of the same for the noise alone, which hardly depends on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +38,7 @@ class Components:
     @property
     def precision(self) -> Array:
         """(nominal + standing,)"""
-        return np.r_[self.flat, self.mean_square / self.variance]
+        return np.asarray(np.r_[self.flat, self.mean_square / self.variance])
 
 
 def components(
@@ -48,14 +47,15 @@ def components(
     rows: int,
     of: Sequence[Group],
     config: DiagnosisConfig,
-    rounds: int | None = None,
+    power: float | None = None,
 ) -> Components:
-    """Return the numbers and variances of the standing columns, of rows of unit noise.
+    """Return the numbers and variances of the standing columns.
 
     Args:
         gram: B Bᵀ (k, k), B the nominal columns and, behind them, the standing ones.
         moment: B y (k,).
         of: group of each standing column.
+        power: yᵀ y, where the variance of the noise is not 1 and has to be found.
     """
     n_nominal = len(gram) - len(of)
     own, family = _numbered([(g.key, g.shape) for g in of]), _numbered([_family(g) for g in of])
@@ -65,16 +65,20 @@ def components(
     alike = np.array([g.kind == "unnamed" for g in of])  # columns that share a variance [(N m)²]
     mean_square = np.where(alike, largest[own], mean_square)
     flat = _FLAT * np.diag(gram)[:n_nominal]
-    tau, mean = np.full(len(own), _START), np.zeros(len(gram))
+    tau, mean, noise = np.full(len(own), _START), np.zeros(len(gram)), 1.0
     per_group, per_family = np.bincount(own), np.bincount(family)
-    for _ in range(rounds or config.em_rounds):
-        covariance = np.linalg.inv(gram + np.diag(np.r_[flat, mean_square / tau]))
-        mean = covariance @ moment
+    for _ in range(config.em_rounds):
+        precision = np.r_[flat, mean_square / tau]
+        covariance = np.linalg.inv(gram / noise + np.diag(precision))
+        mean = covariance @ moment / noise
         spread = np.diag(covariance)
         energy = (mean[n_nominal:] ** 2 + spread[n_nominal:]) * mean_square
         of_family = np.bincount(family, energy) / per_family
         pooled = np.bincount(own, energy)[own] + config.variance_prior * of_family[family]
         tau = np.maximum(pooled / (per_group[own] + config.variance_prior), 1e-12)
+        if power is not None:
+            rss = power - 2.0 * float(mean @ moment) + float(mean @ gram @ mean)
+            noise = rss / (rows - len(gram) + float(spread @ precision))
     return Components(flat, mean_square, tau, mean)
 
 
@@ -86,29 +90,33 @@ def _numbered(names: Sequence[Hashable]) -> Indices:
 
 def _family(group: Group) -> tuple[str, int | None]:
     """Return the key that shares a variance: of a ripple its joint, of any order."""
-    return (group.key[0].split()[0], group.key[1])
+    return (group.family, group.key[1])
 
 
 def settle(
-    dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig
+    dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig, cause: Array | None = None
 ) -> tuple[Dataset, Dictionary]:
-    """Return the rows of each session whitened, in units of its own noise, and their columns."""
+    """Return the rows of each session whitened, in units of its own noise, and their columns.
+
+    Args:
+        cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
+    """
     groups = [g for g in dictionary.groups if g.shape == 0]
     columns = np.concatenate([g.columns for g in groups])
     of = [g for g in groups for _ in range(g.width)]
 
     def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
-        there, through = rows.whitened(
-            _left(rows, table.take(columns), of, config), config.noise_bins
-        )
+        left = _left(rows, table.take(columns), of, config)
+        there, through = rows.whitened(left, config.noise_bins)
         return there, through(table)
 
-    later, table = settled(dataset.later, dictionary.later)
+    cleared, table = settled(dataset.later.less(cause), dictionary.later)
+    dataset = replace(dataset, later=cleared.less(None), cleared=cleared)
     if dataset.reference is None or dictionary.reference is None:
-        return replace(dataset, later=later), replace(dictionary, later=table)
+        return dataset, replace(dictionary, later=table)
     before, known = settled(dataset.reference, dictionary.reference)
     return (
-        replace(dataset, later=later, reference=before),
+        replace(dataset, reference=before),
         replace(dictionary, later=table, reference=known),
     )
 
@@ -118,9 +126,8 @@ def _left(
 ) -> tuple[Array, ...]:
     """Return what the nominal columns and the dictionary together leave, of each joint."""
     scale = rows.nominal.norms
-    table = Table.stacked(
-        [rows.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0)), dictionary]
-    )
-    gram, moment = table.gram(table), table.moments(rows.y)
-    found = components(gram, moment, rows.count, of, config, _NOISE_ROUNDS)
+    unit = 1.0 / np.where(scale > 0.0, scale, 1.0)
+    table = Table.stacked([rows.nominal.scaled(unit), dictionary])
+    power = sum(float(y @ y) for y in rows.y)
+    found = components(table.gram(table), table.moments(rows.y), rows.count, of, config, power)
     return tuple(y - t for y, t in zip(rows.y, table.times(found.mean), strict=True))

@@ -26,4 +26,4 @@ def test_a_payload_is_one() -> None:
     """Half a kilogram at the tip, within 3 %."""
     found = since("payload", None)
     assert [one.key[0] for one in found.decision.causes] == ["payload"]
-    assert found.selection.end.model.effects[0].amplitudes[0] == pytest.approx(0.5, rel=0.03)
+    assert found.look.selection.end.model.effects[0].amplitudes[0] == pytest.approx(0.5, rel=0.03)
