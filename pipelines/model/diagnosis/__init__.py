@@ -1,9 +1,8 @@
 """What the simulation of an arm gets wrong, and why: every effect tried on what the nominal model leaves.
 
-`diagnose`, `changed` and `extend` answer one question each; a folder is a part of the way there, and its docstring the map of it:
+`diagnose` and `extend` answer one question each, of logs without reference logs (with these `pipelines.diagnosis` does); a folder is a part of the way there, and its docstring the map of it:
 
     diagnose     what the nominal model gets wrong in these logs: the whole of it in the order in which it happens
-    changed      what has changed since the reference logs: the same, with these beside
     extend       what follows for causes that somebody names
     result       what they answer with: everything found, nothing drawn
     memory       what was worked out of logs, for whoever asks the same of them again
@@ -13,8 +12,7 @@ Where to look, in the order in which it happens:
     asked        settings and logs, and what has to be in order before any physics is blamed
     rows         logs as equations: how signals become rows, and what noise these have
     fitted       the nominal model on the rows, and an arm with its effects exactly, every number at once
-    given        what is settled before anything is looked for: frequency responses, laws of dry friction, reference logs, the floor
-    reference    what the reference logs have as well, and what base parameters took in since
+    given        what is settled before anything is looked for: frequency responses, laws of dry friction, the floor
     screened     every cause that could be, and how much of the residual it would take away, to first order
     floor        what an arm in order leaves, and so what a cause has to exceed
     searched     causes found one after the other, each fitted exactly beside those before it

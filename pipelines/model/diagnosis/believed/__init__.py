@@ -9,7 +9,6 @@
     mistaken       for what it could have been mistaken
     mended         it only mends the shape of another
     which_joint    logs do not tell at which joint it is
-    unchanged      it was there before, reference logs say
     steadied       numbers refitted with the ripple of drives among the noise
 
     second_look    where the noise is white: what slow noise hides

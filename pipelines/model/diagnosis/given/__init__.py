@@ -4,7 +4,6 @@
     compliance        what gives way, named by them
     change_of_sign    by which curve dry friction changes its sign
     terms_apart       a friction law of as many terms as the logs tell apart
-    since             with reference logs: the later ones less what stands, and the gate that only a change passes
-    floored           without them: the floor, where it comes from, and the thresholds that follow
+    floored           the floor, where it comes from, and the thresholds that follow
     clean             what is left when all that may be a fault is taken away: the noise for that floor
 """

@@ -4,5 +4,4 @@
     findings    from the steps of a search to findings
     joined      found several times at one place, it is one finding
     chain       what each is worth in the order in which they are told
-    carried     what base parameters took in, made a finding
 """

@@ -7,6 +7,7 @@
     held_out        what a model leaves of rows that it was not fitted to
     extrapolated    what it may leave of other motion because its numbers are not known better
     gains           what a finding is worth: torque, simulated position, tip
+    extended        the model extended by causes, with the deviations of all its numbers
     closed_loop     arms moved by the controllers of logs
     simulated       measured over simulated, in closed loop
 """
