@@ -1,6 +1,7 @@
 """What the simulation of an arm gets wrong, and why: every effect tried on what the nominal model leaves.
 
-`diagnose` and `extend` answer one question each, of logs without reference logs (with these `pipelines.diagnosis` does); a folder is a part of the way there, and its docstring the map of it:
+`diagnose` and `extend` answer one question each, without reference logs (with them the package
+pipelines.diagnosis does); a folder is a part of the way there, and its docstring the map of it:
 
     diagnose     what the nominal model gets wrong in these logs: the whole of it in the order in which it happens
     extend       what follows for causes that somebody names

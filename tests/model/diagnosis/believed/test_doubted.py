@@ -81,7 +81,8 @@ def test_what_leaves_many_floors_of_the_held_out_logs_is_something_else(held_out
 def test_half_of_what_the_held_out_logs_show_is_explained(before: float, after: float, told: dict[str, bool], verdict: str,
                                                           elsewhere: float) -> None:
     """A link of the wrong length, taken out of the library, passes for a spring of the next joint where it was fitted, and leaves
-    three of five floors elsewhere; little above the floor may be the floor, what shows in responses is no residual's, and what another joint leaves is no matter."""
+    three of five floors elsewhere; little above the floor may be the floor, what shows in responses is no
+    residual's, and what another joint leaves is no matter."""
     nominal, final = left(0.01, 0.03, 0.01), left(0.01, 0.011, 0.01)
     found = searched(nominal, (effect("spring", 2), final))
     found.steps[0].best.log = None
