@@ -35,7 +35,7 @@ from pipelines.model.diagnosis.asked.gates import logs_of_roles
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.memory import Memory
-from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect

@@ -25,7 +25,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.given.compliance import compliance
 from pipelines.model.diagnosis.result import Rejected
-from pipelines.model.diagnosis.searched.wanted import Wanted, usable
+from pipelines.model.diagnosis.screened.wanted import Wanted, usable
 from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.diagnosis.worth.gains import worse_log
 from pipelines.model.words import plain_number

@@ -16,7 +16,7 @@ from pipelines.log.hdf5 import read_parts
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.result import Diagnosis, Finding
-from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
 

@@ -45,11 +45,12 @@ from pipelines.model.diagnosis.named.findings import extended_arm, findings, hel
 from pipelines.model.diagnosis.named.verdict import Ruling
 from pipelines.model.diagnosis.result import Finding, Rejected, ResidualRms
 from pipelines.model.diagnosis.screened.candidates import place_of
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.diagnosis.searched.beside import Held, acted, judged
 from pipelines.model.diagnosis.searched.case import Case
 from pipelines.model.diagnosis.searched.ledger import IMPOSSIBLE, UNBELIEVABLE
 from pipelines.model.diagnosis.searched.search import Found, search
-from pipelines.model.diagnosis.searched.wanted import Wanted, wanted_families
+from pipelines.model.diagnosis.searched.wanted import wanted_families
 from pipelines.model.diagnosis.worth.extended import Extended, with_uncertainty
 from pipelines.model.diagnosis.worth.gains import gain_of, simulation_errors, torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import held_out_left

@@ -8,7 +8,7 @@ import pytest
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
 from tests.model.diagnosis.arms import hidden, wave

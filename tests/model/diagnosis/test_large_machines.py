@@ -16,7 +16,7 @@ from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.quadratic_drag import QuadraticDrag
 from tests.model.diagnosis.slides import SLIDE
 

@@ -9,7 +9,7 @@ import pytest
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.cogging import Cogging
 from tests.model.diagnosis.screened.test_through import turned
 

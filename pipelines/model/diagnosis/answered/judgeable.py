@@ -15,7 +15,6 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.floor.repeated import unrepeated
-from pipelines.model.diagnosis.named.verdict import stands_high
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.estimation.estimate import Estimate, estimate
@@ -24,6 +23,8 @@ from pipelines.model.estimation.negative_viscous import negative_viscous
 from pipelines.model.estimation.regression import Columns, LogEquations
 
 __all__ = ["facts", "limited_by_estimate", "nominal_estimate"]
+
+_ABOVE = 1.6  # times the noise between periods, up to which a residual is explained by it
 
 
 def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
@@ -55,7 +56,7 @@ def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
     left = found.residual_rms.validate
     known = np.full(len(left), found.floor_origin != "blocks")
     if not known.all():
-        known = ~stands_high(left, _noise(prepared))
+        known = left <= _ABOVE * _noise(prepared)
     return Facts(left, judge.rms(judge.y), predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns))),
                  unresolved(estimated), known, found.no_twin)
 

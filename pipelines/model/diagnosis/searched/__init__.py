@@ -2,7 +2,7 @@
 
     search        screen, refit the best and its rivals, keep the best, look at what is left
     case          what is diagnosed: the rows, those that judge, the nominal model, every cause that is looked for
-    wanted        causes that somebody names
+    wanted        the shapes that causes which somebody names are fitted in
     beside        effects whose numbers are known from elsewhere
 
     gate          what passes before any is fitted exactly

@@ -18,7 +18,7 @@ from pipelines.model.diagnosis.asked.fitted_too import at_floor, fitted_too, of_
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.result import ResidualRms
-from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.torque_saturation import TorqueSaturation
 
 FLOOR, OWN = np.array([0.1, 0.2]), np.array([0.05, 0.25])  # [N m] of the fitted logs, of those held out

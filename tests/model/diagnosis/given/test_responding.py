@@ -19,7 +19,7 @@ from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.given import responding
 from pipelines.model.diagnosis.given.compliance import Compliance, compared
 from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.searched.wanted import Wanted
+from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.base_resonance import BaseResonance
 from pipelines.report.diagnosis_finding import finding_section
 from tests.diagnose.sessions import but, session
