@@ -130,6 +130,9 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     if given.arm is not None and given.arm.n_joints != chosen.identify[0].n_joints:
         raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has "
                          f"{chosen.identify[0].n_joints}", where="--model", remedy="give a model of this robot")
+    if chosen.reference and given.calibration is not None:
+        raise UsageError("C02", "reference logs tell what is usual, and a calibration is given as well", where="--calibration",
+                         remedy="leave out one of the two")
     given.tell("examining the logs")
     memory = Memory()
     said, boundary = memory.examined(chosen, settings.allow_mismatch)

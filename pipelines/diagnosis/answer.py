@@ -5,6 +5,7 @@ answer(prepared, diagnose_prepared(prepared, config), tell)
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -53,6 +54,13 @@ _VERDICTS: dict[str, Verdict] = {
     "no-fault-found": "nothing-wrong",
     "unknown": "unknown",
 }
+_UNNAMED = {
+    r"ripple (\d+):(\d+)": r"a torque ripple of joint \2, \1 a turn,",
+    r"spline of q:(\d+)": r"a curve over the position of joint \1",
+    r"spline of dq:(\d+)": r"a curve over the speed of joint \1",
+    r"spline of tau:(\d+)": r"a curve over the torque of joint \1",
+    r"friction form:(\d+)": r"another law of friction at joint \1",
+}
 _ACCEPTED = "accepted"
 _ALIKE = "these logs do not tell it from the cause that is named"
 _WORSE = "others predict blocks of time better"
@@ -88,10 +96,10 @@ def answer(
     open_to = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
     named = {one.cause for one in findings}
     reference = prepared.reference is not None
-    verdict = _VERDICTS[found.decision.verdict]
+    verdict, reason = _VERDICTS[found.decision.verdict], _plain(found.decision.reason)
     told_of = Diagnosis(
         verdict,
-        _sentence(verdict, found.decision.reason, findings, trained, found),
+        _sentence(verdict, reason, findings, trained, found),
         findings,
         standing.told,
         _rejected(found),
@@ -101,7 +109,7 @@ def answer(
         "what has changed" if reference else "what is wrong",
         "blocks" if prepared.judge is None else "logs",
         "reference logs" if reference else "blocks",
-        found.decision.reason,
+        reason,
         worth.rms(last),
         _ledger(found),
         _thresholds(found, f"parts of {'the reference' if reference else 'these'} logs"),
@@ -168,6 +176,13 @@ def _like(first: Finding, candidate: Candidate) -> tuple[Acting, Finding]:
     return other, replace(first, cause=cause, joint=joint, parameters=numbers, log=None)
 
 
+def _plain(reason: str) -> str:
+    """Return a reason with shapes that have no name, "spline of q:2" say, in words."""
+    for pattern, words in _UNNAMED.items():
+        reason = re.sub(pattern, words, reason)
+    return reason
+
+
 def _rejected(found: Found) -> tuple[Rejected, ...]:
     """Return what stood above its threshold and is not named."""
     named = {one.key for one in found.decision.causes}
@@ -176,7 +191,7 @@ def _rejected(found: Found) -> tuple[Rejected, ...]:
     for one in found.look.selection.rounds:
         for trial in one.tried:
             if trial.key not in named | alike:
-                out[trial.key] = Rejected(*trial.key, one.stopped or _WORSE)
+                out[trial.key] = Rejected(*trial.key, _plain(one.stopped) or _WORSE)
     return tuple(out.values())
 
 
@@ -199,7 +214,7 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
                 if key in alike
                 else _WEAKER
                 if key not in exact
-                else one.stopped or _WORSE
+                else _plain(one.stopped) or _WORSE
             )
             bound = found.look.baseline.threshold(group, screened.freedom, rows)
             out.append(
