@@ -1,4 +1,4 @@
-"""What is told of a diagnosis: verdict, sentence, findings with their numbers and what they gain.
+"""Build the result of a diagnosis: verdict, summary, findings, limits, ledger.
 
 answer(prepared, diagnose_prepared(prepared, config), tell)
 """
@@ -132,7 +132,7 @@ def answer(
 def _sentence(
     verdict: Verdict, reason: str, findings: Sequence[Finding], trained: Trained, found: Found
 ) -> str:
-    """Return what a technician is told."""
+    """Return the summary, one sentence for a technician."""
     if verdict == "nothing-wrong":
         return "Nothing is wrong with this arm, as far as these logs can tell."
     if not findings:
@@ -184,7 +184,7 @@ def _plain(reason: str) -> str:
 
 
 def _rejected(found: Found) -> tuple[Rejected, ...]:
-    """Return what stood above its threshold and is not named."""
+    """Return the causes above their thresholds that are not named."""
     named = {one.key for one in found.decision.causes}
     alike = {key for one in found.decision.causes for key in one.alternatives}
     out: dict[Key, Rejected] = {}

@@ -1,7 +1,7 @@
-"""Causes as they are told: their numbers, what they gain on held-out rows, what proves them.
+"""Build findings: parameters with deviations, gain on held-out rows, proof.
 
-    worth = weigh(prepared, trained, floor, whole=True)
-    findings = findings_of(worth, later, end, rivals)
+worth = weigh(prepared, trained, floor, whole=True)
+findings = findings_of(worth, later, end, rivals)
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ __all__ = ["Worth", "extension_of", "findings_of", "rivals_of", "weigh"]
 
 @dataclass(frozen=True, eq=False)
 class Worth:
-    """Models without the held-out rows, and what each leaves of them."""
+    """Models fitted without the held-out rows, and their residuals there."""
 
     trained: Trained
     left: tuple[Array, ...]  # (rows,) [N m] of each model, held out

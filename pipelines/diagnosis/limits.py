@@ -1,11 +1,13 @@
-"""What these logs can tell: the smallest cause that would have been found, and what cannot be seen.
+"""Compute detection limits in closed form, and list causes that are not identifiable.
 
     limits = limits_of(later, state, baseline)
 
 A cause of amplitude a adds a² h to T_c, h its share of H_c (`screening`). It is found with 95 % where
 
-    a √h > √threshold + 1.65     (the power of the test; Scharf & Friedlander 1994, with one sigma
-                                  of chance beside the threshold)
+    a √h > √threshold + 1.65
+
+√T_c is about normal with unit variance, and 1.65 its one-sided 95 % deviate (Scharf & Friedlander
+1994, power of the matched subspace detector).
 
 Of shapes that differ, an order say, the limit is that of one that a quarter of them do not reach.
 """
@@ -35,7 +37,7 @@ _TOO_MUCH = "these logs cannot show it: no arm has so much of it that they would
 
 @dataclass(frozen=True)
 class Limits:
-    """What would have been found, and what not however large."""
+    """Detection limits, and causes that these logs cannot show."""
 
     detectable: tuple[Detectable, ...]
     not_testable: tuple[NotTestable, ...]
@@ -112,9 +114,7 @@ def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> Detect
     return _told(later, min(seen, key=lambda s: s.effect.strength), amplitudes, visible)
 
 
-def _told(
-    later: Later, one: _Shape, amplitudes: Array, visible: float
-) -> Detectable | NotTestable:
+def _told(later: Later, one: _Shape, amplitudes: Array, visible: float) -> Detectable | NotTestable:
     """Return the parameter that goes with the amplitudes, where an arm can have as much of it."""
     effect = one.effect
     values = effect.values(amplitudes)

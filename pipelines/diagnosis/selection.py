@@ -116,9 +116,7 @@ def select(
         explained += max(state.cost - found.state.cost, 0.0)
         state = found.state
     causes, state = _backward(later, causes, state, config)
-    return Selection(
-        tuple(causes), start, state, explained, stopped, follows, tuple(rounds)
-    )
+    return Selection(tuple(causes), start, state, explained, stopped, follows, tuple(rounds))
 
 
 def _round(

@@ -1,4 +1,4 @@
-"""What the reference logs show beside the nominal model: a part of this machine, and no news.
+"""Find the baseline effects: causes that the reference logs show beside the nominal model.
 
     standing = standing_of(later, config)
     standing.effects                       causes of the library, with their numbers
@@ -35,10 +35,10 @@ _REFITS = 2  # numerics: candidates that are refitted in a round, for one is tak
 
 
 def standing_of(prepared: Data | None, later: Later, config: DiagnosisConfig) -> Standing:
-    """Return what stands, and the nominal model beside it, its friction laws in their own shapes.
+    """Return the baseline effects and the nominal model refitted with them to the reference.
 
     Args:
-        prepared: rows of the reference logs as they are logged; None: there are none.
+        prepared: unwhitened rows of the reference logs; None without reference logs.
     """
     if prepared is None or later.dataset.reference is None or later.dictionary.reference is None:
         return Standing(later.dataset.model)
@@ -89,9 +89,7 @@ def _reference(later: Later, config: DiagnosisConfig) -> Later:
 def _flat(prior: Prior) -> Prior:
     n = prior.n_nominal
     none = np.zeros(0, dtype=np.intp)
-    return replace(
-        prior, standing=none, groups=(), start=(prior.precision[:n, :n], np.zeros(n))
-    )
+    return replace(prior, standing=none, groups=(), start=(prior.precision[:n, :n], np.zeros(n)))
 
 
 def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Candidate | None:

@@ -1,8 +1,8 @@
-"""Models of a diagnosis fitted to the rows of role "identify" alone, and what they leave of the others.
+"""Fit the models of a diagnosis to the rows of role "identify" alone; predict the held-out rows.
 
     trained = train(prepared, later, causes)
     trained.models                         nominal, with the first cause, …, with all of them
-    trained.held_out(0)                    what the nominal model leaves of rows that it has not seen
+    trained.held_out(0)                    residual of the nominal model on held-out rows
 
 A model for simulation has no standing dictionary, but in its place causes that the reference logs
 show. The prior is that of its nominal numbers alone,
@@ -42,21 +42,21 @@ _UNSEEN = 1e6  # numerics: variance of a number of unit columns, from which the 
 
 @dataclass(frozen=True, eq=False)
 class Standing:
-    """Effects that the reference logs show, and the nominal model beside them."""
+    """Baseline effects, and the nominal model that was fitted with them."""
 
     nominal: Exact
     effects: tuple[Acting, ...] = ()
     told: tuple[Told, ...] = ()
-    floor: Array | None = None  # (joints,) [N m] what both leave of the reference; None: there is none
+    floor: Array | None = None  # (joints,) [N m] rms residual of the reference; None without one
 
     def rows(self, rows: Rows) -> Rows:
-        """Return whitened rows less the torque of what stands, with columns of the nominal model."""
+        """Return whitened rows less the baseline effects, with columns of the nominal model."""
         data, columns = self.less(rows.data), self.nominal.columns
         table = Table.of(rows_of(data, columns) * rows.weight, data.joint, data.n_joints)
         return Rows(data, columns, rows.weight, table, rows.level)
 
     def less(self, data: Data) -> Data:
-        """Return rows less the torque of what stands."""
+        """Return rows less the torque of the baseline effects."""
         if not self.effects:
             return data
         arm = self.nominal.nominal
@@ -80,7 +80,7 @@ class Trained:
     standing: tuple[Acting, ...] = ()  # effects that the models have beside those of their own
 
     def arm(self, place: int) -> Arm:
-        """Return an arm with what stands and every cause that lasts, with their deviations."""
+        """Return an arm with the baseline effects and every lasting cause, with their deviations."""
         done = self.models[place]
         known = done.covariance()
         kept = [k for k, one in enumerate(done.model.effects) if one.log is None]
@@ -95,7 +95,7 @@ class Trained:
     def held_out(self, place: int) -> Array:
         """Return the residual (rows,) [N m] of model number `place` on rows it was not fitted to.
 
-        Without logs that judge, each block of time is predicted from all others, to first order:
+        Without validation logs, each block of time is predicted from all others, to first order:
         θ_-b - θ = -(P - J_b J_bᵀ)⁻¹ J_b r_b. An event keeps its numbers, which no other block tells.
         """
         done, state = self.models[place], self.states[place]
@@ -172,7 +172,7 @@ def _beside(later: Later, rows: Rows, standing: Standing) -> Later:
 
 
 def _nominal(prior: Prior) -> Prior:
-    """Return what the prior says of the nominal numbers alone."""
+    """Return the marginal prior of the nominal numbers."""
     info, moment = prior.start
     n = prior.n_nominal
     mean = np.linalg.solve(info, moment)[:n]

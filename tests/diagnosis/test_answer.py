@@ -1,4 +1,4 @@
-"""What is told of a diagnosis: numbers, gain on held-out logs, limits; on an independent plant."""
+"""The result of a diagnosis on an independent plant: numbers, gain on held-out logs, limits."""
 
 from __future__ import annotations
 
