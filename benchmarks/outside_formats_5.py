@@ -181,7 +181,7 @@ def abb_egm(folder: Path, run: Run) -> Answer:
 
 
 @layout(THREE, robot=None, rate=250.0)
-def abb_test_signals(folder: Path, run: Run) -> Answer:
+def abb_motor_signals(folder: Path, run: Run) -> Answer:
     """ABB test signals by number, a motor each: resolver angle, speed, torque of the motor side."""
     gear = np.array([101.0, -120.5, 89.0])
     more = {"angle": run.q * gear, "set": run.dq * gear * 1.001, "speed": run.dq * gear}
@@ -343,7 +343,10 @@ def dynamixel_long(folder: Path, run: Run) -> Answer:
     columns = {"time_ms": np.repeat(values(run)["ms"], 3), "ID": np.tile([1, 2, 5], n)}
     columns |= {"Torque Enable": 1, "Present Position": raw["pos"].ravel()}
     columns |= {"Present Velocity": raw["vel"].ravel(), "Present Current": raw["cur"].ravel()}
-    columns |= {"Present Temperature": np.round(run.temperature).ravel(), "Input Voltage": 120}
+    columns |= {
+        "Present Temperature": np.round(run.temperature).astype(int).ravel(),
+        "Input Voltage": 120,
+    }
     table(folder / "dxl.tsv", columns, sep="\t")
     specs = "Position=q:counts; Velocity=dq:?; Current=current:?"
     return answer("dxl.tsv", {"time_ms": "ms"}, "Present @[{}]", (1, 2, 5), specs, known=False)
@@ -356,8 +359,10 @@ def odrive_script(folder: Path, run: Run) -> Answer:
     more = {"pos": gear * run.q, "vel": gear * run.dq, "set": gear * run.q_ref, "iq": 1.01 * amps}
     specs = "t=t; *axis{}.encoder.pos_estimate=pos:q:rev;"
     specs += "*axis{}.encoder.vel_estimate=vel:dq:rev/s;"
-    specs += "*axis{}.controller.input_pos=set:q_ref:rev; axis{}.current_control.Iq_setpoint=iq;"
-    specs += "*axis{}.current_control.Iq_measured=current; axis{}.fet_thermistor.temperature=temp;"
+    specs += "*axis{}.controller.input_pos=set:q_ref:rev;"
+    specs += "axis{}.motor.current_control.Iq_setpoint=iq;"
+    specs += "*axis{}.motor.current_control.Iq_measured=current;"
+    specs += "axis{}.fet_thermistor.temperature=temp;"
     columns, right = wide(run, specs + "vbus_voltage=24.02", range(2), joint_wise=True, **more)
     table(folder / "odrive.csv", columns)
     return Answer("odrive.csv", {"t": "s"}, right=right, draftable=False)
@@ -437,7 +442,7 @@ def simulink_to_file(folder: Path, run: Run) -> Answer:
 
 
 @layout(THREE, robot="robot.toml", rate=200.0)
-def labview_lvm(folder: Path, run: Run) -> Answer:
+def labview_lvm_german(folder: Path, run: Run) -> Answer:
     """LabVIEW measurement file: two headers, decimal commas, unit row, empty comment column."""
     columns, right = wide(run, "X_Value=t; *Winkel {}=q°; *Drehmoment {}=tau; Temp {}=temp")
     text = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
@@ -512,7 +517,7 @@ def ros2_echo_yaml(folder: Path, run: Run) -> Answer:
 
 
 @layout(SIX, rate=100.0)
-def ros2_echo_csv(folder: Path, run: Run) -> Answer:
+def ros2_echo_no_header(folder: Path, run: Run) -> Answer:
     """ros2 topic echo --csv /joint_states: no header; s, ns, frame, six names, then the values."""
     us, right = values(run)["us"], {}
     rows = [1712000000 + us // 1_000_000, us % 1_000_000 * 1000, np.full(len(us), "base_link")]
@@ -588,7 +593,7 @@ def numpy_savetxt(folder: Path, run: Run) -> Answer:
 
 
 @layout(THREE, rate=250.0)
-def matlab_timetable(folder: Path, run: Run) -> Answer:
+def matlab_timetable_sec(folder: Path, run: Run) -> Answer:
     """MATLAB writetimetable: times "0.004 sec", matrices split into _1 … _3, units nowhere."""
     specs = "Time=time; *Theta_{}=q°; *ThetaDes_{}=q_ref°; *Omega_{}=dq°; *Torque_{}=tau; Enabled=1"
     time = np.array([f"{t:.5g} sec" for t in run.t])
