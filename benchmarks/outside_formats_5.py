@@ -8,6 +8,8 @@ no time, no unit), so that asking is right.
 """
 
 import json
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -25,7 +27,7 @@ UNITS = {"q": RAD, "q_ref": RAD, "dq": RADS, "tau": NM, "current": ("A",), "%": 
 UNITS |= {"q°": DEG, "q_ref°": DEG, "dq°": DEGS, "counts": ("counts",), "counts/s": ("counts/s",)}
 UNITS |= {"rev": ("turn", "turns", "rev"), "rev/s": ("turn/s", "turns/s", "rev/s"), "?": ()}
 UNITS |= {"mrad": ("mrad",), "mNm": ("mN m", "mNm", "N mm"), "0.1 %": ("0.1 %",), "rpm": ("rpm",)}
-DATE = "datetime"  # time of day and date as text
+DATE = "*"  # time of day and date as text: it has no unit
 
 
 def current(run: Run) -> np.ndarray:
@@ -96,7 +98,18 @@ def answer(file: str, time: dict, form: str, joints, specs: str, known: bool = T
     for spec in specs.split("; "):
         part, _, role = spec.rpartition("=")
         state(right, form.replace("@", part), joints, role)
+    if Path(file).suffix in (".npz", ".mat", ".h5", ".hdf5"):
+        time = {address(name): unit for name, unit in time.items()}
+        right = {
+            role: tuple(replace(s, columns=tuple(map(address, s.columns))) for s in signals)
+            for role, signals in right.items()
+        }
     return Answer(file, time, right=right, draftable=known)
+
+
+def address(name: str) -> str:
+    """Return what the importer calls column k (from 0) of an array: "a/b[k]" is "a.b_<k + 1>"."""
+    return re.sub(r"\[(\d+)\]$", lambda m: f"_{int(m[1]) + 1}", name.replace("/", "."))
 
 
 def stamps(run: Run, form: str) -> np.ndarray:
@@ -148,7 +161,7 @@ def sunrise_data_recorder(folder: Path, run: Run) -> Answer:
     specs += "*axisQMsr_LBR_iiwa_14_R820_1_A{}=q; cartPosMsr_X=x; cartPosMsr_Y=y; cartPosMsr_Z=z"
     columns, right = wide(run, specs, s=ticks // 1000, ns=ticks % 1000 * 1_000_000)
     table(folder / "Recording_3.log", columns, sep=" ", float_format="%.9f")
-    return Answer("Recording_3.log", {"ZeitInSec": "s", "ZeitInNanoSec": "ns"}, right=right)
+    return Answer("Recording_3.log", {"ZeitInSec+ZeitInNanoSec": "s+ns"}, right=right)
 
 
 @layout(SEVEN, robot=None, rate=200.0)
@@ -176,7 +189,7 @@ def abb_egm(folder: Path, run: Run) -> Answer:
     specs += "motorState.state=MOTORS_ON; mciConvergenceMet=False; utilizationRate=31.5"
     columns, right = wide(run, specs, range(6), s=ticks // 1000, us=ticks % 1000 * 1000)
     table(folder / "egm_log.csv", columns)
-    time = {"feedBack.time.sec": "s", "feedBack.time.usec": "us"}
+    time = {"feedBack.time.sec+feedBack.time.usec": "s+us"}
     return Answer("egm_log.csv", time, right=right)
 
 
@@ -437,8 +450,8 @@ def simulink_to_file(folder: Path, run: Run) -> Answer:
     with path.open("r+b") as file:
         file.write(title.ljust(124) + b"\x00\x02IM")
     for role, first in (("q", 1), ("dq", 7), ("tau", 13)):
-        state(right, "ans[{}]", range(first, first + 6), role)
-    return Answer("log.mat", {"ans[0]": "s"}, right=right, draftable=False)
+        state(right, "ans_{}", range(first + 1, first + 7), role)
+    return Answer("log.mat", {"ans_1": "s"}, right=right, draftable=False)
 
 
 @layout(THREE, robot="robot.toml", rate=200.0)
@@ -479,7 +492,7 @@ def rostopic_echo_p(folder: Path, run: Run) -> Answer:
     for name, v in (("position", run.q), ("velocity", run.dq), ("effort", run.tau)):
         columns |= {f"field.{name}{k}": v[:, list(place).index(k)] for k in range(6)}
     table(folder / "joint_states.txt", columns)
-    specs, time = "position=q; velocity=dq; effort=tau", {"field.header.stamp": "ns"}
+    specs, time = "position=q; velocity=dq; effort=tau", {"field.header.stamp": "ns", "%time": "ns"}
     return answer("joint_states.txt", time, "field.@{}", place, specs)
 
 
@@ -495,7 +508,7 @@ def plotjuggler_merged(folder: Path, run: Run) -> Answer:
     other |= {f"/wrench/wrench/force/{x}": run.tau_ext[::2, 0] for x in "xyz"}
     frame = pd.concat([pd.DataFrame(columns)[order], pd.DataFrame(other)])
     frame.sort_values("__time").to_csv(folder / "pj.csv", index=False, float_format="%.9f")
-    return Answer("pj.csv", {"__time": "s"}, right=right)
+    return Answer("pj.csv", {"__time": "s", "/joint_states/header/stamp": "s"}, right=right)
 
 
 @layout(SEVEN, rate=50.0)
@@ -511,7 +524,7 @@ def ros2_echo_yaml(folder: Path, run: Run) -> Answer:
             text += f"{key}:\n" + "".join(f"- {x!r}\n" for x in [*v[k].tolist(), finger, finger])
         parts.append(text + "---\n")
     (folder / "joint_states.yaml").write_text("".join(parts))
-    time = {"header.stamp.sec": "s", "header.stamp.nanosec": "ns"}
+    time = {"header.stamp.sec+header.stamp.nanosec": "s+ns"}
     specs = "position=q; velocity=dq; effort=tau"
     return answer("joint_states.yaml", time, "@[{}]", range(7), specs)
 
@@ -525,8 +538,8 @@ def ros2_echo_no_header(folder: Path, run: Run) -> Answer:
     rows += [*run.q.T, *run.dq.T, *run.tau.T]
     table(folder / "js.csv", dict(enumerate(rows)), header=False)
     for role, first in (("q", 9), ("dq", 15), ("tau", 21)):
-        state(right, "{}", range(first, first + 6), role)
-    return Answer("js.csv", {"0": "s", "1": "ns"}, right=right, draftable=False)
+        state(right, "column_{}", range(first + 1, first + 7), role)
+    return Answer("js.csv", {"column_1+column_2": "s+ns"}, right=right, draftable=False)
 
 
 @layout(SEVEN, rate=500.0)
@@ -556,7 +569,8 @@ def isaaclab_hdf5(folder: Path, run: Run) -> Answer:
         for name, v, finger in [*arrays, (base + "applied_torque", run.tau, 0.0)]:
             file[name] = np.hstack([v, np.full((len(run.t), 2), finger)]).astype("f4")
     specs = "joint_position=q; joint_velocity=dq; applied_torque=tau"
-    return answer("dataset.hdf5", {}, base + "@[{}]", range(7), specs, known=False)
+    right = answer("dataset.hdf5", {}, base + "@[{}]", range(7), specs, known=False)
+    return replace(right, rate=50.0)
 
 
 @layout(SIX, rate=50.0)
@@ -575,6 +589,7 @@ def pandas_two_headers(folder: Path, run: Run) -> Answer:
     """pandas with two levels of columns and a timedelta index: "0 days 00:00:00.004000"."""
     specs = "*angle_deg/J{}=q°; *rate_dps/J{}=dq°; *torque_Nm/J{}=tau; temp_C/J{}=temp"
     columns, right = wide(run, specs)
+    right = {k: tuple(replace(s, columns=tuple(c.replace("/", " ") for c in s.columns)) for s in v) for k, v in right.items()}
     index = pd.to_timedelta(values(run)["us"], unit="us").rename("elapsed")
     frame = pd.DataFrame({tuple(name.split("/")): v for name, v in columns.items()})
     frame = frame.set_index(index).rename_axis(columns=["signal", "joint"])
@@ -612,7 +627,8 @@ def json_channels(folder: Path, run: Run) -> Answer:
             channels.append({"name": f"{part}_{name}", "unit": unit, "values": samples})
     meta = {"device": "legbench", "fs_hz": 500, "start": "2024-01-15T10:00:00Z"}
     (folder / "bench.json").write_text(json.dumps({"meta": meta, "channels": channels}, indent=1))
-    return answer("bench.json", {}, "{}_@", TWO.joints, "angle=q:mrad; torque=tau:mNm")
+    right = answer("bench.json", {}, "{}_@", TWO.joints, "angle=q:mrad; torque=tau:mNm")
+    return replace(right, rate=500.0)
 
 
 @layout(SIX, rate=500.0)
