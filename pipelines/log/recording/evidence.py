@@ -17,6 +17,7 @@ __all__ = ["Guess", "Slope", "held", "motion_of", "normalised", "position_unit",
            "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
+Side = Literal["joint", "motor", ""]  # of the gear, as far as names say it
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
 
 
@@ -99,10 +100,11 @@ def _slope_over(q: Array, summed: Array, width: int) -> Slope | None:
 
 
 def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | None,
-                  joints: Sequence[Joint] = ()) -> tuple[Guess, str]:
+                  joints: Sequence[Joint] = (), side: Side = "joint") -> tuple[Guess, str]:
     """The unit of the positions of turning joints, "" where it stays open, and further keys of the recipe (counts_per_rev, wrap).
 
-    `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot.
+    `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot;
+    `side` is what the names say: only of a joint does its range of motion say anything.
     """
     span = float(np.ptp(q, axis=0).max())
     wrap = rollover(q)
@@ -123,7 +125,9 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
                      "motor side, and these are likely its gear ratios for [drive]"), further
     if _whole(q) and span > 10.0:
         return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
-    return _by_limits(q, t, joints) or _by_size(q, t, span), further
+    if side == "motor":
+        return Guess("", "unsure", "named a motor's or an encoder's, whose turns no limit of a joint bounds: rad, deg or rev?"), further
+    return _by_limits(q, joints, side) or _by_size(q, t, span), further
 
 
 def unknown_unit(named: str) -> Guess:
@@ -138,7 +142,7 @@ def _inside(q: Array, joint: Joint) -> bool:
     return bool(q.min() >= low - slack and q.max() <= high + slack)
 
 
-def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | None:
+def _by_limits(q: Array, joints: Sequence[Joint], side: Side) -> Guess | None:
     """The unit under which the motion keeps the robot's limits."""
     limited = [(j, joint) for j, joint in enumerate(joints) if all(map(math.isfinite, joint.position))]
     if not limited or len(joints) != q.shape[1]:
@@ -151,6 +155,8 @@ def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | No
         return _RAD_OR_TURNS
     if inside(1.0):
         return Guess("rad", "likely", f"inside the robot's limits in rad; the largest range is {np.ptp(q, axis=0).max():.3g}")
+    if inside(math.pi / 180.0) and side == "":
+        return Guess("", "unsure", "beyond the robot's limits in rad, inside them in deg: deg, or the motor's side in rad?")
     if inside(math.pi / 180.0):
         return Guess("deg", "likely", "beyond the robot's limits in rad, inside them in deg")
     return Guess("", "unsure", "outside the robot's limits in rad and in deg: motor side, counts, or another robot?")

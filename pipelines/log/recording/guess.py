@@ -271,7 +271,7 @@ class _Drafting:
             elif self.t is None:
                 slope = None
             joints = [self.joints[j] for j in turning] if self.joints else ()
-            guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints)
+            guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints, group.side)
             if not named[turning[0]] and {"observation", "action"} & set(group.words.split()) and normalised(self.q[:, turning]):
                 guess = Guess("", "unsure", "data sets of robot learning also scale positions to -1..1 or -100..100")
             for j in turning:
