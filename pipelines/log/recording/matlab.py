@@ -24,7 +24,7 @@ Arrays = dict[str, npt.NDArray[np.generic]]
 
 BUDGET = 4 << 30  # [B] of samples in one file; a ten-minute log of seven joints at 5 kHz has 0.5 GB
 _MOST_MEMBERS = 2000
-_DEEPEST = 4  # levels of structures; Simulink stores q.signals.values
+_DEEPEST = 8  # levels of structures, as in JSON; Isaac Lab has six
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical")
 _HARMLESS = (*_NUMERIC, "char", "cell", "struct", "sparse")
 _DAMAGE = (ValueError, TypeError, IndexError, KeyError, OSError, OverflowError, EOFError, AttributeError, NotImplementedError,
