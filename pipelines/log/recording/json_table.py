@@ -16,7 +16,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
-from pipelines.log.recording.raw import RawTable, columns_of_arrays
+from pipelines.log.recording.raw import RawTable, columns_of_arrays, described, distinct
 
 __all__ = ["is_json", "read_json"]
 
@@ -54,11 +54,10 @@ def read_json(data: bytes, source: str) -> RawTable:
     frames = _frames(document, _DEEPEST)
     if frames is not None:
         return _table_of_frames(frames, source)
-    arrays = {
-        name: values
-        for name, value in _named(document, "", _DEEPEST)
-        if (values := _array(value)) is not None
-    }
+    arrays: dict[str, Array] = {}
+    for name, value in _series(document, "", _DEEPEST):
+        if (values := _array(value)) is not None:
+            arrays[distinct(name, arrays, source)] = values
     if not arrays:
         raise InputRejected(
             "S12",
@@ -102,6 +101,22 @@ def _named(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
     if isinstance(value, dict) and depth > 0:
         for key, item in value.items():
             yield from _named(item, f"{path}.{key}" if path else str(key), depth - 1)
+    elif not isinstance(value, dict):
+        yield path or "column", value
+
+
+def _series(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
+    """Yield (path, value) as `_named` does; samples in an object with a name go by it, with its unit in brackets."""
+    if isinstance(value, list) and depth > 0 and value and all(isinstance(x, dict) for x in value):
+        for k, item in enumerate(value):
+            yield from _series(item, f"{path}[{k}]", depth - 1)
+    elif isinstance(value, dict) and depth > 0:
+        name = described(value)
+        for key, item in value.items():
+            if name and isinstance(item, list):
+                yield name, item
+            else:
+                yield from _series(item, f"{path}.{key}" if path else str(key), depth - 1)
     elif not isinstance(value, dict):
         yield path or "column", value
 

@@ -6,12 +6,14 @@ import difflib
 import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
 from pipelines.log.experiment import Array
+from pipelines.log.recording.header import split_unit
 
 __all__ = ["RawTable", "columns_of_arrays", "expand", "unstacked"]
 
@@ -120,12 +122,15 @@ def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str
     checks: list[Check] = []
     columns: dict[str, Array] = {}
     groups: dict[str, tuple[str, ...]] = {}
+    units: dict[str, str] = {}
     text: dict[str, str] = {}
     open_arrays: list[str] = []
 
     def add(name: str, matrix: npt.NDArray[np.generic]) -> None:
+        name, unit = split_unit(name)
         names = (name,) if matrix.shape[1] == 1 else tuple(f"{name}_{j + 1}" for j in range(matrix.shape[1]))
         groups[name] = names
+        units.update(dict.fromkeys(names, unit) if unit else {})
         columns.update((key, np.ascontiguousarray(matrix[:, j], dtype=np.float64)) for j, key in enumerate(names))
 
     for name, array in arrays.items():
@@ -153,7 +158,30 @@ def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str
     length = max(len(column) for column in columns.values())
     for name in [key for key, column in columns.items() if len(column) != length]:
         text[name] = f"{len(columns.pop(name))} numbers, not {length} samples"
-    return RawTable(source, columns, np.arange(length), groups=groups, text=text, checks=tuple(checks))
+    return RawTable(source, columns, np.arange(length), units=units, groups=groups, text=text, checks=tuple(checks))
+
+
+def described(record: Mapping[str, Any]) -> str:
+    """Return "hip_angle [rad]" of a record that names its samples and their unit; "" where it has no name."""
+    name = next((value for key, value in record.items() if key.lower() in ("name", "label") and isinstance(value, str)), "")
+    return name[:200] + unit_in(record) if name else ""
+
+
+def distinct(name: str, found: Mapping[str, object], source: str) -> str:
+    """Return a name that is not yet among those found.
+
+    Raises:
+        InputRejected: S03, it is.
+    """
+    if name in found:
+        raise InputRejected("S03", f"two series are both named '{clean(name, 80)}'", where=source, remedy="rename one of them in the file")
+    return name
+
+
+def unit_in(record: Mapping[str, Any]) -> str:
+    """Return " [rad]" of a record, or of the attributes of an array, with an entry for the unit; "" without one."""
+    unit = next((value for key, value in record.items() if key.lower() in ("unit", "units", "einheit")), "")
+    return f" [{unit}]" if isinstance(unit, str) and 0 < len(unit) <= 20 else ""
 
 
 def _not_real(array: npt.NDArray[np.generic]) -> str | None:
