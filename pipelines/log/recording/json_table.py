@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.raw import RawTable, columns_of_arrays, described, distinct
 
-__all__ = ["is_json", "read_json"]
+__all__ = ["is_json", "read_json", "table_of_frames"]
 
 _LARGEST = 200_000_000  # [bytes]; parsed, JSON takes about ten times its size
 _DEEPEST = 8  # levels of names within a frame
@@ -53,7 +53,7 @@ def read_json(data: bytes, source: str) -> RawTable:
     document = _parsed(data, source)
     frames = _frames(document, _DEEPEST)
     if frames is not None:
-        return _table_of_frames(frames, source)
+        return table_of_frames(frames, source)
     arrays: dict[str, Array] = {}
     for name, value in _series(document, "", _DEEPEST):
         if (values := _array(value)) is not None:
@@ -147,7 +147,7 @@ def _cells(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
                 yield f"{path}[{k}]", path, item
 
 
-def _table_of_frames(frames: list[Mapping[str, Any]], source: str) -> RawTable:
+def table_of_frames(frames: Sequence[Mapping[str, Any]], source: str) -> RawTable:
     columns: dict[str, Array] = {}
     groups: dict[str, list[str]] = {}
     texts: dict[str, list[str]] = {}

@@ -16,7 +16,8 @@ from pipelines.log.files import regular_file
 from pipelines.log.guard import Answer, guarded
 from pipelines.log.recording.arrays import read_npy, read_npz
 from pipelines.log.recording.dialect import TextFormat
-from pipelines.log.recording.json_table import is_json, read_json
+from pipelines.log.recording.json_table import is_json, read_json, table_of_frames
+from pipelines.log.recording.labelled import yaml_documents
 from pipelines.log.recording.matlab import damaged, read_mat5, read_mat73
 from pipelines.log.recording.raw import RawTable, columns_of_arrays, unstacked
 from pipelines.log.recording.tabular import read_text
@@ -24,6 +25,7 @@ from pipelines.log.recording.tabular import read_text
 __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
+_LARGEST_YAML = 200_000_000  # [B], as of JSON
 _ENDINGS = {"npy": (".npy",), "npz": (".npz",), "json": (".json", ".jsonl"), "text": (), "mat5": (".mat",),
             "mat73": (".mat", ".h5", ".hdf5")}
 _REFUSED = ((b"PAR1", "F06", "a Parquet file",
@@ -101,7 +103,8 @@ def _is_mat4(data: bytes, source: str) -> bool:
 
 def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
     if kind == "text":
-        return read_text(data, source, text)
+        documents = yaml_documents(data[:_LARGEST_YAML].decode("utf-8", "replace")) if text in (None, TextFormat()) else None
+        return read_text(data, source, text) if documents is None else table_of_frames(documents, source)
     if kind == "json":
         return read_json(data, source)
     if kind == "npy":

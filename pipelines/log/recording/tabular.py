@@ -19,6 +19,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
 from pipelines.log.recording.header import Header, find_header, names_and_units, without_repeats
+from pipelines.log.recording.labelled import LabelledLines, labelled_lines
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.units import UNITS, canonical_unit
 
@@ -44,9 +45,13 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     """
     given = given or TextFormat()
     text, checks = decode(data, source, given.encoding)
+    if '"' in text and given == TextFormat():  # numpy breaks the lines of an array within its cell
+        text = re.sub(r'(?<=["\s\d.\[])\n(?=[^"\n]*\]")', " ", text) if '"[' in text else text
     lines = lines_of(text, given.comment)
     if not lines:
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy="record again, or copy the file again")
+    if given == TextFormat() and (labelled := labelled_lines(lines)) is not None:
+        return _labelled(labelled, source, checks)
     dialect = find_dialect(lines, source, given)
     if dialect.width > _WIDEST:
         raise InputRejected("F16", f"{dialect.width} cells in a line, {dialect.words}: not a table of columns", where=source,
@@ -77,6 +82,19 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
                     checks=tuple(checks), groups=_numbered(names),
                     labels={name: label for name, label in labels.items() if isinstance(label, str)},
                     cycles={name: label for name, label in labels.items() if isinstance(label, tuple)})
+
+
+def _labelled(found: LabelledLines, source: str, checks: list[Check]) -> RawTable:
+    """F09: lines of another form are left out; they are notes between the samples."""
+    if found.others:
+        checks.append(Check.of("F09", "warn", f"{found.others} lines without the numbers of the others left out", where=source,
+                               remedy="none where these are notes"))
+    body = [(number, "\t".join(row)) for number, row in found.rows]
+    columns, words, wrong, units = _parse(body, Dialect("\t", ".", len(found.names)), found.names, source)
+    keep = np.array([i not in wrong for i in range(len(body))], dtype=bool)
+    lines = np.array([number for number, _ in body], dtype=np.int64)[keep]
+    return RawTable(source, {name: values[keep] for name, values in columns.items()}, np.arange(lines.size), text=words, lines=lines,
+                    units={name: units[name] for name in columns if name in units}, checks=tuple(checks))
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
@@ -188,6 +206,9 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
             if (read := _clock_times([row[j] for row in cells]) or _with_units([row[j] for row in cells])) is not None:
                 columns[name], labels[name] = read
                 continue
+            if (arrays := _arrays([row[j] for row in cells])) is not None:
+                columns |= {f"{name}[{k}]": values for k, values in enumerate(arrays.T)}
+                continue
             words[name] = cells[bad[0]][j][:40]
             if (period := _period([row[j] for row in cells])) is not None:
                 labels[name] = cells[0][j] if period == 1 else tuple(row[j] for row in cells[:period])
@@ -212,6 +233,15 @@ def _with_units(cells: list[str]) -> tuple[Array, str] | None:
     if not all(found) or len(units) != 1 or (unit := canonical_unit(units.pop())) not in UNITS:
         return None
     return np.array([float(m[1]) for m in found if m is not None]), unit
+
+
+def _arrays(cells: list[str]) -> Array | None:
+    """Arrays of one length in the cells of a column, as Python and numpy write them: "[0.1, 0.2]", "[ 0.1  0.2]". (cells, length)"""
+    if not all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells):
+        return None
+    rows = [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells]
+    alike = len({len(row) for row in rows}) == 1 and all(is_number(number) for row in rows for number in row)
+    return np.array(rows, dtype=np.float64) if alike else None
 
 
 def _clock_times(cells: list[str]) -> tuple[Array, str] | None:
