@@ -346,7 +346,7 @@ def dynamixel_lines(folder: Path, run: Run) -> Answer:
         lines.append(f"{text}PresCur:{raw['cur'][k, j]}")
     (folder / "servo_out.txt").write_text("\n".join(lines) + "\n")
     specs = "PresPos=q:counts; PresVel=dq:?; PresCur=current:?; GoalPos=q_ref:counts"
-    return answer("servo_out.txt", {"time": "s"}, "@[{}]", ("011", "012"), specs, known=False)
+    return answer("servo_out.txt", {"column_1": "s"}, "@[{}]", (11, 12), specs, known=False)
 
 
 @layout(THREE, robot="robot.toml", rate=100.0)
@@ -420,7 +420,7 @@ def twincat_scope_pairs(folder: Path, run: Run) -> Answer:
     pairs = np.column_stack([x for v in columns.values() for x in (1000 * run.t, v)])
     rows = ["\t".join(f"{x:.7g}".replace(".", ",") for x in row) for row in pairs]
     (folder / "scope.txt").write_text(text + "\n" + "\n".join(rows) + "\n")
-    return Answer("scope.txt", {"Name": "ms"}, right=right, draftable=False)
+    return Answer("scope.txt", {"Name": "ms", "SymbolName": "ms"}, right=right, draftable=False)
 
 
 @layout(TWO, rate=1000.0)

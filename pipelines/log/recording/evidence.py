@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
+from scipy.special import stdtr
 
 from pipelines.log.experiment import Array
 from pipelines.log.recording.recipe_reader import BLANK
@@ -53,7 +55,7 @@ _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
-_CLEAR = 4.0  # standard errors of a jump of friction
+_FALSE_SIGN = 1e-3  # chance that a recording without friction is given a sign
 
 
 @dataclass(frozen=True)
@@ -268,10 +270,8 @@ def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[f
         return Guess(named, "sure", f"named so; up to {peak:.4g} {named}")
     if named is not None:
         return unknown_unit(named)
-    if current and (_whole(tau) or 60.0 < peak <= 200.0):
-        return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or the drive's own unit?")
     if current:
-        return Guess("mA" if peak > 200.0 else "A", "likely", f"named a current; up to {peak:.4g}")
+        return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or a share of the drive's rated current?")
     if _whole(tau) and peak > 20.0:
         return Guess("", "unsure", f"whole numbers up to {peak:.5g}: the drive's own, such as per mille of the rated torque?")
     use = max((float(p / limit) for p, limit in zip(peaks, limits, strict=False) if math.isfinite(limit)), default=math.nan)
@@ -288,29 +288,48 @@ def sign_of(q: Array, tau: Array) -> Guess:
     """Dry friction turns with the speed: where a joint reverses, its torque jumps the same way, and all else is smooth.
 
     About each reversal, tau = a + b k + c k² + d k³ + F sign(dq); F is positive (Coulomb's law; Armstrong-Hélouvry 1991).
+    Student's test of the mean F of a joint's reversals, at `_FALSE_SIGN` over all joints. A jump that fits better
+    elsewhere than at the reversal is no friction at it: the position leads or lags the torque.
     """
     half = max(6, len(q) // 200)
-    k = np.linspace(-1.0, 1.0, 2 * half + 1)
+    step = max(1, half // 10)
+    shifts = step * np.arange(-(half // 2 // step), half // 2 // step + 1)
     smooth = np.ones(max(3, half // 2)) / max(3, half // 2)
-    strength = np.zeros(q.shape[1])  # mean jump over its standard error
+    claims = np.zeros(q.shape[1])  # sign of F where it is significant
     for j in range(q.shape[1]):
         speed = np.gradient(np.convolve(q[:, j], smooth, mode="same"))
-        jumps = []
-        for at in np.flatnonzero(speed[half + 1 : -half - 1] * speed[half : -half - 2] < 0) + half + 1:
-            turn = np.sign(speed[at - half : at + half + 1])
-            if (turn[: half - 1] == turn[0]).all() and (turn[half + 2 :] == -turn[0]).all() and turn[0] != 0:
-                columns = np.column_stack([turn, k**0, k, k**2, k**3])
-                jumps.append(np.linalg.lstsq(columns, tau[at - half : at + half + 1, j], rcond=None)[0][0])
-        if len(jumps) > 2:
-            strength[j] = np.mean(jumps) / max(float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps)), 1e-300)
-    wrong = [str(j + 1) for j in np.flatnonzero(strength < -_CLEAR)]
+        jumps, residuals = _jumps(speed, tau[:, j], half, shifts)
+        if len(jumps) < 3 or shifts[np.argmin(residuals)] != 0:
+            continue
+        mean, error = np.mean(jumps), np.std(jumps, ddof=1) / math.sqrt(len(jumps))
+        chance = 2.0 * stdtr(len(jumps) - 1, -abs(mean) / max(error, 1e-300))
+        claims[j] = np.sign(mean) if chance < _FALSE_SIGN / q.shape[1] else 0.0
+    wrong = [str(j + 1) for j in np.flatnonzero(claims < 0)]
     if wrong:
         return Guess("sign = -1?", "likely",
                      f"torque of joint {', '.join(wrong)} jumps against the speed where it reverses, unlike friction: "
                      "add sign = -1 there, unless its transmission is negative")
-    if (strength > _CLEAR).all():
+    if (claims > 0).all():
         return Guess("as recorded", "likely", "sign: torque jumps with the speed where a joint reverses, as friction does")
     return Guess("as recorded", "unsure", "sign: torque and motion do not tell")
+
+
+def _jumps(speed: Array, tau: Array, half: int, shifts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return F of each clean reversal, and the squared residual of all with the jump moved by each shift."""
+    k = np.linspace(-1.0, 1.0, 2 * half + 1)
+    jumps, residuals = [], np.zeros(shifts.size)
+    for at in np.flatnonzero(speed[half + 1 : -half - 1] * speed[half : -half - 2] < 0) + half + 1:
+        turn = np.sign(speed[at - half : at + half + 1])
+        if not ((turn[: half - 1] == turn[0]).all() and (turn[half + 2 :] == -turn[0]).all() and turn[0] != 0):
+            continue
+        window = tau[at - half : at + half + 1]
+        for s, shift in enumerate(shifts):
+            columns = np.column_stack([turn[np.clip(np.arange(k.size) - shift, 0, k.size - 1)], k**0, k, k**2, k**3])
+            numbers = np.linalg.lstsq(columns, window, rcond=None)[0]
+            residuals[s] += np.sum((window - columns @ numbers) ** 2)
+            if shift == 0:
+                jumps.append(numbers[0])
+    return np.array(jumps), residuals
 
 
 def motion_of(q: Array, unit: str) -> list[str]:

@@ -350,7 +350,7 @@ class _Drafting:
             guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
         elif choice.group.words == BY_FILE and guess.confidence != "sure":
             guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
-        self.current = guess.value in ("A", "mA")
+        self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
         units = [unit if unit is not None and unit in UNITS else guess.value for unit in named]
         if guess.value == "N m" and self.joints:
             units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]
