@@ -9,17 +9,18 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import stdtr
 
 from pipelines.log.experiment import Array
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 
-__all__ = ["Guess", "Slope", "held", "motion_of", "normalised", "position_unit", "quarter_turns", "rollover", "sign_of",
+__all__ = ["Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
            "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
-Side = Literal["joint", "motor", ""]  # of the gear, as far as names say it
+Side = Literal["joint", "motor", "scaled", ""]  # of the gear, as far as names say it
+_OPEN_SIDES = {"motor": "named a motor's or an encoder's, whose turns no limit of a joint bounds: rad, deg or rev?",
+               "scaled": "data sets of robot learning also scale positions to -1..1 or -100..100"}
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
 
 
@@ -127,8 +128,8 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
                      "motor side, and these are likely its gear ratios for [drive]"), further
     if _whole(q) and span > 10.0:
         return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
-    if side == "motor":
-        return Guess("", "unsure", "named a motor's or an encoder's, whose turns no limit of a joint bounds: rad, deg or rev?"), further
+    if side in _OPEN_SIDES:
+        return Guess("", "unsure", _OPEN_SIDES[side]), further
     return _by_limits(q, joints, side) or _by_size(q, t, span), further
 
 
@@ -177,12 +178,6 @@ def _by_size(q: Array, t: Array | None, span: float) -> Guess:
     if far <= 720.0:
         return Guess("", "unsure", f"up to {far:.4g}: more than a turn in rad, so deg? or the motor's side in rad, then [drive]")
     return Guess("", "unsure", f"up to {far:.5g}: neither an arm's in rad nor in deg; motor side, or counts?")
-
-
-def normalised(q: Array) -> bool:
-    """Tell whether positions may be scaled to their range: within -1..1, or beyond that within -100..100."""
-    far = float(np.abs(q).max())
-    return far <= 1.0 or 2.0 * math.pi < far <= 100.0
 
 
 def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
@@ -291,6 +286,8 @@ def sign_of(q: Array, tau: Array) -> Guess:
     Student's test of the mean F of a joint's reversals, at `_FALSE_SIGN` over all joints. A jump that fits better
     elsewhere than at the reversal is no friction at it: the position leads or lags the torque.
     """
+    from scipy.special import stdtr
+
     half = max(6, len(q) // 200)
     step = max(1, half // 10)
     shifts = step * np.arange(-(half // 2 // step), half // 2 // step + 1)

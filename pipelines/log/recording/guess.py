@@ -28,7 +28,6 @@ from pipelines.log.recording.evidence import (
     Slope,
     held,
     motion_of,
-    normalised,
     position_unit,
     quarter_turns,
     sign_of,
@@ -284,8 +283,6 @@ class _Drafting:
                 slope = None
             joints = [self.joints[j] for j in turning] if self.joints else ()
             guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints, group.side)
-            if not named[turning[0]] and {"observation", "action"} & set(group.words.split()) and normalised(self.q[:, turning]):
-                guess = Guess("", "unsure", "data sets of robot learning also scale positions to -1..1 or -100..100")
             for j in turning:
                 said = named[j] or ""
                 units[j] = said if said in UNITS or said == "counts" else guess.value
