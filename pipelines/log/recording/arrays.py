@@ -1,4 +1,4 @@
-"""Read a NumPy or Parquet file: a NumPy header is checked against its size before anything is read, and nothing is ever unpickled."""
+"""Read a NumPy or Parquet file: its header is checked against its size before anything is read, and nothing is unpickled."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from pipelines.log.units import canonical_unit
 __all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of", "texts_of", "unit_of_group"]
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
-_JOINT_SIDE = frozenset({"joint", "joints", "jnt", "jnts", "axis", "axes", "achse", "gelenk", "link", "j", "a", "q", "qpos", "jpos"})
+_JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
 
 
 Order = Literal["robot", "numbers", "file", "text"]

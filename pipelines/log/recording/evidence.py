@@ -298,7 +298,7 @@ def sign_of(q: Array, tau: Array) -> Guess:
         jumps, residuals = _jumps(speed, tau[:, j], half, shifts)
         if len(jumps) < 3 or shifts[np.argmin(residuals)] != 0:
             continue
-        mean, error = np.mean(jumps), np.std(jumps, ddof=1) / math.sqrt(len(jumps))
+        mean, error = float(np.mean(jumps)), float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps))
         chance = 2.0 * stdtr(len(jumps) - 1, -abs(mean) / max(error, 1e-300))
         claims[j] = np.sign(mean) if chance < _FALSE_SIGN / q.shape[1] else 0.0
     wrong = [str(j + 1) for j in np.flatnonzero(claims < 0)]

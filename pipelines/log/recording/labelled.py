@@ -16,7 +16,7 @@ from typing import Any
 __all__ = ["LabelledLines", "labelled_lines", "yaml_documents"]
 
 _DATE = r"(?:\d{4}[-/.]\d\d[-/.]\d\d[T ])?\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?Z?"
-_NUMBER = r"(?<![\w.])[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|(?<!\w)(?:nan|NaN|[+-]?inf)(?!\w)"
+_NUMBER = r"(?<![\w.])[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?(?![\w.])|(?<!\w)(?:nan|NaN|[+-]?inf)(?!\w)"
 _VALUE = re.compile(rf"{_DATE}|{_NUMBER}")
 _MARK = "\0"  # a number's place in a line's form; no text file holds it
 _DAY = "\1"
@@ -90,11 +90,12 @@ def _names(form: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def yaml_documents(text: str) -> list[dict[str, Any]] | None:
+def yaml_documents(data: bytes) -> list[dict[str, Any]] | None:
     """Return YAML documents of mappings and lists of scalars, as `ros2 topic echo` writes them; None where it is no such text."""
-    if not re.match(r"(---\n)?[A-Za-z_]\w*:( \S.*)?\n", text) or text.count("\n---") < 2:
+    if not re.match(rb"(---\r?\n)?[A-Za-z_]\w*:( \S.*)?\r?\n", data[:300]) or data.count(b"\n---") < 2:
         return None
-    parts = [part for part in re.split(r"(?m)^---[^\S\n]*\n", text) if part.strip()]
+    text = data.decode("utf-8", "replace").replace("\r\n", "\n")
+    parts = [part for part in re.split(r"(?m)^---[^\S\n]*$", text) if part.strip()]
     return [_document(part) for part in parts]
 
 

@@ -170,8 +170,8 @@ def _samples_of(arrays: Mapping[str, npt.NDArray[np.generic]], source: str) -> i
         name for name, array in arrays.items() if samples in array.shape and _either_way(array)
         and enough.get(sum(array.shape) - samples) == enough[samples]]
     if alike:
-        raise InputRejected("S11", f"'{alike[0]}' has shape {arrays[alike[0]].shape}: which side is time cannot be told", where=source,
-                            remedy="store one row a sample, with many more samples than columns")
+        raise InputRejected("S11", f"'{alike[0]}' has shape {arrays[alike[0]].shape}: which side is time cannot be told",
+                            where=source, remedy="store one row a sample, with many more samples than columns")
     return samples
 
 
@@ -188,7 +188,8 @@ def distinct(name: str, found: Mapping[str, object], source: str) -> str:
         InputRejected: S03, it is.
     """
     if name in found:
-        raise InputRejected("S03", f"two series are both named '{clean(name, 80)}'", where=source, remedy="rename one of them in the file")
+        raise InputRejected("S03", f"two series are both named '{clean(name, 80)}'", where=source,
+                            remedy="rename one of them in the file")
     return name
 
 

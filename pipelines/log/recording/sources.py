@@ -26,8 +26,8 @@ __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
 _LARGEST_YAML = 200_000_000  # [B], as of JSON
-_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "parquet": (".parquet",), "json": (".json", ".jsonl"), "text": (), "mat5": (".mat",),
-            "mat73": (".mat", ".h5", ".hdf5")}
+_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "parquet": (".parquet",), "json": (".json", ".jsonl"), "text": (),
+            "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5")}
 _REFUSED = ((b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
             (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
             (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"))
@@ -103,7 +103,7 @@ def _is_mat4(data: bytes, source: str) -> bool:
 
 def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
     if kind == "text":
-        documents = yaml_documents(data[:_LARGEST_YAML].decode("utf-8", "replace")) if text in (None, TextFormat()) else None
+        documents = yaml_documents(data) if text in (None, TextFormat()) and len(data) <= _LARGEST_YAML else None
         return read_text(data, source, text) if documents is None else table_of_frames(documents, source)
     if kind == "json":
         return read_json(data, source)
@@ -129,7 +129,8 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
     """The table, read where a crash or a flood of memory costs a child process only."""
     def work() -> Answer:
         table = read()
-        about = {"names": list(table.columns), "text": dict(table.text), "units": dict(table.units), "groups": {k: list(v) for k, v in table.groups.items()},
+        about = {"names": list(table.columns), "text": dict(table.text), "units": dict(table.units),
+                 "groups": {k: list(v) for k, v in table.groups.items()},
                  "checks": [check.as_dict() for check in table.checks]}
         return Answer(about, {str(i): values for i, values in enumerate(table.columns.values())})
 

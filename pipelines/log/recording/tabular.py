@@ -33,7 +33,7 @@ _MOST_JOINTS = 32
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
-_WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
+_WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
 _FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
 
@@ -45,8 +45,9 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     """
     given = given or TextFormat()
     text, checks = decode(data, source, given.encoding)
-    if '"' in text and given == TextFormat():  # numpy breaks the lines of an array within its cell
-        text = re.sub(r'(?<=["\s\d.\[])\n(?=[^"\n]*\]")', " ", text) if '"[' in text else text
+    if '"[' in text and given == TextFormat():  # numpy breaks the lines of an array within its cell
+        parts = text.split('"')
+        text = '"'.join(part.replace("\n", " ") if k % 2 and part[:1] + part[-1:] == "[]" else part for k, part in enumerate(parts))
     lines = lines_of(text, given.comment)
     if not lines:
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy="record again, or copy the file again")
@@ -93,7 +94,8 @@ def _labelled(found: LabelledLines, source: str, checks: list[Check]) -> RawTabl
     columns, words, wrong, units = _parse(body, Dialect("\t", ".", len(found.names)), found.names, source)
     keep = np.array([i not in wrong for i in range(len(body))], dtype=bool)
     lines = np.array([number for number, _ in body], dtype=np.int64)[keep]
-    return RawTable(source, {name: values[keep] for name, values in columns.items()}, np.arange(lines.size), text=words, lines=lines,
+    columns = {name: values[keep] for name, values in columns.items()}
+    return RawTable(source, columns, np.arange(lines.size), text=words, lines=lines,
                     units={name: units[name] for name in columns if name in units}, checks=tuple(checks))
 
 
@@ -171,7 +173,7 @@ _Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], _Labels]
 
 def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Columns of numbers, columns of text with an example, the lines (by index) with a cell that is no number, and labels:
-    the text of a column that never changes, the texts that one goes through, the unit that the cells of a column of numbers hold."""
+    the text of a column that never changes, the texts that one goes through, the unit behind the numbers of one."""
     # numpy rounds every number correctly; pandas does so only where asked, and newer ones refuse to be asked.
     text = "\n".join(line for _, line in lines)
     try:
@@ -236,7 +238,7 @@ def _with_units(cells: list[str]) -> tuple[Array, str] | None:
 
 
 def _arrays(cells: list[str]) -> Array | None:
-    """Arrays of one length in the cells of a column, as Python and numpy write them: "[0.1, 0.2]", "[ 0.1  0.2]". (cells, length)"""
+    """Arrays of one length in the cells of a column, as Python and numpy write them: "[0.1, 0.2]". (cells, length)"""
     if not all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells):
         return None
     rows = [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells]
