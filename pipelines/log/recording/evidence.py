@@ -128,7 +128,8 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
                      "motor side, and these are likely its gear ratios for [drive]"), further
     if _whole(q) and span > 10.0:
         return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
-    if side in _OPEN_SIDES:
+    far = float(np.abs(q).max())  # neither -1..1 nor, of which it would be 6 %, -100..100
+    if side == "motor" or (side == "scaled" and not 1.0 < far <= 2.0 * math.pi):
         return Guess("", "unsure", _OPEN_SIDES[side]), further
     return _by_limits(q, joints, side) or _by_size(q, t, span), further
 
