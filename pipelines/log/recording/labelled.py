@@ -18,6 +18,7 @@ __all__ = ["LabelledLines", "labelled_lines", "yaml_documents"]
 _DATE = r"(?:\d{4}[-/.]\d\d[-/.]\d\d[T ])?\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?Z?"
 _NUMBER = r"(?<![\w.])[+-]?(?:\d++\.?\d*+|\.\d++)(?:[eE][+-]?\d++)?(?![\w.])|(?<!\w)(?:nan|NaN|[+-]?inf)(?!\w)"
 _VALUE = re.compile(rf"{_DATE}|{_NUMBER}")
+_SPLIT = re.compile(f"({_VALUE.pattern})")
 _MARK = "\0"  # a number's place in a line's form; no text file holds it
 _DAY = "\1"
 _PIECE = re.compile(rf"[^\W\d][\w.]*|[\[({{<\])}}>]|{_MARK}|{_DAY}")
@@ -25,6 +26,7 @@ _LABEL = re.compile(rf"[^\W\d][\w.]*\s*[=:>]\s*[\"'\[({{]*{_MARK}")
 _SEARCHED = 200  # lines that show the form
 _LEAST = 0.9  # of these, behind the first lines, and of all lines, that have one form
 _LONGEST = 20_000  # characters of a line
+_MOST_FORMS = 1000  # that are remembered; the words of a line may vary
 
 
 @dataclass(frozen=True)
@@ -41,15 +43,19 @@ def labelled_lines(lines: list[tuple[int, str]]) -> LabelledLines | None:
     known: dict[str, tuple[str, ...]] = {}
 
     def names_of(line: str) -> tuple[tuple[str, ...], list[str]]:
-        found = _VALUE.findall(line[:_LONGEST])
-        form = _VALUE.sub(lambda m: _DAY if ":" in m[0] else _MARK, line[:_LONGEST])
-        form = re.sub(r"\s+", " ", form)
-        if form not in known:
-            known[form] = _names(form) if len(known) < 5000 else ()
-        return known[form], found
+        pieces = _SPLIT.split(line)  # words and numbers by turns
+        found = pieces[1::2]
+        pieces[1::2] = [_DAY if ":" in value else _MARK for value in found]
+        form = " ".join("".join(pieces).split())
+        names = known[form] if form in known else _names(form)
+        if len(known) < _MOST_FORMS:
+            known[form] = names
+        return names, found
 
     middle = lines[len(lines) // 4 :][:_SEARCHED]
-    forms = [_VALUE.sub(_MARK, line[:_LONGEST]) for _, line in middle]
+    if any(len(line) > _LONGEST for _, line in lines):
+        return None
+    forms = [_VALUE.sub(_MARK, line) for _, line in middle]
     labels = sum(len(_LABEL.findall(form)) for form in forms)
     if labels < 2 * len(forms) or not forms:
         return None
