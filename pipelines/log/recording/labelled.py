@@ -22,7 +22,7 @@ _SPLIT = re.compile(f"({_VALUE.pattern})")
 _MARK = "\0"  # a number's place in a line's form; no text file holds it
 _DAY = "\1"
 _PIECE = re.compile(rf"[^\W\d][\w.]*|[\[({{<\])}}>]|{_MARK}|{_DAY}")
-_LABEL = re.compile(rf"[^\W\d][\w.]*\s*[=:>]\s*[\"'\[({{]*{_MARK}")
+_LABEL = re.compile(rf"(?<![\w.])[^\W\d][\w.]*+\s*+[=:>]\s*+[\"'\[({{]*{_MARK}")
 _SEARCHED = 200  # lines that show the form
 _LEAST = 0.9  # of these, behind the first lines, and of all lines, that have one form
 _LONGEST = 20_000  # characters of a line
