@@ -20,7 +20,7 @@ from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
 from pipelines.model.friction.drift import DriftConfig, drift_of
 from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.fit_law import fit_law
-from pipelines.model.friction.ladder import Judge, Ladder, climb
+from pipelines.model.friction.ladder import Judge, Ladder, climb, no_worse
 from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law
 from pipelines.model.friction.one_joint import OneJoint, gravity_columns
@@ -110,7 +110,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
         stretches = left_out(rows.stretches, rows.sliding.slides)
     courses = _courses(stretches, rows, arm, config, DriftConfig()) or (None,)
     ends = [_with_course(stretches, rows.fitted, one, fit, arm) for one in courses]
-    stretches, fit, course = min(ends, key=lambda end: end[1].found.rms)
+    best = min(ends, key=lambda end: end[1].found.rms)[1].found.residual
+    stretches, fit, course = next(end for end in ends if no_worse(end[1].found.residual, best))
     identify, validate = stretches[:rows.fitted], tuple(stretch for stretch in stretches[rows.fitted:] if stretch.rows)
     judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
     sticks = any(stretch.sticks is not None for stretch in identify)

@@ -19,7 +19,7 @@ from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.rigid.body import Array
 
-__all__ = ["Judge", "Ladder", "Tried", "climb"]
+__all__ = ["Judge", "Ladder", "Tried", "climb", "no_worse"]
 
 _SURE = 2.0  # standard errors of a difference: beyond, it is one
 _WORTH = 0.01  # of the mean square: a smaller difference is none, however sure
@@ -57,14 +57,14 @@ class Ladder:
 
     def alike(self, one: Tried) -> bool:
         """Not measurably worse than the best."""
-        return not one.reason and _alike(one.residual, self.best.residual)
+        return not one.reason and no_worse(one.residual, self.best.residual)
 
     @property
     def rivals(self) -> tuple[Tried, ...]:
         """Laws as simple as the chosen one, or nearly, that explain the fitted rows as well: nothing there speaks against them."""
         own = self.chosen.fit.found.residual
         return tuple(one for one in self.tried if one is not self.chosen and not one.reason
-                     and _alike(one.fit.found.residual, own) and one.law.size <= self.chosen.law.size + 1
+                     and no_worse(one.fit.found.residual, own) and one.law.size <= self.chosen.law.size + 1
                      and not set(self.chosen.law.members) <= set(one.law.members))
 
 
@@ -110,10 +110,10 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
         hopeful = [k for k in sorted(range(len(gains)), key=lambda k: -gains[k])[:_HOPEFUL] if gains[k] > 0.5 * _WORTH]
         more = [_worth(judge.try_law(*beside[k]), best) for k in hopeful]
         tried += more
-        if not more or _alike(best.residual, _best(tried).residual):
+        if not more or no_worse(best.residual, _best(tried).residual):
             break
     best = _best(tried)
-    able = [one for one in tried if not one.reason and _alike(one.residual, best.residual)]
+    able = [one for one in tried if not one.reason and no_worse(one.residual, best.residual)]
     chosen = min(able or [best], key=lambda one: (one.law.size, one.validate_rms))
     return Ladder(tuple(tried), chosen, best, "logs" if judge.validate is not None else "blocks", judge.torque)
 
@@ -160,7 +160,7 @@ def _best(tried: Sequence[Tried]) -> Tried:
     return min(able or list(tried), key=lambda one: one.validate_rms)
 
 
-def _alike(one: Array, best: Array) -> bool:
+def no_worse(one: Array, best: Array) -> bool:
     """Whether residuals are not measurably larger than the best law's.
 
     Σ r² - Σ b² = Σ δ² + 2 Σ δ b with δ = r - b. Where the best law is right, b is noise, and the last sum is what chance

@@ -8,7 +8,8 @@ encoder decides. From the longest travel down, a further class of travel is take
 
     τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed, each way apart
 
-leaves no more of it than of the rows before; f may change slowly in time. No law is assumed.
+leaves no more of it than of the rows before; f may change slowly in time, or at an instant that explains a class which does
+not follow otherwise. No law is assumed.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.model.friction.drift import DriftConfig, orthonormal, step_row
 from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.friction.weak_form import Stretch
@@ -78,9 +80,10 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
         wider = moving & (travel >= lower)
         more = wider & ~slides
         if more.any():
-            square = np.square(_residual(columns[wider], equations.y[wider]))
-            if np.median(square[more[wider]]) > config.worse * np.median(square[~more[wider]]):
-                break
+            if not _follows(columns, equations.y, wider, more, config):
+                columns = np.hstack([columns, _step(columns, equations.y, speed, wider)])
+                if not _follows(columns, equations.y, wider, more, config):
+                    break
             slides = wider
         reach = lower
     reach = min(config.margin * reach, start)
@@ -92,6 +95,20 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     doubtful = rest > 0 and (whole - left) / max(count_whole - count, 1) > config.worse * mean_square
     return Sliding(slides, ~moving, travel, reach, mean_square,
                    _attenuation(stretches, steady[slides], slides, len(equations.postures)), bool(doubtful))
+
+
+def _follows(columns: Array, y: Array, wider: Mask, more: Mask, config: SlidingConfig) -> bool:
+    """Whether least squares over `wider` rows leaves no more of `more` of them than of the others."""
+    square = np.square(_residual(columns[wider], y[wider]))
+    return bool(np.median(square[more[wider]]) <= config.worse * np.median(square[~more[wider]]))
+
+
+def _step(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
+    """Columns of Coulomb and viscous friction from the row on that explains most of `rows` (all rows, 2)."""
+    basis = orthonormal(columns[rows])
+    left = y[rows] - basis @ (basis.T @ y[rows])
+    first = np.flatnonzero(rows)[step_row(np.sign(speed[rows]), basis, left, DriftConfig())]
+    return np.where(np.arange(len(y))[:, None] >= first, np.stack([np.sign(speed), speed], axis=1), 0.0)
 
 
 def left_out(stretches: Sequence[Stretch], slides: Mask) -> tuple[Stretch, ...]:
