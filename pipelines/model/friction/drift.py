@@ -7,7 +7,7 @@ on rows that slide, beside inertia, gravity and a free curve of friction (slidin
 a curve can hold is no drift. The course that leaves least must predict blocks of time that were held out better than no change
 does: logarithms of the ratio of their squared errors, in closed form by leverage, against draws of their signs
 (fit/flips.py). A course that costs a number and gains nothing loses there. A step may lie between any two rows; the time
-constant of a trend is fitted later with the law (joint.py), and so is which part of friction changes.
+constant of a trend is fitted later with the law (joint.py).
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ import numpy.typing as npt
 
 from pipelines.fit.flips import by_flips
 from pipelines.fit.varpro import held_out
+from pipelines.model.friction.ladder import no_worse
 from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time
 from pipelines.model.rigid.body import Array
 
 __all__ = ["DriftConfig", "drift_of", "orthonormal", "step_row"]
 
-_FORMS = ("whole", "viscous", "coulomb")
+_FORMS = ("whole", "coulomb", "viscous")
 _ROUNDS = 4  # of scanning for a course and fitting the curve that changes
 Index = npt.NDArray[np.intp]
 
@@ -45,8 +46,10 @@ class DriftConfig:
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
 
 
-def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> tuple[Course, ...]:
-    """The courses of friction, one for every form, of the kind that rows show beyond chance; empty where they show none.
+def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> Course | None:
+    """The course of friction in time, where rows show one beyond chance: the first that is not measurably worse than the best.
+
+    All friction by one share comes before a part of it, and a trend before a step.
 
     Args:
         stretches: whose rows these are; they slide.
@@ -58,22 +61,31 @@ def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array,
     known = np.hstack([rigid, curve])
     basis, blocks = orthonormal(known), blocks_of_time(stretches, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
-        return ()
+        return None
     trends = _trends(stretches, config)
     found = [_best(kind, form, stretches, y, known, curve, basis, speed, trends, config)
-             for kind in ("trend", "step") for form in _FORMS]
-    course, own, size, _ = min(found, key=lambda one: one[3])
-    alike = tuple(one[0] for one in found if one[0].kind == course.kind)
-    gains = np.log(_held_out(basis, y, blocks) / _held_out(orthonormal(np.column_stack([known, own])), y, blocks))
-    whole = curve @ _least(np.column_stack([known, own]), y)[rigid.shape[1]:-1]
-    large = size >= config.least * float(np.median(np.abs(whole)))
-    return alike if large and by_flips(gains) <= config.chance else ()
+             for form in _FORMS for kind in ("trend", "step")]
+    best = min(found, key=lambda one: float(one.residual @ one.residual))
+    gains = np.log(_held_out(basis, y, blocks) / _held_out(orthonormal(np.column_stack([known, best.column])), y, blocks))
+    whole = curve @ _least(np.column_stack([known, best.column]), y)[rigid.shape[1]:-1]
+    if best.size < config.least * float(np.median(np.abs(whole))) or by_flips(gains) > config.chance:
+        return None
+    return next(one.course for one in found if no_worse(one.residual, best.residual))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """The best course of one kind and form."""
+
+    course: Course
+    column: Array  # (rows,) c(t) g(v)
+    size: float  # [N m] by which it changes friction
+    residual: Array  # (rows,) [N m]
 
 
 def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: Array, curve: Array, basis: Array,
-          speed: Array, trends: Sequence[Course], config: DriftConfig) -> tuple[Course, Array, float, float]:
-    """The course of this kind and form that leaves least, its column (rows,), by how much it changes friction
-    [N m], and the sum of squares it leaves.
+          speed: Array, trends: Sequence[Course], config: DriftConfig) -> _Found:
+    """The course of this kind and form that leaves least.
 
     The curve that changes as a whole is itself fitted: scan, fit, scan again.
     """
@@ -92,7 +104,7 @@ def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: A
         columns = np.column_stack([known, own])
         beta = _least(columns, y)
     size = abs(float(beta[-1])) * float(np.median(np.abs(shape)))
-    return course, own, size, float(np.square(y - columns @ beta).sum())
+    return _Found(course, own, size, y - columns @ beta)
 
 
 def _least(columns: Array, y: Array) -> Array:

@@ -175,10 +175,11 @@ def no_worse(one: Array, best: Array) -> bool:
 def _held_out(fit: LawFit) -> Array:
     """The residual of every block of rows as the other blocks would have it.
 
-    By the first order of the law about the whole fit.
+    By the first order of the law about the whole fit; a number on its bound does not move.
     """
     found = fit.found
-    part = linear_part(found.jacobian, found.residual)
+    free = np.append(np.ones(len(found.beta), dtype=bool), ~np.array(found.at_bound, dtype=bool))
+    part = linear_part(found.jacobian[:, free], found.residual)
     blocks = np.arange(len(found.residual)) * _FOLDS // len(found.residual)
     return held_out(part.columns @ part.root, found.residual, blocks)
 
@@ -191,4 +192,9 @@ def _fault(fit: LawFit, takes: bool) -> str:
     below = [number.name for number in fit.numbers if number.low >= 0.0 and number.value < number.low - _SURE * number.std]
     if below:
         return f"{', '.join(below)} would be negative"
+    for effect in fit.law.effects[2:]:  # what the law has beyond Coulomb and viscous friction
+        own = {f"{effect.name}.{q.name}" for q in effect.parameters if not q.shape}
+        numbers = [number for number in fit.numbers if number.name in own]
+        if all(abs(number.value) <= _SURE * number.std for number in numbers):
+            return f"{', '.join(number.name for number in numbers)} may be zero"
     return "" if takes else "its curve would push at speeds that are not in these logs"

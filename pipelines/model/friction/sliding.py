@@ -36,9 +36,10 @@ class SlidingConfig:
     """Numbers that decide which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
-    worse: float = 4.0  # median square of a class over that of the rows before: twice their size, beyond chance of a few rows
+    worse: float = 4.0  # median square of a class over that of the rows before: 3 std of the logarithm of the median square of
+    # 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
     rows: int = 3  # for every column of the free curve, that the first class has at least
-    margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel)
+    margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel) (Dahl 1968), 2 %
     classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
     decades: int = 4  # of speed; slower rows are one class
     course: int = 8  # knots of a change of friction in time: what drifts still is a function of speed
