@@ -38,7 +38,7 @@ class DriftConfig:
     """Numbers that decide whether friction drifts."""
 
     chance: float = 1e-3  # that a joint without drift gains as much in blocks held out: none in a hundred joints
-    block: float = 1.0  # [s] of rows whose errors may depend on one another
+    block: float = 0.5  # [s] of rows whose errors may depend on one another; .1 s apart they do by .15 (ten joints, one .28)
     fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
     ends: float = 0.08  # of all rows, that lie before and after a step
