@@ -113,7 +113,10 @@ class _Fit:
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
                 most: Array | None = None, config: HeldConfig | None = None) -> Held | None:
-    """Return the response from torque to position with the other joints held; None where none of them moves.
+    """Return the response from torque to position with the other joints held; None where their motion does not matter.
+
+    It matters where Z with columns for the others has the shorter description. Where the others hardly move, their columns are
+    nearly those of Z_jj times the same a_j, and taking them out adds more than it takes away.
 
     Args:
         responses: from v to torque and all positions, in the excited band.
@@ -135,7 +138,11 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
     rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
                  np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
-    fit = _unattenuated(rows, _with_modes(rows, bound, config))
+    fit = _with_modes(rows, bound, config)
+    alone = replace(rows, acceleration=rows.acceleration[:, :1], covariance=rows.covariance[:, :2, :2])
+    if _with_modes(alone, bound[:0], config).description(rows.independent) <= fit.description(rows.independent):
+        return None
+    fit = _unattenuated(rows, fit)
     held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
     couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit, config.draws)]) / rigid[:, None]
     rest = responses.response[:, torque] - np.einsum("dbk,bk->db", couplings, responses.response[:, list(others)])
