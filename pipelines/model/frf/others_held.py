@@ -94,8 +94,11 @@ class _Fit:
         return max(float(self.rest @ self.rest), 1e-300)
 
     def passive(self, most: Array) -> bool:
-        """Whether every mode is found and could exist: b_jm² is positive, and no b_km² is more than D_kk, `most` (others,)."""
+        """Whether bodies like this could exist, and every mode is found: D_jk² ≤ D_jj D_kk with D_kk at most `most` (others,), and
+        b_jm² is positive and no b_km² more than D_kk."""
         joints, place = len(most) + 1, len(most) + 1
+        if self.gains[0] <= 0.0 or (self.gains[1:joints]**2 > most * self.gains[0]).any():
+            return False
         for ratio in self.ratios:
             size = joints if ratio is None else 1
             own, others = self.gains[place], self.gains[place + 1:place + size]
@@ -138,9 +141,10 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
     rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
                  np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
-    fit = _with_modes(rows, bound, config)
-    alone = replace(rows, acceleration=rows.acceleration[:, :1], covariance=rows.covariance[:, :2, :2])
-    if _with_modes(alone, bound[:0], config).description(rows.independent) <= fit.description(rows.independent):
+    single = replace(rows, acceleration=rows.acceleration[:, :1], covariance=rows.covariance[:, :2, :2])
+    alone = _with_modes(single, bound[:0], config)
+    fit = _with_modes(rows, bound, config, alone.shape)
+    if not fit.passive(bound) or alone.description(rows.independent) <= fit.description(rows.independent):
         return None
     fit = _unattenuated(rows, fit)
     held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
@@ -159,15 +163,26 @@ def _less(responses: Responses, kept: list[int], coupling: Complex) -> Responses
                    coherence=responses.coherence[:, kept[:2]])
 
 
-def _with_modes(rows: _Rows, most: Array, config: HeldConfig) -> _Fit:
-    """Add modes as long as they shorten the description."""
+def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array | None = None) -> _Fit:
+    """Add modes as long as they shorten the description; of bodies that could exist, where there are such.
+
+    `known_shape` of a fit with fewer joints is a further start: that fit is one of these, with no coupling.
+    """
     plain = np.sqrt(0.5 * (rows.covariance[:, 0, 0].real + rows.floor**2))
     delays = np.arange(-config.delay, config.delay, np.pi / 4.0 / abs(rows.s[-1]))
     rigid = [_linear(rows, np.array([delay]), plain) for delay in (0.0, *delays)]
-    best = known = _refined(rows, min(rigid, key=lambda one: one.cost), config)
+    begun = [_refined(rows, min(rigid, key=lambda one: one.cost), config)]
+    if known_shape is not None:
+        free = _linear(rows, known_shape, plain, (None,) * (len(known_shape) // 2))
+        turned = free.gains[1:rows.acceleration.shape[1]] / free.gains[0]
+        begun += [_refined(rows, start, config) for start in
+                  (free, _linear(rows, known_shape, plain, (turned,) * (len(known_shape) // 2)))]
+    begun = [one for one in begun if one.passive(most)] or begun[:1]
+    best = min(begun, key=lambda one: one.description(rows.independent))
+    known = best
     frequencies = np.log(np.geomspace(abs(rows.s[0]), abs(rows.s[-1]), config.frequencies))
     shapes = [np.array([w, np.log(z)]) for w in frequencies[1:-1] for z in config.dampings]
-    for _ in range(config.modes):
+    for _ in range(config.modes - len(known.ratios)):
         starts = []
         for kind in (known.gains[1:rows.acceleration.shape[1]] / known.gains[0], None):
             for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
