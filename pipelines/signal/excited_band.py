@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pipelines.signal.frequency_response import Array, Responses
 
-__all__ = ["BandConfig", "ExcitedBand", "excited_band"]
+__all__ = ["BandConfig", "ExcitedBand", "excited_band", "powered"]
 
 
 @dataclass(frozen=True)
@@ -75,11 +75,16 @@ def excited_band(responses: Responses, density: Array, config: BandConfig | None
     first = np.searchsorted(f, f * (1.0 - config.around))
     last = np.searchsorted(f, f * (1.0 + config.around), side="right")
     usual = np.array([np.median(known[a:b]) for a, b in zip(first, last, strict=True)])
-    powered = density > config.power * float(density @ density) / total
-    driven = (float(f[powered][0]), float(f[powered][-1]))
-    good = np.flatnonzero(powered & (usual >= config.known))
+    driving = powered(density, config)
+    driven = (float(f[driving][0]), float(f[driving][-1]))
+    good = np.flatnonzero(driving & (usual >= config.known))
     if not len(good):
         return ExcitedBand((), driven)
     widest = np.maximum(config.hole[0] * float(np.median(np.diff(f))), config.hole[1] * f[good[:-1]])
     parts = np.split(good, np.flatnonzero(np.diff(f[good]) > widest) + 1)
     return ExcitedBand(tuple((float(f[p[0]]), float(f[p[-1]])) for p in parts if len(p) >= config.fewest), driven)
+
+
+def powered(density: Array, config: BandConfig | None = None) -> npt.NDArray[np.bool_]:
+    """Return a mask of the bins where v has power, from its `density` [unit²/Hz] (bins,), which is not zero throughout."""
+    return np.asarray(density > (config or BandConfig()).power * float(density @ density) / float(density.sum()))

@@ -25,7 +25,7 @@ from pipelines.model.frf.controller import continuous_controller, loop_delay, sa
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
 from pipelines.model.frf.others_held import Held, others_held
 from pipelines.signal.cross_spectra import cross_spectra
-from pipelines.signal.excited_band import ExcitedBand, excited_band
+from pipelines.signal.excited_band import ExcitedBand, excited_band, powered
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
 from pipelines.signal.local_polynomial import local_polynomial
 from pipelines.signal.multisine_response import DetectionLines, MultisineResponses, multisine_responses
@@ -41,9 +41,10 @@ _SEGMENTS = 4  # at least, for Welch's coherence and variance
 _NO_POWER = 1e-12  # of the strongest bin of the source
 _FOLDED = 0.1  # of the density of v in its band, near half the rate: it goes on beyond
 _COUPLED = 4.0  # [Hz] from where on friction and gravity of the other joints matter less than their inertia
+_OCTAVE = 2.5  # highest over lowest frequency of v from which the inertia is told roughly
 _CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
 _POSTURES = 3.0  # times that the inertia about a joint grows from one posture to another
-_DENSITY = 1.0  # [s] of the segments that show where v has power
+_DENSITY = 4.0  # [s] of the segments that show where v has power, to half a hertz: Hann's window leaks into two bins beside
 _SMOOTH = 25  # lines over which distortion is compared with noise
 
 
@@ -125,12 +126,19 @@ def measured_responses(logs: Iterable[ExperimentLog], how: How | None = None) ->
 
 
 def _roughly(turned: Turned) -> float:
-    """The inertia [kg m^2] of the joint from all of a log: torque over acceleration by v, where friction matters little."""
+    """Return the inertia [kg m^2] of the joint from all of a log, torque over acceleration by v; inf where v tells none.
+
+    Over the octave and a bit where v begins to drive it: there friction matters little, and modes hardly yet.
+    """
     spectra = cross_spectra([s.signals[:, [V, TORQUE, POSITION]] for s in turned.stretches], turned.rate,
                             min(round(_DENSITY * turned.rate), *(len(s.signals) for s in turned.stretches)))
-    inside = (spectra.frequency >= _COUPLED) & (spectra.frequency <= _CONSTANT[0])
+    f = spectra.frequency
+    driven = powered(spectra.density[:, 0, 0].real) & (f >= _COUPLED)
+    inside = driven & (f <= _OCTAVE * f[driven].min(initial=np.inf))
+    if not inside.any():
+        return np.inf
     torque, position = spectra.density[inside, 0, 1], spectra.density[inside, 0, 2]
-    return float(np.median(np.abs(torque) / np.maximum(np.abs(position) * (2.0 * np.pi * spectra.frequency[inside]) ** 2, 1e-300)))
+    return float(np.median(np.abs(torque) / np.maximum(np.abs(position) * (2.0 * np.pi * f[inside]) ** 2, 1e-300)))
 
 
 def _together(a: Turned, b: Turned) -> bool:
