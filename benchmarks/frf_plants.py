@@ -443,15 +443,16 @@ class _Injected:
         return self.law.describe(machine)
 
     def start(self, machine: Machine, reference: Reference, sample_time: float) -> Step:
-        inner, v = self.law.start(machine, reference, sample_time), self.v.tolist()
+        return _InjectedStep(self.law.start(machine, reference, sample_time), self.v)
 
-        class Both:
-            extras: dict[str, Array] = {**inner.extras, "v": self.v}
 
-            def __call__(self, k: int, q: list[float], observer: Observer) -> list[float]:
-                return [a + b for a, b in zip(inner(k, q, observer), v[k], strict=True)]
+class _InjectedStep:
+    def __init__(self, inner: Step, v: Array) -> None:
+        self._inner, self._v = inner, v.tolist()
+        self.extras = {**inner.extras, "v": v}
 
-        return Both()
+    def __call__(self, k: int, q: list[float], observer: Observer) -> list[float]:
+        return [a + b for a, b in zip(self._inner(k, q, observer), self._v[k], strict=True)]
 
 
 def _bench(s: Session) -> list[ExperimentLog]:

@@ -22,12 +22,12 @@ from pipelines.errors import InputRejected
 from pipelines.fit.rational import Known
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
+from pipelines.model.frf.grouping import Finding, GroupingConfig, Open, group_joint, seen_elsewhere
 from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
 from pipelines.model.frf.responses import How, Measured, measured_responses
 from pipelines.model.frf.rigid import Expected, expected_rigid
 
-__all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings"]
+__all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings", "grouped"]
 
 
 _SLOW = 20.0  # [Hz] up to which friction and delay turn the phase by less than a right angle
@@ -78,16 +78,21 @@ def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tupl
         _check_sign(one)
     usable = [one for one in measured if tells(one, band)]
     seen = tuple(Seen(one, fitted_modes(one, band), expected_rigid(one, arm)) for one in usable)
+    return Findings(seen, tuple(one for one in measured if not tells(one, band)), *grouped(seen))
+
+
+def grouped(seen: Sequence[Seen], config: GroupingConfig | None = None) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
+    """What is sure, and what is open, from the modes of all joints and postures."""
     sure: list[Finding] = []
     unsure: list[Open] = []
     for joint in sorted({one.measured.joint for one in seen}):
         own = [one for one in seen if one.measured.joint == joint]
         turned = own[0].measured.first
         found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute, turned.held,
-                                  [one.measured.load for one in own])
+                                  [one.measured.load for one in own], config)
         sure += found
         unsure += left
-    return Findings(seen, tuple(one for one in measured if not tells(one, band)), *seen_elsewhere(sure, unsure))
+    return seen_elsewhere(sure, unsure, config)
 
 
 def _check_sign(measured: Measured) -> None:
