@@ -25,6 +25,7 @@ from pipelines.model.frf.modes import Pair
 __all__ = ["Explained", "explain", "predicted"]
 
 _FLOOR = 1e-3  # relative deviation of a frequency, that of every bin of the fit
+_LEAST_STD = 1e-9  # relative, of an inertia that is exactly known
 _LEAST = 1e-12  # of J: less is lost in the sums of the mass matrix, which is singular then
 
 
@@ -34,9 +35,15 @@ class Explained:
 
     base: tuple[float, float] | None  # f_b [Hz], I [kg m^2]
     joint: tuple[float, float] | None  # k [N m/rad], J_m [kg m^2]
-    std: tuple[float, ...]  # relative, of the numbers above in their order
-    misfit: float  # χ²
+    covariance: Array  # of the logarithms of the numbers above in their order
+    misfit: float  # χ², with the `slack` that frequencies are granted
+    worst: float  # largest relative deviation of a frequency
     freedom: int  # numbers measured less numbers fitted
+
+    @property
+    def std(self) -> tuple[float, ...]:
+        """Relative, of the numbers above in their order."""
+        return tuple(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).tolist())
 
 
 def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[float, float] | None) -> tuple[Array, Array]:
@@ -59,7 +66,7 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
 
 
 def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: bool, joint: bool,
-            slack: float = 0.008, inertia_std: float = 0.0) -> Explained | None:
+            slack: float = 0.008, inertia_std: Sequence[float] = ()) -> Explained | None:
     """Springs at the base, in the joint or both, that explain the pairs of every posture best; None where counts differ.
 
     Args:
@@ -67,7 +74,7 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
         inertia: J of each posture [kg m^2].
         slack: relative deviation of a frequency that masses and springs are granted: held joints give way a little, and J is
             averaged over a turn.
-        inertia_std: relative, of all J alike: every mass and stiffness is as uncertain.
+        inertia_std: relative, of J in each posture; none: exactly known. J is fitted beside the springs, with this as its prior.
     """
     springs = int(base) + int(joint)
     if not pairs or springs == 0 or any(len(own) != springs for own in pairs):
@@ -75,21 +82,26 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     measured = np.log([[f.value for kind in _kinds(own) for f in kind] for own in pairs])
     spread = np.array([[np.hypot(f.std / f.value, slack) for kind in _kinds(own) for f in kind] for own in pairs])
 
-    def rest(theta: Array) -> Array:
-        b, k = _taken(theta, base, joint)
-        rows = [np.concatenate(predicted(j, b, k)) for j in inertia]
-        return _known(((np.log(rows) - measured) / spread).ravel())
+    known = np.maximum(inertia_std if len(inertia_std) else np.zeros(len(inertia)), _LEAST_STD)
+    numbers = 2 * springs
 
-    found = [least_squares(rest, start) for start in _starts(pairs, inertia, base, joint)]
+    def rest(theta: Array) -> Array:
+        b, k = _taken(theta[:numbers], base, joint)
+        rows = [np.concatenate(predicted(j * float(np.exp(s * off)), b, k))
+                for j, s, off in zip(inertia, known, theta[numbers:], strict=True)]
+        return np.concatenate([_known(((np.log(rows) - measured) / spread).ravel()), theta[numbers:]])
+
+    found = [least_squares(rest, np.concatenate([start, np.zeros(len(inertia))])) for start in _starts(pairs, inertia, base, joint)]
     best = min(found, key=lambda one: float(one.rest @ one.rest))
-    b, k = _taken(best.x, base, joint)
+    b, k = _taken(best.x[:numbers], base, joint)
     alone = np.array([[np.hypot(f.std / f.value, _FLOOR) for kind in _kinds(own) for f in kind] for own in pairs])
-    weight = (spread / alone).ravel()  # what is left, not what was granted, says how well the numbers are known
-    jac, left = best.slope * weight[:, None], float(((best.rest * weight) ** 2).sum()) / max(measured.size - len(best.x), 1)
-    covariance = np.linalg.pinv(jac.T @ jac) * max(left, 1.0)
-    scaled = np.array([0.0, inertia_std][2 - 2 * base:] + [inertia_std, inertia_std][2 - 2 * joint:])
-    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0) + scaled**2).tolist()), float(best.rest @ best.rest),
-                     measured.size - len(best.x))
+    # What is left, not what was granted, says how well the numbers are known.
+    weight = np.concatenate([(spread / alone).ravel(), np.ones(len(inertia))])
+    freedom = measured.size - numbers
+    jac, left = best.slope * weight[:, None], float(((best.rest * weight) ** 2).sum()) / max(freedom, 1)
+    covariance = np.linalg.pinv(jac.T @ jac)[:numbers, :numbers] * max(left, 1.0)
+    return Explained(b, k, covariance, float(best.rest @ best.rest),
+                     float(np.abs(best.rest[:measured.size] * spread.ravel()).max()), freedom)
 
 
 def _kinds(own: Sequence[Pair]) -> tuple[list[Known], list[Known]]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pipelines.fit.rational import Known
+from pipelines.log.experiment import Array
 from pipelines.model.frf.compliant import Explained, explain
 from pipelines.model.frf.modes import Modes, Pair
 
@@ -59,6 +60,15 @@ class GroupingConfig:
     contact: float = 0.03
 
 
+@dataclass(frozen=True, eq=False)
+class Gaussian:
+    """Numbers that are known together: prior information of a later fit."""
+
+    names: tuple[str, ...]
+    mean: Array  # (numbers,) SI
+    covariance: Array  # (numbers, numbers)
+
+
 @dataclass(frozen=True)
 class Finding:
     """One thing that is sure."""
@@ -73,6 +83,8 @@ class Finding:
     seen_at: tuple[int, ...]  # joints
     faint: bool = False  # its pairs are so small that they may be a trace of what another joint does
     stands: tuple[Known, ...] = ()  # [Hz] of a base: the antiresonance in each posture
+    frequencies: tuple[Known, ...] = ()  # [Hz] what `frequency` is in each posture
+    numbers: Gaussian | None = field(default=None, compare=False)  # `parameters` that follow from no others
 
 
 @dataclass(frozen=True)
@@ -172,16 +184,16 @@ def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
 def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str,
              config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
     inertia, slack = [m.inertia.value if m.inertia else float("nan") for m in modes], max(m.slack for m in modes)
-    share = max((m.inertia.std / m.inertia.value for m in modes if m.inertia and m.inertia.value > 0.0), default=0.0)
     if not np.isfinite(inertia).all() or min(inertia) <= 0.0:
         return [], [_open(joint, pairs, "the inertia of the joint could not be measured")]
+    share = [m.inertia.std / m.inertia.value if m.inertia else 0.0 for m in modes]
     if len(pairs[0]) == 1:
         return _one_spring(joint, pairs, inertia, unit, slack, share, config)
     if len(pairs[0]) == 2:
         both = explain(pairs, inertia, True, True, slack, share)
         if both is not None and len(pairs) > 1 and _accepted(both, config) and _moves(inertia, config):
             words = (f"{_told(pairs, inertia, unit)}. A base and a spring in the joint together explain both pairs in all "
-                     f"{len(pairs)} postures (χ² {both.misfit:.3g} for {both.freedom}).")
+                     f"{len(pairs)} postures, within {100.0 * both.worst:.2g} %.")
             return [_as_base(both, pairs, words, joint, config), _as_joint(joint, both, pairs, inertia, words)], []
         strong = [sorted(own, key=lambda p: -p.rise) for own in pairs]
         if all(own[0].rise > config.heavy and own[1].rise < config.trace for own in strong):
@@ -191,7 +203,7 @@ def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: 
 
 
 def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str,
-                slack: float, share: float, config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
+                slack: float, share: Sequence[float], config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
     base, spring = (explain(pairs, inertia, *which, slack, share) for which in ((True, False), (False, True)))
     assert base is not None
     assert spring is not None
@@ -203,14 +215,14 @@ def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit:
             return [], [_open(joint, pairs, f"{told}; it stays as a base's would, but {base.base[1]:.2g} {unit} are too little "
                               "for a base")]
         words = (f"{told}. The resonance stays where it is while the inertia changes, with a phase lead between the two: a base of "
-                 f"{base.base[1]:.3g} {unit} explains every frequency (χ² {base.misfit:.2g} for {base.freedom}), a spring in the "
-                 f"joint does not (χ² {spring.misfit:.3g}).")
+                 f"{base.base[1]:.3g} {unit} explains every frequency within {100.0 * base.worst:.2g} %, a spring in the "
+                 f"joint within {100.0 * spring.worst:.2g} %.")
         return [_as_base(base, pairs, words, joint, config)], []
     if base.misfit > spring.misfit + config.tells and _accepted(spring, config):
         assert spring.joint is not None
         words = (f"{told}. The antiresonance moves with the posture as a link on a spring does. The level above the resonance is "
                  f"{rise:.3g} times that below: 1/J of a motor of {spring.joint[1]:.3g} {unit}. A spring in the joint explains "
-                 f"every frequency (χ² {spring.misfit:.2g} for {spring.freedom}), a base does not (χ² {base.misfit:.3g}).")
+                 f"every frequency within {100.0 * spring.worst:.2g} %, a base within {100.0 * base.worst:.2g} %.")
         return [_as_joint(joint, spring, pairs, inertia, words)], []
     if _accepted(spring, config) and all(own[0].rise > config.heavy for own in pairs):
         assert spring.joint is not None
@@ -220,7 +232,7 @@ def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit:
         return [_as_joint(joint, spring, pairs, inertia, words)], []
     why = "one posture only" if len(pairs) == 1 else \
         "the inertia hardly differs between the postures" if not _moves(inertia, config) \
-        else f"a base explains it with χ² {base.misfit:.3g}, a spring in the joint with {spring.misfit:.3g} for {base.freedom}"
+        else f"a base explains it within {100.0 * base.worst:.2g} %, a spring in the joint within {100.0 * spring.worst:.2g} %"
     return [], [_open(joint, pairs, f"{told}; {why}")]
 
 
@@ -237,11 +249,14 @@ def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int, co
     assert one.base is not None
     frequency, inertia = (Known(v, v * s) for v, s in zip(one.base, one.std[:2], strict=True))
     near = [min(own, key=lambda p: abs(p.resonance.frequency.value - frequency.value)) for own in pairs]
-    measured = _mean([p.resonance.frequency for p in near])
-    damping = _mean([p.resonance.damping for p in near])
-    return Finding("base", None, words, "base_resonance", measured, damping,
-                   {"frequency": measured, "damping_ratio": damping, "inertia": inertia}, (joint,),
-                   max(p.rise for p in near) < config.trace, tuple(p.antiresonance.frequency for p in near))
+    each = tuple(p.resonance.frequency for p in near)
+    measured, damping = _mean(each), _mean([p.resonance.damping for p in near])
+    together = np.diag([measured.std, damping.std, inertia.std]) ** 2
+    together[0, 2] = together[2, 0] = measured.std * inertia.std * one.covariance[0, 1] / max(one.std[0] * one.std[1], 1e-300)
+    numbers = {"frequency": measured, "damping_ratio": damping, "inertia": inertia}
+    return Finding("base", None, words, "base_resonance", measured, damping, numbers, (joint,),
+                   max(p.rise for p in near) < config.trace, tuple(p.antiresonance.frequency for p in near), each,
+                   Gaussian(tuple(numbers), np.array([v.value for v in numbers.values()]), together))
 
 
 def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list[float], words: str) -> Finding:
@@ -252,14 +267,23 @@ def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list
     near = [min(own, key=lambda p: abs(p.antiresonance.frequency.value - f)) for own, f in zip(pairs, locked, strict=True)]
     damping = _mean([p.antiresonance.damping for p in near])
     d = [2.0 * p.antiresonance.damping.value * np.sqrt(stiffness.value * j) for p, j in zip(near, link, strict=True)]
-    share = float(np.hypot(damping.std / max(abs(damping.value), 1e-9), 0.5 * stiffness.std / stiffness.value))
-    mean_link = float(np.mean(link))
+    value, mean_link = float(np.mean(d)), float(np.mean(link))
+    # d = 2 ζ √(k (J - J_m)): what is known of k and J_m is in d as well.
+    slope = value * np.array([1.0 / max(abs(damping.value), 1e-9), 0.5, -0.5 * motor.value / mean_link])
+    known = np.zeros((3, 3))
+    known[0, 0], known[1:, 1:] = damping.std**2, one.covariance[-2:, -2:]  # of ζ, log k, log J_m
+    to = np.array([[0.0, stiffness.value, 0.0], slope, [0.0, 0.0, motor.value]])
+    together = to @ known @ to.T
     frequency = float(np.sqrt(stiffness.value / mean_link) / (2.0 * np.pi))
+    each = tuple(p.antiresonance.frequency for p in near)
+    scatter = float(np.std([v.value for v in each]))  # it moves with the posture: one number stands for all of them
     return Finding("joint", joint, words, "joint_elasticity",
-                   Known(frequency, frequency * max(p.antiresonance.frequency.std / p.antiresonance.frequency.value for p in near)),
-                   damping, {"stiffness": stiffness, "damping": Known(float(np.mean(d)), float(np.mean(d)) * share),
-                             "frequency": Known(frequency, 0.5 * frequency * stiffness.std / stiffness.value),
-                             "motor_inertia": motor}, (joint,))
+                   Known(frequency, float(np.hypot(scatter, frequency * max(v.std / v.value for v in each)))),
+                   damping, {"stiffness": stiffness, "damping": Known(value, float(np.sqrt(together[1, 1]))),
+                             "frequency": Known(frequency, float(np.hypot(scatter, 0.5 * frequency * one.std[-2]))),
+                             "motor_inertia": motor}, (joint,), frequencies=each,
+                   numbers=Gaussian(("stiffness", "damping", "motor_inertia"),
+                                    np.array([stiffness.value, value, motor.value]), together))
 
 
 def _mean(values: Sequence[Known]) -> Known:
@@ -318,6 +342,11 @@ def _rigid(joint: int, modes: Sequence[Modes], config: GroupingConfig) -> Findin
         return Open(joint, None, ("joint_elasticity", "base_resonance"),
                     f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
                     "stronger excitation, to lower and higher frequencies")
+    if 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % of the frequencies lie within two deviations
+        return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
+                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about a "
+                    f"linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} % is not known. Noise does so, and "
+                    "a gap that is crossed.", "longer, and excited more strongly")
     if flat < config.flat:
         traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]
         beside = f" A pair that nearly cancels leaves a trace at {_many(traces)} Hz: base or another joint." if traces else ""
