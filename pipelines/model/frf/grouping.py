@@ -204,25 +204,22 @@ def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: 
 
 def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str,
                 slack: float, share: Sequence[float], config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
-    base, spring = (explain(pairs, inertia, *which, slack, share) for which in ((True, False), (False, True)))
+    base, spring = (explain(pairs, inertia, *which, slack, share, config.light) for which in ((True, False), (False, True)))
     assert base is not None
     assert spring is not None
     told = _told(pairs, inertia, unit)
     rise = float(np.mean([own[0].rise for own in pairs]))
     assert base.base is not None
     if spring.misfit > base.misfit + config.tells and _accepted(base, config):
-        if base.base[1] < config.light * float(np.mean(inertia)):
-            return [], [_open(joint, pairs, f"{told}; it stays as a base's would, but {base.base[1]:.2g} {unit} are too little "
-                              "for a base")]
         words = (f"{told}. The resonance stays where it is while the inertia changes, with a phase lead between the two: a base of "
                  f"{base.base[1]:.3g} {unit} explains every frequency within {100.0 * base.worst:.2g} %, a spring in the "
-                 f"joint within {100.0 * spring.worst:.2g} %.")
+                 f"joint {_within(spring)}.")
         return [_as_base(base, pairs, words, joint, config)], []
     if base.misfit > spring.misfit + config.tells and _accepted(spring, config):
         assert spring.joint is not None
         words = (f"{told}. The antiresonance moves with the posture as a link on a spring does. The level above the resonance is "
                  f"{rise:.3g} times that below: 1/J of a motor of {spring.joint[1]:.3g} {unit}. A spring in the joint explains "
-                 f"every frequency within {100.0 * spring.worst:.2g} %, a base within {100.0 * base.worst:.2g} %.")
+                 f"every frequency within {100.0 * spring.worst:.2g} %, a base {_within(base)}.")
         return [_as_joint(joint, spring, pairs, inertia, words)], []
     if _accepted(spring, config) and all(own[0].rise > config.heavy for own in pairs):
         assert spring.joint is not None
@@ -232,8 +229,12 @@ def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit:
         return [_as_joint(joint, spring, pairs, inertia, words)], []
     why = "one posture only" if len(pairs) == 1 else \
         "the inertia hardly differs between the postures" if not _moves(inertia, config) \
-        else f"a base explains it within {100.0 * base.worst:.2g} %, a spring in the joint within {100.0 * spring.worst:.2g} %"
+        else f"a base explains it {_within(base)}, a spring in the joint {_within(spring)}"
     return [], [_open(joint, pairs, f"{told}; {why}")]
+
+
+def _within(one: Explained) -> str:
+    return f"within {100.0 * one.worst:.2g} %" if one.worst < 1.0 else "not at all"
 
 
 def _accepted(one: Explained, config: GroupingConfig) -> bool:
@@ -342,10 +343,10 @@ def _rigid(joint: int, modes: Sequence[Modes], config: GroupingConfig) -> Findin
         return Open(joint, None, ("joint_elasticity", "base_resonance"),
                     f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
                     "stronger excitation, to lower and higher frequencies")
-    if 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % of the frequencies lie within two deviations
+    if 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % of the frequencies are within two deviations
         return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
-                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about a "
-                    f"linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} % is not known. Noise does so, and "
+                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about "
+                    f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} % is not known. Noise does so, and "
                     "a gap that is crossed.", "longer, and excited more strongly")
     if flat < config.flat:
         traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]

@@ -32,7 +32,7 @@ class HeldConfig:
 
     Attributes:
         modes: at most: a base and a spring in two joints.
-        frequencies, dampings: tried for each mode; the last damping is the largest.
+        dampings: tried for each mode; the last is the largest.
         delay: [s] the largest.
         floor: of the torque, what the model leaves out.
         alike: share of the frequency over which that is the same: its bins count as one.
@@ -42,7 +42,6 @@ class HeldConfig:
     """
 
     modes: int = 3
-    frequencies: int = 60
     dampings: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
     delay: float = 0.02
     floor: float = 0.01
@@ -180,8 +179,8 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
     begun = [one for one in begun if one.passive(most)] or begun[:1]
     best = min(begun, key=lambda one: one.description(rows.independent))
     known = best
-    frequencies = np.log(np.geomspace(abs(rows.s[0]), abs(rows.s[-1]), config.frequencies))
-    shapes = [np.array([w, np.log(z)]) for w in frequencies[1:-1] for z in config.dampings]
+    low, high = np.log(np.abs(rows.s[[0, -1]]))  # a mode is 2 ζ ω wide: as close as that frequencies are tried
+    shapes = [np.array([w, np.log(z)]) for z in config.dampings for w in np.arange(low + z, high, 2.0 * z)]
     for _ in range(config.modes - len(known.ratios)):
         starts = []
         for kind in (known.gains[1:rows.acceleration.shape[1]] / known.gains[0], None):
