@@ -57,10 +57,15 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
     f_b, i_b = base or (1.0, 1.0)
     k, motor = joint or (1.0, 0.5 * inertia)
     link, rides = inertia - motor, inertia - rotor
-    kept = [i for i, there in enumerate((base is not None, True, joint is not None)) if there]
-    locked = [i for i in kept if i != 1]
     if not np.isfinite([f_b * f_b * i_b, k, link]).all() or min(link, motor, i_b, rides) <= _LEAST * inertia:
-        return np.full(len(locked), np.nan), np.full(len(locked), np.nan)
+        none = np.full(int(base is not None) + int(joint is not None), np.nan)
+        return none, none
+    if joint is None:  # K / (I + J_l), K / (I + J_l J_m / J)
+        alone = f_b * np.sqrt([i_b / (i_b + rides), i_b / (i_b + rides * rotor / inertia)])
+        return alone[:1], alone[1:]
+    if base is None:  # k / J_l, k J / (J_l J_m)
+        alone = np.sqrt([k / link, k * inertia / (link * motor)]) / (2.0 * np.pi)
+        return alone[:1], alone[1:]
     mass = np.array([[i_b + rides, rides, link], [rides, inertia, link], [link, link, link]])
     spring = np.diag([i_b * (2.0 * np.pi * f_b) ** 2, 0.0, k])
 
@@ -68,7 +73,7 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
         values = np.linalg.eigvals(np.linalg.solve(mass[np.ix_(rows, rows)], spring[np.ix_(rows, rows)]))
         return np.sort(np.sqrt(np.maximum(values.real, 0.0))) / (2.0 * np.pi)
 
-    return frequencies(locked), frequencies(kept)[1:]
+    return frequencies([0, 2]), frequencies([0, 1, 2])[1:]
 
 
 def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: bool, joint: bool,

@@ -329,6 +329,12 @@ def _delay(joint: int, modes: Sequence[Modes], sample_time: float, held: bool,
                      "the measured motor current beside the command")]
 
 
+def _in_all(modes: Sequence[Modes], config: GroupingConfig) -> list[Known]:
+    """Resonances of pairs that nearly cancel, at the same frequency in every posture: one alone is as likely noise."""
+    each = [[m.frequency for m in one.traces if m.kind == "resonance"] for one in modes]
+    return [first for first in each[0] if all(any(_same(first, one, config) for one in own) for own in each[1:])]
+
+
 def _hidden(joint: int, modes: Sequence[Modes], lost: float) -> Open:
     low, high = max(m.band[0] for m in modes), min(m.band[1] for m in modes)
     return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
@@ -346,11 +352,11 @@ def _rigid(joint: int, modes: Sequence[Modes], config: GroupingConfig) -> Findin
     if 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % of the frequencies are within two deviations
         return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
                     f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about "
-                    f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} % is not known. Noise does so, and "
-                    "a gap that is crossed.", "longer, and excited more strongly")
+                    f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} % is not known. Noise does so, "
+                    "and a gap that is crossed.", "longer, and excited more strongly")
     if flat < config.flat:
-        traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]
-        beside = f" A pair that nearly cancels leaves a trace at {_many(traces)} Hz: base or another joint." if traces else ""
+        traces = _in_all(modes, config) if len(modes) > 1 else []
+        beside = f" Pairs that nearly cancel recur at {_many(traces)} Hz: of a base, or of another joint." if traces else ""
         words = (f"No {'distinct ' if traces else ''}mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration "
                  f"per input is flat within {100.0 * (flat - 1.0):.2g} %, without delay.{beside}")
         return Finding("rigid", joint, words, None, None, None, {}, (joint,))
