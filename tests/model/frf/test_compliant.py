@@ -158,9 +158,11 @@ def test_delay_and_rigid() -> None:
     assert [(one.kind, one.cause) for one in rigid] == [("rigid", None)]
     assert "trace" not in rigid[0].evidence
     faint = modes_of([(26.7, 26.8)], 0.5)
-    traced, _ = group_joint(2, [replace(faint, modes=(), pairs=(), traces=faint.modes)], 1e-3)
-    assert [one.kind for one in traced] == ["rigid"]
-    assert "26.8 Hz" in traced[0].evidence
+    trace = replace(faint, modes=(), pairs=(), traces=faint.modes)
+    for postures, said in (([trace, trace], True), ([trace], False), ([trace, modes_of([], 0.5)], False)):
+        traced, _ = group_joint(2, postures, 1e-3)
+        assert [one.kind for one in traced] == ["rigid"]
+        assert ("26.8 Hz" in traced[0].evidence) == said
 
 
 def test_modes_that_do_not_explain_are_not_believed() -> None:
