@@ -24,7 +24,8 @@ import numpy as np
 from benchmarks.frf_plants import KINDS, PLANTS, Session, recorded
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log, write_log
-from pipelines.model.frf.findings import Findings, frf_findings
+from pipelines.model.frf.findings import Findings, frf_findings, grouped
+from pipelines.model.frf.grouping import GroupingConfig
 
 __all__ = ["drawn", "interval", "judged", "main"]
 
@@ -100,6 +101,9 @@ def main() -> None:
         verdict = judged(session, found)
         for group in ("all", session.plant, f"{session.rate} Hz"):
             tally[group, verdict] += 1
+        for share in (0.25, 1.0):
+            again = Findings(found.seen, (), *grouped(found.seen, GroupingConfig(lost=share)))
+            tally[f"lost {share:g}", judged(session, again)] += 1
         print(_line(session, verdict, found, time.process_time() - begun), flush=True)
     for group in dict.fromkeys(group for group, _ in sorted(tally)):
         total = sum(tally[group, v] for v in ("right", "undecided", "wrong"))

@@ -30,11 +30,26 @@ from pipelines.model.frf.rigid import Expected, expected_rigid
 __all__ = ["Finding", "Findings", "Gaussian", "Known", "Open", "Seen", "findings_of", "frf_findings", "grouped"]
 
 
-_SLOW = 20.0  # [Hz] up to which friction and delay turn the phase by less than a right angle
-_FIRST = 2.0  # times the lowest excited frequency, up to where the sign is seen first: between two modes the phase is turned round
-_RELIABLE = 0.7  # coherence
-_FEWEST = 3  # bins
-_AGAINST = -0.5  # cosine of the phase: beyond 120°
+@dataclass(frozen=True)
+class SignConfig:
+    """When a joint accelerates against its input.
+
+    Attributes:
+        slow: [Hz] up to which friction and delay turn the phase by less than a right angle
+        first: times the lowest excited frequency, up to where the sign is seen first: between two modes the phase is turned round
+        reliable: coherence
+        fewest: bins
+        against: cosine of the phase: beyond 120°
+    """
+
+    slow: float = 20.0
+    first: float = 2.0
+    reliable: float = 0.7
+    fewest: int = 3
+    against: float = -0.5
+
+
+_CONFIG = SignConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,10 +112,10 @@ def grouped(seen: Sequence[Seen], config: GroupingConfig | None = None) -> tuple
 
 def _check_sign(measured: Measured) -> None:
     whole = relative_acceleration(measured)
-    whole = whole.where(measured.excited.holds(whole.frequency) & (whole.coherence >= _RELIABLE))
-    slow = whole.within(0.0, _SLOW)
-    slow = slow.within(0.0, _FIRST * float(slow.frequency.min(initial=_SLOW)))
-    if len(slow.frequency) >= _FEWEST and all(float(np.median(one.response.real / np.abs(one.response))) < _AGAINST
+    whole = whole.where(measured.excited.holds(whole.frequency) & (whole.coherence >= _CONFIG.reliable))
+    slow = whole.within(0.0, _CONFIG.slow)
+    slow = slow.within(0.0, _CONFIG.first * float(slow.frequency.min(initial=_CONFIG.slow)))
+    if len(slow.frequency) >= _CONFIG.fewest and all(float(np.median(one.response.real / np.abs(one.response))) < _CONFIG.against
                                               for one in (slow, whole)):
         first = measured.first
         raise InputRejected("S14", f"joint {measured.joint} accelerates against its input {first.quantity}", where=first.name,
