@@ -173,9 +173,9 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
     begun = [_refined(rows, min(rigid, key=lambda one: one.cost), config)]
     if known_shape is not None:
         free = _linear(rows, known_shape, plain, (None,) * (len(known_shape) // 2))
-        turned = free.gains[1:rows.acceleration.shape[1]] / free.gains[0]
+        ratio = free.gains[1:rows.acceleration.shape[1]] / free.gains[0]
         begun += [_refined(rows, start, config) for start in
-                  (free, _linear(rows, known_shape, plain, (turned,) * (len(known_shape) // 2)))]
+                  (free, _linear(rows, known_shape, plain, (ratio,) * (len(known_shape) // 2)))]
     begun = [one for one in begun if one.passive(most)] or begun[:1]
     best = min(begun, key=lambda one: one.description(rows.independent))
     known = best
@@ -183,7 +183,8 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
     shapes = [np.array([w, np.log(z)]) for z in config.dampings for w in np.arange(low + z, high, 2.0 * z)]
     for _ in range(config.modes - len(known.ratios)):
         starts = []
-        for kind in (known.gains[1:rows.acceleration.shape[1]] / known.gains[0], None):
+        turned = known.gains[1:rows.acceleration.shape[1]] / known.gains[0]
+        for kind in (turned, None) if len(turned) else (None,):
             for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
                 trials = (_linear(rows, np.concatenate([[delay], known.shape[1:], shape]), spread, (*known.ratios, kind))
                           for shape in shapes)
