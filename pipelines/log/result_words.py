@@ -165,8 +165,7 @@ WORDS: Final[dict[str, str]] = {
     "revolute": "whether the joint turns; else it slides", "controller": "control law of the log",
     "detected_odd": "odd distortion that was detected", "expected_from": "what the rigid response is known from",
     "misfit": "how far the fitted response is from the measured one", "damping": "damping, with its unit",
-    "seen_at": "numbers of the responses that show it", "frequencies": "[Hz] the frequency in each posture",
-    "candidates": "what it could be",
+    "seen_at": "numbers of the responses that show it", "candidates": "what it could be",
     # model.json
     "base_parameters": "base parameters of the rigid body", "validity": "range of the logs behind the model", "notes": "remarks",
     "format": "what kind of file this is", "format_version": "version of the format",
