@@ -59,7 +59,7 @@ _EXCITED = {"table": (1,), "planar": (1,), "upright": (1, 2), "scara": (1,), "si
 
 @dataclass(frozen=True)
 class Session:
-    """What is recorded, and how. The numbers of the machine are drawn by its plant from `seed`."""
+    """One recording of an arm; its plant draws the numbers of the machine from `seed`."""
 
     name: str
     plant: str
@@ -73,7 +73,7 @@ class Session:
 
     @property
     def known(self) -> tuple[float, float]:
-        """[Hz] of v as far as modes can be told: up to .3 of the rate."""
+        """Band [Hz] of v up to .3 of the rate, where modes are fitted."""
         return self.band[0], min(self.band[1], 0.3 * self.rate)
 
     def antiresonance(self, rng: np.random.Generator, share: float) -> float:
@@ -269,7 +269,7 @@ def _two_laws(runs: list[Session], two: _Two) -> Callable[..., tuple[Array, Arra
 
 @dataclass(frozen=True, eq=False)
 class _Soft:
-    """An arm in MuJoCo of which a base, or a joint, gives way."""
+    """An arm in MuJoCo with a compliant base or joint."""
 
     model: Any
     places: Array  # of the joints' angles among all
@@ -393,7 +393,7 @@ def _unlike(arm: Arm, model: Any, j: int, rng: np.random.Generator) -> tuple[Arr
 
 def _softened(s: Session, arm: Arm, j: int, inertia: Array,
               rng: np.random.Generator) -> tuple[_Soft, int]:
-    """The arm with what gives way, and steps a sample; `inertia` about its joint in both postures."""
+    """Return the compliant arm and its steps a sample; `inertia` about its joint in both postures."""
     motor = arm.axes[j].rotor
     link, fastest = float(inertia.min()) - motor, 0.0
     spec = arm.spec()

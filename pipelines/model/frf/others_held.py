@@ -93,11 +93,8 @@ class _Fit:
         return max(float(self.rest @ self.rest), 1e-300)
 
     def passive(self, most: Array) -> bool:
-        """Whether bodies like this could exist, and every mode is found: D_jk² ≤ D_jj D_kk with D_kk at most `most` (others,), and
-        b_jm² is positive and no b_km² more than D_kk."""
+        """Whether every mode is found and could exist: b_jm² is positive, and no b_km² is more than D_kk, `most` (others,)."""
         joints, place = len(most) + 1, len(most) + 1
-        if self.gains[0] <= 0.0 or (self.gains[1:joints]**2 > most * self.gains[0]).any():
-            return False
         for ratio in self.ratios:
             size = joints if ratio is None else 1
             own, others = self.gains[place], self.gains[place + 1:place + size]
@@ -176,12 +173,11 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
         ratio = free.gains[1:rows.acceleration.shape[1]] / free.gains[0]
         begun += [_refined(rows, start, config) for start in
                   (free, _linear(rows, known_shape, plain, (ratio,) * (len(known_shape) // 2)))]
-    begun = [one for one in begun if one.passive(most)] or begun[:1]
-    best = min(begun, key=lambda one: one.description(rows.independent))
-    known = best
+    known = begun[0]
+    best = min((one for one in begun if one.passive(most)), key=lambda one: one.description(rows.independent), default=known)
     low, high = np.log(np.abs(rows.s[[0, -1]]))  # a mode is 2 ζ ω wide: as close as that frequencies are tried
     shapes = [np.array([w, np.log(z)]) for z in config.dampings for w in np.arange(low + z, high, 2.0 * z)]
-    for _ in range(config.modes - len(known.ratios)):
+    for _ in range(config.modes):
         starts = []
         turned = known.gains[1:rows.acceleration.shape[1]] / known.gains[0]
         for kind in (turned, None) if len(turned) else (None,):

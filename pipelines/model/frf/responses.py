@@ -47,7 +47,7 @@ class ResponseConfig:
         no_power: of the strongest bin of the source
         folded: of the density of v in its band, near half the rate: it goes on beyond
         coupled: [Hz] from where on friction and gravity of the other joints matter less than their inertia
-        octave: highest over lowest frequency of v from which the inertia is told roughly
+        octave: highest over lowest frequency of v that a rough inertia is taken from
         constant: [Hz] where input and torque are compared
         postures: times that the inertia about a joint grows from one posture to another, at most: it bounds the coupled modes
         density: [s] of the segments that show where v has power, to half a hertz: Hann's window leaks into two bins
