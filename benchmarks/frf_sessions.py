@@ -101,9 +101,9 @@ def main() -> None:
         verdict = judged(session, found)
         for group in ("all", session.plant, f"{session.rate} Hz"):
             tally[group, verdict] += 1
-        for share in (0.25, 1.0):
-            again = Findings(found.seen, (), *grouped(found.seen, GroupingConfig(lost=share)))
-            tally[f"lost {share:g}", judged(session, again)] += 1
+        for share in (1.075, 1.3):
+            again = Findings(found.seen, (), *grouped(found.seen, GroupingConfig(flat=share)))
+            tally[f"flat {share:g}", judged(session, again)] += 1
         print(_line(session, verdict, found, time.process_time() - begun), flush=True)
     for group in dict.fromkeys(group for group, _ in sorted(tally)):
         total = sum(tally[group, v] for v in ("right", "undecided", "wrong"))

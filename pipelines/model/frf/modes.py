@@ -96,7 +96,6 @@ class Modes:
     left: float  # rms of what it leaves, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
-    lost: float = 0.0  # share of the band that v drives in which the response is not known
     slack: float = _CONFIG.held_still  # relative deviation of a frequency that masses and springs are granted
 
 
@@ -151,15 +150,7 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
                  inertia, _friction_below(relative, level), fit.misfit, _left(fit, part),
-                 (float(part.frequency[0]), float(part.frequency[-1])), fit, _lost(measured, band))
-
-
-def _lost(measured: Measured, band: tuple[float, float]) -> float:
-    """Of what v drives of `band` [Hz], the share in which its responses are not known."""
-    low, high = measured.excited.driven
-    low, high = max(low, band[0]), min(high, band[1], _CONFIG.of_rate * measured.first.rate)
-    known = sum(max(min(b, high) - max(a, low), 0.0) for a, b in measured.excited.intervals)
-    return 1.0 - known / max(high - low, 1e-9)
+                 (float(part.frequency[0]), float(part.frequency[-1])), fit)
 
 
 def _fitted(part: FrequencyResponse) -> Rational:
