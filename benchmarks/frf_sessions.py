@@ -30,6 +30,7 @@ from pipelines.model.frf.grouping import GroupingConfig
 __all__ = ["drawn", "interval", "judged", "main"]
 
 RATES = (100, 250, 500, 1000, 2000, 5000)  # [Hz]
+_RUNAWAY = 1.0  # [rad] from the reference: a controller too fast for its rate and a light motor
 BANDS = ((3.0, 80.0), (4.0, 150.0), (2.0, 220.0))  # [Hz] of v, at most .4 of the rate
 
 
@@ -47,7 +48,7 @@ def _draw(seed: int, number: int) -> Session:
         f"{seed}-{number}", plant, KINDS[number // len(PLANTS) % len(KINDS)],
         str(rng.choice(["multisine", "noise", "sweep"])),
         str(rng.choice(["pd", "pd+feedforward", "computed-torque"])), rate,
-        (low, min(high, 0.4 * rate)), float(rng.uniform(3.0, min(8.0, 0.05 * rate))),
+        (low, min(high, 0.4 * rate)), float(rng.uniform(min(3.0, 0.016 * rate), min(8.0, 0.032 * rate))),
         int(rng.integers(1 << 30)))
 
 
@@ -96,6 +97,9 @@ def main() -> None:
     sessions = [s for s in drawn(given.seed, given.count) if not given.only or s.name in given.only]
     tally: Counter[tuple[str, str]] = Counter()
     for session, logs in logs_of(sessions, given.logs):
+        if not max(np.abs(log.q - log["q_ref"]).max() for log in logs) < _RUNAWAY:
+            print(f"{session.name}: the loop is unstable; not counted")
+            continue
         begun = time.process_time()
         found = frf_findings(logs)
         verdict = judged(session, found)
