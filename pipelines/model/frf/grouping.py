@@ -145,6 +145,8 @@ def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: b
                          f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. "
                          "A gap that is crossed, or friction that turns its sign, does so.",
                          "another strength of excitation and a faster turn; else longer")]
+    if not count and 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % within two deviations
+        return [], [_scattered(joint, modes, left, config)]
     if (early := advance(modes, sample_time, held, config)) is not None:
         return [], [_early(joint, modes, early, config)]
     delays, unclear = _delay(joint, modes, sample_time, held, config)
@@ -332,17 +334,20 @@ def _in_all(modes: Sequence[Modes], config: GroupingConfig) -> list[Known]:
     return [first for first in each[0] if all(any(_same(first, one, config) for one in own) for own in each[1:])]
 
 
+def _scattered(joint: int, modes: Sequence[Modes], left: float, config: GroupingConfig) -> Open:
+    low, high = max(m.band[0] for m in modes), min(m.band[1] for m in modes)
+    return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
+                f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about "
+                f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} %, or late, is not known. Noise does "
+                "so, and a gap that is crossed.", "longer, and excited more strongly")
+
+
 def _rigid(joint: int, modes: Sequence[Modes], config: GroupingConfig) -> Finding | Open:
     flat, low, high = max(m.flat for m in modes), max(m.band[0] for m in modes), min(m.band[1] for m in modes)
     if high < config.span * low:
         return Open(joint, None, ("joint_elasticity", "base_resonance"),
                     f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
                     "stronger excitation, to lower and higher frequencies")
-    if 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % of the frequencies are within two deviations
-        return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
-                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about "
-                    f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} % is not known. Noise does so, "
-                    "and a gap that is crossed.", "longer, and excited more strongly")
     if flat < config.flat:
         traces = _in_all(modes, config) if len(modes) > 1 else []
         beside = f" Pairs that nearly cancel recur at {_many(traces)} Hz: of a base, or of another joint." if traces else ""
