@@ -338,8 +338,8 @@ def _scattered(joint: int, modes: Sequence[Modes], left: float, config: Grouping
     low, high = max(m.band[0] for m in modes), min(m.band[1] for m in modes)
     return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
                 f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about "
-                f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} %, or late, is not known. Noise does "
-                "so, and a gap that is crossed.", "longer, and excited more strongly")
+                f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} %, or late, is not known. Noise "
+                "does so, and a gap that is crossed.", "longer, and excited more strongly")
 
 
 def _rigid(joint: int, modes: Sequence[Modes], config: GroupingConfig) -> Finding | Open:
