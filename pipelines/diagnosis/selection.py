@@ -185,7 +185,12 @@ def _contest(
         key: _scores(later, other, other.effects.width - state.effects.width)
         for key, other in others.items()
     }
-    kept = confidence_set(scores | free, config)
+    without = _scores(later, state)
+    better = {k: v for k, v in (scores | free).items() if v.sum() < without.sum()}
+    if not any(one.key in better for one in tried):
+        best = min(scores, key=lambda key: scores[key].sum())
+        return None, (), f"{_place(best)} does not pay on blocks that it was not fitted to"
+    kept = confidence_set(better, config)
     named = [one for one in tried if one.key in kept]
     if not named and (near := _nearly(later, state, tried, others, config)):
         named = [near]
@@ -193,9 +198,8 @@ def _contest(
         best = min(scores, key=lambda key: scores[key].sum())
         return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
     pick = min(named, key=lambda one: scores[one.key].sum())
-    without = _scores(later, state)
     pays = confidence_set({"with": scores[pick.key], "without": without}, config)
-    if scores[pick.key].sum() >= without.sum() or ("without" in pays and not pick.event):
+    if "without" in pays and not pick.event:
         return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
     return pick, tuple(one.key for one in named if one is not pick), ""
 
