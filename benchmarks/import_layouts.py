@@ -216,7 +216,11 @@ def layout_ur_rtde() -> Layout:
         "robot_mode": np.full(SAMPLES, 7.0),
     }
     return Layout(
-        ARM | {"run.csv": table(columns, " ")}, m.t, m.q, m.tau, {"drive.torque_constant": 10.0}
+        ARM | {"run.csv": table(columns, " ")},
+        m.t,
+        m.q,
+        m.tau,
+        {"drive.torque_constant": 10.0, "signals.tau.unit": "A"},
     )
 
 
@@ -230,7 +234,11 @@ def layout_ur_currents_only() -> Layout:
         m.t,
         m.q,
         m.tau,
-        {"drive.torque_constant": 10.0, "robot.use": "robot/arm.urdf"},
+        {
+            "drive.torque_constant": 10.0,
+            "signals.tau.unit": "A",
+            "robot.use": "robot/arm.urdf",
+        },
     )
 
 

@@ -3,8 +3,8 @@
     python -m benchmarks.outside_layouts [NAME ...] [--set formats] [--keep FOLDER]
 
 Every layout of `outside_formats` (ROS, controllers), `outside_formats_2` (drives, tools, files:
-thirty with these), `outside_formats_3` and `_4` (ten made later each) copies a real export after
-its documentation or public source code, and states the right answer beside it. A draft is "right"
+thirty with these), `outside_formats_3` (twenty made later) and `_5` (forty by a stranger) copies a
+real export after its documentation or public source code, and states the right answer beside it. A draft is "right"
 where every field that is filled in is true (with no blank it is also imported, and the log compared with
 the simulated motion), "asks" where a field that it cannot know is blank, "refused" with a remedy,
 or "wrong": a field is filled in that is not true.
@@ -27,7 +27,7 @@ import numpy as np
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("formats", "formats_2", "formats_3", "formats_4")
+SETS = ("formats", "formats_2", "formats_3", "formats_5")
 
 
 @dataclass(frozen=True)
@@ -289,11 +289,14 @@ def unit_of(entry: dict[str, object]) -> str:
 
 def wrong_fields(draft: dict, answer: Answer, run: Run, robot: str | None) -> list[str]:
     """Return every field of a draft that is filled in and is not true."""
-    wrong = []
     use = draft.get("robot", {}).get("use", ASK)
-    if ASK not in use and use.partition(":")[0] != robot:
-        wrong.append(f"robot: {use}")
-    time = draft.get("time", {})
+    wrong = [f"robot: {use}"] if ASK not in use and use.partition(":")[0] != robot else []
+    return wrong + wrong_clock(draft.get("time", {}), answer) + wrong_signals(draft, answer, run)
+
+
+def wrong_clock(time: dict, answer: Answer) -> list[str]:
+    """Return what [time] of a draft holds and is not true."""
+    wrong = []
     column, unit = time.get("column"), time.get("unit", "")
     column = "+".join(column) if isinstance(column, list) else column
     unit = "+".join(unit) if isinstance(unit, list) else unit
@@ -310,6 +313,12 @@ def wrong_fields(draft: dict, answer: Answer, run: Run, robot: str | None) -> li
         answer.rate is None or abs(rate / answer.rate - 1) > 0.02
     ):
         wrong.append(f"rate: {rate}")
+    return wrong
+
+
+def wrong_signals(draft: dict, answer: Answer, run: Run) -> list[str]:
+    """Return what [signals] of a draft holds and is not true."""
+    wrong = []
     for name, entry in draft.get("signals", {}).items():
         if not isinstance(entry, dict):
             continue
@@ -338,16 +347,21 @@ def wrong_values(folder: Path, answer: Answer, run: Run) -> list[str]:
     t = signals["t"] - signals["t"][0]
     step, true = np.median(np.diff(t)), run.t[1] - run.t[0]
     wrong = [] if abs(step / true - 1) < 0.02 else [f"clock: a step of {step:.4g} s"]
-    for name in ("q", "dq", "tau", "q_ref", "current"):
-        if name not in signals:
-            continue
-        accepted = [
-            s.values if s.values is not None else getattr(run, name)
-            for s in answer.right.get(name, ())
-        ]
-        if not any(_same(t, signals[name], run.t - run.t[0], a, name) for a in accepted):
-            wrong.append(f"{name}: not the motion")
-    return wrong
+    names = [name for name in ("q", "dq", "tau", "q_ref", "current") if name in signals]
+    return wrong + [
+        f"{name}: not the motion"
+        for name in names
+        if not _is_motion(name, t, signals[name], answer, run)
+    ]
+
+
+def _is_motion(name: str, t: np.ndarray, values: np.ndarray, answer: Answer, run: Run) -> bool:
+    """Tell whether a signal of a log is what one of the accepted ones holds."""
+    accepted = [
+        s.values if s.values is not None else getattr(run, name)
+        for s in answer.right.get(name, ())
+    ]
+    return any(_same(t, values, run.t - run.t[0], a, name) for a in accepted)
 
 
 def _same(

@@ -24,7 +24,7 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.frf.findings import Findings, frf_findings
-from pipelines.model.frf.grouping import FLAT, advance
+from pipelines.model.frf.grouping import GroupingConfig, advance
 from pipelines.model.frf.modes import BAND
 from pipelines.model.frf.responses import How, Measured
 from pipelines.model.frf.result import Classified, Method, Posture, Undecided, classified, methods_of, posture_of, undecided
@@ -142,7 +142,7 @@ def _complaints(found: Findings, settings: Settings) -> list[Check]:
         own = [seen for seen in found.seen if seen.measured.joint == joint]
         first = own[0].measured.first
         early = advance([seen.modes for seen in own], first.sample_time, first.held)
-        if early is not None and max(seen.modes.flat for seen in own) < FLAT:
+        if early is not None and max(seen.modes.flat for seen in own) < GroupingConfig().flat:
             said.append(Check.of("T06", "warn", f"joint {joint} moves {-1e3 * early.value:.3g} ms before its torque: torque and "
                                  "position have different clocks, or what is faster has folded back (aliasing)",
                                  where=", ".join(_logs_of(seen.measured) for seen in own), gate=True, remedy=_UNFOLDED))

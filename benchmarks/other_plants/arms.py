@@ -90,8 +90,13 @@ class Arm:
 
     def model(self, step: float, gravity: Vector | None = None, scale: float = 1.0, payload: float = 0.0) -> Any:
         """The arm in MuJoCo, Runge-Kutta 4 with steps of `step` [s]; links `scale` times as heavy, `payload` [kg] at the last."""
-        spec = mujoco.MjSpec()
+        spec = self.spec(gravity, scale, payload)
         spec.option.timestep = step
+        return spec.compile()
+
+    def spec(self, gravity: Vector | None = None, scale: float = 1.0, payload: float = 0.0) -> Any:
+        """The same before it is compiled."""
+        spec = mujoco.MjSpec()
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
         spec.option.gravity = self.gravity if gravity is None else gravity
         spec.option.disableflags = int(mujoco.mjtDisableBit.mjDSBL_CONTACT) | int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
@@ -106,7 +111,7 @@ class Arm:
         if payload:
             body.add_body(pos=tuple(2.0 * x for x in self.axes[-1].com), mass=payload, inertia=(1e-4, 1e-4, 1e-4),
                           explicitinertial=True)
-        return spec.compile()
+        return spec
 
 
 _SHOULDER = Axis(0.0, _TURN, 0.0, 7.0, (0.18, 0.01, 0.02), 0.12, 0.8, 2.5, 0.9, home=0.7)

@@ -35,5 +35,5 @@ class DiagnosisConfig:
         0.5  # of the excess residual, that causes have to explain where the rest does not fit
     )
     excess: float = (
-        1.5  # mean square residual of a joint over the baseline's, from which it is too large
+        2.0  # mean square residual of a joint over the baseline's, from which it is too large
     )

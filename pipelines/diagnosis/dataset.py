@@ -114,10 +114,18 @@ class Rows:
         return self.signal(model.torque(self.data))
 
     def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
-        """Return the slopes of the torque by the numbers of the effects, and their names."""
+        """Return the slopes of the torque by the numbers of the effects, and their names.
+
+        At the joint of an effect the shape of the friction law is one of them: fitted without the
+        effect, it has taken some of it.
+        """
         every, names = slopes_of(model, self.data, rigid_rows(self.data, model.columns))
-        first = len(model.beta)
-        places = [k for k, name in enumerate(names) if name[0] == 1]
+        first, joints = len(model.beta), {one.effect.joint for one in model.effects}
+        places = [
+            k
+            for k, (of_effect, place, _) in enumerate(names)
+            if of_effect or model.columns.laws[place].joint in joints
+        ]
         return self.table(every[[first + k for k in places]]), [names[k] for k in places]
 
     def blocks(self, length: float) -> tuple[Indices, ...]:

@@ -153,7 +153,9 @@ class Later:
                 break
         slopes, names = self._slopes(model)
         effects = slopes.scaled(1.0 / _unit(slopes.norms))
-        lasting = np.flatnonzero([model.effects[place].log is None for _, place, _ in names])
+        lasting = np.flatnonzero(
+            [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
+        )
         state = State(model, theta, info, moment, residual, effects, lasting, np.zeros(0))
         return replace(state, losses=self.losses(state))
 

@@ -188,21 +188,26 @@ def _contest(
     config: DiagnosisConfig,
 ) -> tuple[Candidate | None, tuple[Key, ...], str]:
     """Return the winner of the predictive scores and its alternatives, or why nothing wins."""
-    size = np.log(later.rows.count)
-    scores = {one.key: _scores(later, one.state) + _event_price(one, later) for one in tried}
-    free = {key: _scores(later, other) for key, other in others.items()}
-    kept = confidence_set(scores | free, config)
+    scores = {one.key: _scores(later, one.state, one.numbers) for one in tried}
+    free = {
+        key: _scores(later, other, other.effects.width - state.effects.width)
+        for key, other in others.items()
+    }
+    without = _scores(later, state)
+    better = {k: v for k, v in (scores | free).items() if v.sum() < without.sum()}
+    if not any(one.key in better for one in tried):
+        best = min(scores, key=lambda key: scores[key].sum())
+        return None, (), f"{_place(best)} does not pay on blocks that it was not fitted to"
+    kept = confidence_set(better, config)
     named = [one for one in tried if one.key in kept]
     if not named and (near := _nearly(later, state, tried, others, config)):
         named = [near]
     if not named:
         best = min(scores, key=lambda key: scores[key].sum())
         return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
-    pick = min(named, key=lambda one: scores[one.key].sum() + one.numbers * size)  # BIC
-    without = _scores(later, state)
+    pick = min(named, key=lambda one: scores[one.key].sum())
     pays = confidence_set({"with": scores[pick.key], "without": without}, config)
-    saved = float(without.sum() - scores[pick.key].sum())
-    if saved <= 0.0 if pick.event else "without" in pays:
+    if "without" in pays and not pick.event:
         return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
     return pick, tuple(one.key for one in named if one is not pick), ""
 
@@ -355,20 +360,14 @@ def _backward(
     return causes, end
 
 
-def _scores(later: Later, state: State) -> Array:
-    """Return the predictive score of each block, and its share of what the prior says against it.
+def _scores(later: Later, state: State, numbers: int = 0) -> Array:
+    """Return the predictive score of each block, with its share of what the model costs.
 
-    A standing number that is far from the prior predicts other blocks as well as a cause does.
+    A standing number that is far from the prior predicts other blocks as well as a cause does: what
+    the prior says against it is charged, and further numbers as BIC does (Schwarz 1978).
     """
-    against = (state.cost - state.rss) / len(later.block_rows)
-    return log_scores(state.losses, later.block_rows) + against
-
-
-def _event_price(one: Candidate, later: Later) -> float:
-    """Return what the numbers of an event cost a block: their share of BIC."""
-    return (
-        float(one.numbers * np.log(later.rows.count) / len(later.block_rows)) if one.event else 0.0
-    )
+    price = state.cost - state.rss + numbers * np.log(later.rows.count)
+    return np.asarray(log_scores(state.losses, later.block_rows) + price / len(later.block_rows))
 
 
 def _place(key: Key) -> str:

@@ -217,11 +217,14 @@ def with_block_covariance(found: SeparableFit, blocks: npt.NDArray[np.intp]) -> 
 
     Each block enters with the residual that it has when it is left out, (I - H_bb)⁻¹ r_b: CR3, the jackknife over blocks, of Bell
     & McCaffrey 2002, Survey Methodology 28, p. 169. A direction that few blocks decide has a variance of few degrees of freedom,
-    (Σ s²)²/Σ s⁴ by Satterthwaite 1946: it is widened so that two standard deviations cover what those of Student's t do.
+    (Σ s²)²/Σ s⁴ by Satterthwaite 1946: it is widened so that two standard deviations cover what those of Student's t do. One block
+    shows no scatter: `found` is returned as it is.
 
     Args:
         blocks: (m,) number of the block of every row, from 0.
     """
+    if not blocks.any():
+        return found
     scale = np.linalg.norm(found.jacobian, axis=0)
     scale = np.where(scale > _NOTHING, scale, np.inf)
     turn = _root((found.jacobian / scale).T @ (found.jacobian / scale))

@@ -56,7 +56,7 @@ _ALIASES: Final = {"Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "kN
                    "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "N-m": "N m", "1/min": "rpm",
                    "rad/sec": "rad/s",
                    "deg/sec": "deg/s", "Rad": "rad", "RAD": "rad", "Deg": "deg", "DEG": "deg", "msec": "ms", "usec": "us",
-                   "nsec": "ns", "°": "deg", "°/s": "deg/s", "°/s^2": "deg/s^2"}
+                   "nsec": "ns", "Grad": "deg", "Grad/s": "deg/s", "U/min": "rpm", "°": "deg", "°/s": "deg/s", "°/s^2": "deg/s^2"}
 
 
 def canonical_unit(unit: str) -> str:

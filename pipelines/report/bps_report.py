@@ -47,14 +47,28 @@ def _tone(result: Result) -> Tone:
     if result.unresolved or result.physically_consistent is False or error >= _POOR:
         return "bad"
     above, _ = _above_noise(result)
-    return "good" if error < _GOOD and not _worst_joints(result) and above <= _ABOVE_NOISE else "attention"
+    sound = not _worst_joints(result) and not _contradictions(result) and above <= _ABOVE_NOISE
+    return "good" if error < _GOOD and sound else "attention"
+
+
+def _contradictions(result: Result) -> tuple[str, ...]:
+    """What the estimate's own checks say against its parameters or their standard deviations, a sentence each."""
+    found = []
+    if (balance := result.balance) is not None and not balance.agree:
+        found.append(f"The balance of power does not confirm the parameters: χ² {format_number(balance.chi_square, 2)} in "
+                     f"{balance.freedom} degrees of freedom.")
+    moved, name = _settling(result)
+    if moved > ALONE:
+        found.append(f"The two halves of the samples contradict each other: {name} differs by {moved:.1f} standard deviations.")
+    return tuple(found)
 
 
 def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
-    """Joints that the model explains far worse than the whole arm, and their relative error; the worst first."""
+    """Joints that the model explains far worse than the whole arm, and not well, and their relative error; the worst first."""
     pairs = zip(result.torque_rms["validate"], result.torque_signal_rms["validate"], strict=True)
     errors = [left / whole if whole > 0.0 else 0.0 for left, whole in pairs]
-    far = [pair for pair in zip(result.joints, errors, strict=True) if pair[1] > _STANDS_OUT * result.relative_error["validate"]]
+    least = max(_GOOD, _STANDS_OUT * result.relative_error["validate"])
+    far = [pair for pair in zip(result.joints, errors, strict=True) if pair[1] > least]
     return tuple(sorted(far, key=lambda pair: -pair[1]))
 
 
@@ -85,13 +99,14 @@ def _verdict(result: Result) -> str:
     seen = [_seen(p) for p in result.parameters]
     small, error, noise = seen.count("known to be small"), result.relative_error["validate"], _beside_noise(result)
     worst = ", ".join(f"{name} {_percent(own)}" for name, own in _worst_joints(result))
-    sentences = (f"{'The model predicts' if error < _POOR else 'The model does not explain these logs: it predicts'} the torque of "
-                 f"{judged} with an error of {_percent(error)} (rms){f', in single joints more: {worst}' if worst else ''}"
+    below = "" if result.filter_hz is None else f" below {format_number(result.filter_hz, 2)} Hz"
+    sentences = (*(("No links that could exist have these parameters: some would need negative mass or inertia.",)
+                   if result.physically_consistent is False else ()), *_contradictions(result),
+                 f"{'The model predicts' if error < _POOR else 'The model does not explain these logs: it predicts'} the torque of "
+                 f"{judged}{below} with an error of {_percent(error)} (rms){f', in single joints more: {worst}' if worst else ''}"
                  f"{f'; {noise}' if noise else ''}.",
                  f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
-                 f"{f', {small} known to be small' if small else ''}.",
-                 *(("No links that could exist have these parameters: some would need negative mass or inertia.",)
-                   if result.physically_consistent is False else ()), *_together(result))
+                 f"{f', {small} known to be small' if small else ''}.", *_together(result))
     return " ".join(sentences)
 
 
@@ -211,9 +226,10 @@ def _course_section(result: Result) -> Section:
     figures = [torque_figure(f"torque-{c.name}", f"{c.name} ({c.role}): measured torque, the model's, its friction, "
                                                  f"and what is left{passed}.",
                              c.t, c.measured, c.model, c.friction, c.left, result.joints, unit) for c in result.courses]
-    worst = ", ".join(name for name, _ in _worst_joints(result))
-    words = (f"Much is left of {worst}. Where it follows the motion, the model lacks an effect there: drives that are coupled, "
-             "friction that depends on load or position, a column that belongs to another joint.",) if worst else ()
+    worst = ", ".join(f"{name} ({format_number(left['validate'][result.joints.index(name)], 2)} "
+                      f"{result.torque_units[result.joints.index(name)]} rms)" for name, _ in _worst_joints(result))
+    words = (f"More is left than of the others: {worst}. Where it follows the motion, the model lacks an effect there: drives that "
+             "are coupled, friction that depends on load or position, a column that belongs to another joint.",) if worst else ()
     return Section("Torque along the experiment", words, (table,), tuple(figures))
 
 
@@ -242,18 +258,23 @@ def _trust_section(result: Result) -> Section:
                    tuple(tables), (growth,))
 
 
-def _settling_words(result: Result) -> tuple[str, ...]:
-    """Whether the second half of the samples moved the estimates more than noise does: Var(β_n - β_N) = Var β_n - Var β_N."""
+def _settling(result: Result) -> tuple[float, str]:
+    """By how many deviations the second half of the samples moved an estimate, and which: Var(β_n - β_N) = Var β_n - Var β_N."""
     half = len(result.convergence) // 2
     beta, std = (np.asarray(series)[[half, -1]] for series in (result.convergence, result.convergence_std))
     with np.errstate(invalid="ignore", divide="ignore"):
         moved = np.nan_to_num(np.abs(beta[1] - beta[0]) / np.sqrt(np.square(std[0]) - np.square(std[1])), posinf=0.0)
     k = int(np.argmax(moved))
-    if not moved[k] > 0.0:
+    return float(moved[k]), plain(result.parameters[k].name, True)
+
+
+def _settling_words(result: Result) -> tuple[str, ...]:
+    """Whether the second half of the samples moved the estimates more than noise does."""
+    moved, most = _settling(result)
+    if not moved > 0.0:
         return ()
-    most = plain(result.parameters[k].name, True)
-    words = f"The second half of the samples moves {most} most, by {moved[k]:.1f} standard deviations"
-    return (f"{words}; below {ALONE:g} the largest of so many may be chance." if moved[k] < ALONE else
+    words = f"The second half of the samples moves {most} most, by {moved:.1f} standard deviations"
+    return (f"{words}; below {ALONE:g} the largest of so many may be chance." if moved < ALONE else
             f"{words}: more than noise explains. The model lacks something, or it changed during the experiment.",)
 
 

@@ -66,12 +66,20 @@ def _undecided(one: Undecided) -> str:
 def _said(one: Classified) -> str:
     if one.kind == "delay":
         return f"Joint {one.joint} is measured {format_number(1e3 * one.parameters['delay'].value, 3)} ms late."
-    at = f"{with_std(one.frequency.value, one.frequency.std)} Hz" if one.frequency else "an unknown frequency"
-    return f"The base gives way at {at}." if one.kind == "base" else f"Joint {one.joint} gives way at {at}, its motor locked."
+    if one.kind == "base":
+        return f"The base gives way at {_known(one.frequency)} Hz."
+    return f"Joint {one.joint} gives way at {_each(one)} Hz, its motor locked."
+
+
+def _each(one: Classified) -> str:
+    """The frequency of a link in each posture; of a base one for all, for it does not move."""
+    if one.kind == "base" or not one.frequencies:
+        return _known(one.frequency)
+    return " and ".join(dict.fromkeys(map(_known, one.frequencies)))
 
 
 def _key_figures(sure: Sequence[Classified]) -> Table | None:
-    rows = [(_where(one), _known(one.frequency), _known(one.damping), _numbers(one.parameters)) for one in sure if one.cause]
+    rows = [(_where(one), _each(one), _known(one.damping), _numbers(one.parameters)) for one in sure if one.cause]
     return Table(("what gives way", "frequency [Hz]", "damping ratio", "parameters"), tuple(rows)) if rows else None
 
 

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from pipelines.signal.frequency_response import Array, Responses
 
-__all__ = ["BandConfig", "ExcitedBand", "excited_band"]
+__all__ = ["BandConfig", "ExcitedBand", "excited_band", "powered"]
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,6 @@ class ExcitedBand:
     """Where responses exist, lowest interval first; none where the excitation says nothing."""
 
     intervals: tuple[tuple[float, float], ...]  # [Hz]
-    driven: tuple[float, float] = (0.0, 0.0)  # [Hz] from the lowest to the highest frequency where v has power
 
     def holds(self, frequency: Array) -> npt.NDArray[np.bool_]:
         """Return a mask of the `frequency` [Hz] (any shape) that lie in an interval."""
@@ -66,8 +65,8 @@ def excited_band(responses: Responses, density: Array, config: BandConfig | None
         density: of v [unit²/Hz] at their frequencies (bins,).
     """
     config = config or BandConfig()
-    f, total = responses.frequency, float(density.sum())
-    if len(f) < config.fewest or not total > 0.0:
+    f = responses.frequency
+    if len(f) < config.fewest or not float(density.sum()) > 0.0:
         return ExcitedBand(())
     variance = np.diagonal(responses.covariance, axis1=1, axis2=2).real
     with np.errstate(all="ignore"):
@@ -75,11 +74,14 @@ def excited_band(responses: Responses, density: Array, config: BandConfig | None
     first = np.searchsorted(f, f * (1.0 - config.around))
     last = np.searchsorted(f, f * (1.0 + config.around), side="right")
     usual = np.array([np.median(known[a:b]) for a, b in zip(first, last, strict=True)])
-    powered = density > config.power * float(density @ density) / total
-    driven = (float(f[powered][0]), float(f[powered][-1]))
-    good = np.flatnonzero(powered & (usual >= config.known))
+    good = np.flatnonzero(powered(density, config) & (usual >= config.known))
     if not len(good):
-        return ExcitedBand((), driven)
+        return ExcitedBand(())
     widest = np.maximum(config.hole[0] * float(np.median(np.diff(f))), config.hole[1] * f[good[:-1]])
     parts = np.split(good, np.flatnonzero(np.diff(f[good]) > widest) + 1)
-    return ExcitedBand(tuple((float(f[p[0]]), float(f[p[-1]])) for p in parts if len(p) >= config.fewest), driven)
+    return ExcitedBand(tuple((float(f[p[0]]), float(f[p[-1]])) for p in parts if len(p) >= config.fewest))
+
+
+def powered(density: Array, config: BandConfig | None = None) -> npt.NDArray[np.bool_]:
+    """Return a mask of the bins where v has power, from its `density` [unit²/Hz] (bins,), which is not zero throughout."""
+    return np.asarray(density > (config or BandConfig()).power * float(density @ density) / float(density.sum()))

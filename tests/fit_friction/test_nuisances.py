@@ -18,6 +18,7 @@ from pipelines import fit_friction
 from pipelines.fit_friction import Settings
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
+from pipelines.model.friction.misfit import misfits
 from pipelines.model.friction.result import JointResult, Result, Value
 from pipelines.stage import Inputs
 from tests.cli.commands import rrrid
@@ -75,6 +76,8 @@ MACHINES = {
     "rests": replace(draw("rests", 1), seconds=20.0, rests=0.2),
     # a drive that regenerates and does not log it: torque that falls as speed rises
     "regenerating": replace(draw("rests", 1), seed=2, seconds=20.0, rests=0.2, viscous=(-0.4, -0.4), coulomb=(4.0, 4.0)),
+    # its slowest speed first, its fastest last, so that a step is nearly a bend of the curve
+    "ordered": replace(draw("step", 4014), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=11.3, drift=-0.3),
     "step": replace(draw("step", 1), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=9.0, drift=0.3),
 }
 
@@ -85,7 +88,7 @@ def logs() -> dict[str, ExperimentLog]:
     return dict(zip(MACHINES, logs_of(list(MACHINES.values())).values(), strict=True))
 
 
-def computed(log: ExperimentLog, law: str) -> tuple[JointResult, Result]:
+def computed(log: ExperimentLog, law: str | None) -> tuple[JointResult, Result]:
     result = fit_friction.compute(Inputs((Opened(Path("a.h5"), "", log, ()),), label="logs"), Settings(law=law))
     return result.joints[0], result
 
@@ -128,6 +131,31 @@ def test_friction_that_jumps_is_named_with_its_instant(logs: dict[str, Experimen
     speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
     apart = np.abs(np.interp(speed, joint.series.speed, joint.series.curve) - machine.friction(speed))
     assert np.all(apart <= 0.01 * np.abs(machine.friction(speed)))
+
+
+def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve(logs: dict[str, ExperimentLog]) -> None:
+    """A free choice of laws finds the step, and the curve before it beyond the speeds that were driven before."""
+    machine = MACHINES["ordered"]
+    joint, _ = computed(logs["ordered"], None)
+    assert joint.drift is not None
+    assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
+    assert joint.drift.change.value == pytest.approx(-0.3, abs=0.03)
+    assert sure(joint.inertia, machine.inertia)
+    speed = joint.driven[1] * np.array([-0.9, -0.5, 0.5, 0.9])
+    curve, band = (np.interp(speed, joint.series.speed, x) for x in (joint.series.curve, joint.series.band))
+    assert np.all(np.abs(curve - machine.friction(speed)) <= 3.0 * band)
+    assert np.all(band <= 0.05 * np.abs(curve))
+
+
+def test_an_inertia_below_zero_is_remarked(logs: dict[str, ExperimentLog]) -> None:
+    """Of a joint that was driven alone within its deviation, of one among all at any."""
+    joint, _ = computed(logs["rests"], "asymmetric_friction")
+    below = replace(joint, inertia=Value(-0.02, 0.015, "kg m^2"))
+    (check,) = misfits((below,), "logs")
+    assert (check.code, "these logs do not show it" in check.message) == ("RRID-S14", True)
+    among = replace(below, inertia=Value(-0.2, 0.015, "kg m^2"), validation=replace(joint.validation, by=""))
+    assert any("opposite signs" in check.message for check in misfits((among,), "logs"))
+    assert not misfits((joint,), "logs")
 
 
 def test_a_validation_log_at_rest_judges_nothing(logs: dict[str, ExperimentLog]) -> None:

@@ -64,7 +64,11 @@ def test_impossible_links_and_a_balance_that_differs_are_said(result: Result) ->
     apart = tuple(np.full(len(result.balance.apart), 7.0))
     wrong = replace(result, physically_consistent=False, balance=replace(result.balance, agree=False, apart=apart))
     assert bps_report(wrong).tone == "bad"
-    assert "No links that could exist" in bps_report(wrong).verdict
+    assert bps_report(wrong).verdict.startswith("No links that could exist")  # before an error that may be small
+    unconfirmed = bps_report(replace(wrong, physically_consistent=True))
+    assert unconfirmed.tone == "attention"
+    assert unconfirmed.verdict.startswith("The balance of power does not confirm the parameters")
+    assert f"below {result.filter_hz:.2g} Hz with an error" in unconfirmed.verdict
     assert "does not confirm the parameters" in page(wrong)
     assert "or the model lacks an effect" in page(wrong)
     late = replace(wrong, balance=replace(result.balance, agree=False, delay=2e-3, delay_std=1e-5))
@@ -92,8 +96,10 @@ def test_estimates_that_do_not_settle_are_said(result: Result) -> None:
     spread = np.sqrt(np.square(result.convergence_std[half, 2]) - np.square(result.convergence_std[-1, 2]))
     moving = result.convergence.copy()
     moving[half, 2] = moving[-1, 2] + 5.0 * spread
-    assert f"moves {result.parameters[2].name} most, by 5.0 standard deviations: more than noise" in said(
-        replace(result, convergence=moving))
+    contradicted = replace(result, convergence=moving)
+    assert f"moves {result.parameters[2].name} most, by 5.0 standard deviations: more than noise" in said(contradicted)
+    assert bps_report(contradicted).tone == "attention"
+    assert "two halves of the samples contradict each other" in bps_report(contradicted).verdict
 
 
 def test_the_torque_that_is_drawn_is_the_torque_that_was_fitted(result: Result) -> None:

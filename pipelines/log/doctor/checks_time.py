@@ -163,9 +163,10 @@ def lost_samples(s: Subject) -> list[Check]:
     if not time.dropped.size:
         return s.ok("T03", "no sample dropped", signal="t")
     share = 100.0 * time.dropped_samples / (s.log.n_samples + time.dropped_samples)
+    then = "spectra fill them in alike in all channels" if s.log.experiment == "frf" else \
+        "the observer predicts through them, nothing is interpolated"
     return [s.say("T03", "warn",
-                  f"{many(time.dropped_samples, 'sample')} ({share:.2g} %) dropped at {many(time.dropped.size, 'place')}; "
-                  "the observer predicts through them, nothing is interpolated",
+                  f"{many(time.dropped_samples, 'sample')} ({share:.2g} %) dropped at {many(time.dropped.size, 'place')}; {then}",
                   signal="t", sample=int(time.dropped[0]),
                   remedy="give the recorder more priority, or record fewer signals")]
 

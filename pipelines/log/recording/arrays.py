@@ -1,4 +1,4 @@
-"""Read a NumPy file: its header is checked against its size before anything is read, and nothing is ever unpickled."""
+"""Read a NumPy or Parquet file: its header is checked against its size before anything is read, and nothing is unpickled."""
 
 from __future__ import annotations
 
@@ -14,8 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
+from pipelines.log.hdf5 import refuse_oversize
 
-__all__ = ["read_npy", "read_npz"]
+__all__ = ["read_npy", "read_npz", "read_parquet"]
 
 _LONGEST_HEADER = 65_536
 _BUDGET = 4 << 30  # [B]
@@ -70,6 +71,38 @@ def read_npz(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]:
                 found |= {name if field == "column" else f"{name}.{field}": array for field, array in arrays.items()}
     except (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplementedError, RuntimeError, ValueError, struct.error):
         raise InputRejected("F08", "truncated or damaged NPZ archive", where=source, remedy="save or copy it again") from None
+    return found
+
+
+def read_parquet(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]:
+    """The columns of a Parquet table that hold numbers, lists of one length, or dates [s]. Runs in the guarded child.
+
+    Raises:
+        InputRejected: F06 a log of this program, F08 damaged, X06 larger than a recording.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    found: dict[str, npt.NDArray[np.generic]] = {}
+    try:
+        with pq.ParquetFile(io.BytesIO(data), page_checksum_verification=True) as file:
+            if b"rrrid" in (file.schema_arrow.metadata or {}):
+                raise InputRejected("F06", "a log of this program, not a recording", where=source,
+                                    remedy="it needs no import: rrrid inspect reads it")
+            refuse_oversize(8 * file.metadata.num_rows * file.metadata.num_columns, len(data), "X06", source)
+            table = file.read()
+            for name, column in zip(table.column_names, table.columns, strict=True):
+                kind = column.type
+                if pa.types.is_timestamp(kind):
+                    column = pa.compute.divide(column.cast(pa.timestamp("ns")).cast(pa.int64()).cast(pa.float64(), safe=False), 1e9)
+                if pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
+                    found[name] = np.array(column.to_pylist(), dtype=np.float64)
+                elif not pa.types.is_nested(kind):
+                    found[name] = column.to_numpy()
+    except InputRejected:
+        raise
+    except (pa.ArrowException, OSError, ValueError, TypeError, struct.error):
+        raise InputRejected("F08", "truncated or damaged Parquet file", where=source, remedy="save or copy it again") from None
     return found
 
 

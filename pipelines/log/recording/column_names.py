@@ -63,7 +63,7 @@ _QUANTITIES: dict[str, frozenset[str]] = {
 _COMMANDED = _set(
     "cmd command commanded commands des desired ref reference references target targets tgt set "
     "setpoint setpoints sp goal goals soll demand demanded nominal plan planned action actions "
-    "traj trajectory output vorgabe request requested sollwert cmds as"
+    "traj trajectory input output vorgabe request requested sollwert cmds as"
 )
 _MEASURED = _set(
     "meas measured measure measurement msr act actual fb feedback ist real present istwert read "
@@ -72,12 +72,14 @@ _MEASURED = _set(
 # A part of a torque, or what a controller computed: not the torque that moved the joint.
 _PARTIAL = _set(
     "ext external gravity grav friction residual inertia coriolis ff feedforward dist disturbance contact "
-    "collision model modelled est estimate estimated calc calculated computed predicted sim simulated disturb "
+    "collision model modelled calc calculated computed predicted sim simulated disturb "
     "rnea bias observer expected compensation ripple"
 )
+# A computed torque; of a motion, what the drive makes of its encoder: the measurement.
+_ESTIMATED = _set("est estimate estimated")
 _VARIANT = _set("filtered filt filter lp smooth smoothed lowpass hat")
-_MOTOR = _set("motor mot motors rotor drive antrieb")
-_JOINT = _set("joint joints jnt jnts axis axes achse gelenk link actuator actuators servo arm j a")
+_MOTOR = _set("motor mot motors rotor drive antrieb encoder servo")
+_JOINT = _set("joint joints jnt jnts axis axes achse gelenk link actuator actuators arm j a")
 _NOISE = _set(
     "field fields data msg value values val state states robot robots header vector array log record signal "
     "channel ch info feedback_data raw side of the in and ma"
@@ -87,6 +89,7 @@ _COMPOUND = sorted(
     | _COMMANDED
     | _MEASURED
     | _PARTIAL
+    | _ESTIMATED
     | _MOTOR
     | {"joint", "jnt", "axis", "achse", "q"} - {"a", "j"},
     key=len,
@@ -118,7 +121,7 @@ _UNIT_WORDS = {
 _SUFFIX_UNITS = {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
 
 
-_OTHERS = (_COMMANDED, _MEASURED, _PARTIAL, _VARIANT, _MOTOR, _JOINT, _NOISE)
+_OTHERS = (_COMMANDED, _MEASURED, _PARTIAL, _ESTIMATED, _VARIANT, _MOTOR, _JOINT, _NOISE)
 _ROLE_WORDS = frozenset[str]().union(*_OTHERS, {"d", "hat"})
 
 
@@ -231,6 +234,9 @@ def read_name(column: str, unit: str = "") -> ColumnName:
     desired = at is not None and "d" in words[at + 1 :]  # Franka Emika: q_d, tau_J_d
     commanded = bool(held & _COMMANDED) or desired or any(word.startswith("soll") for word in words)
     now = quantity not in ("", "current") and bool(held & {"current", "cur", "curr"})
+    estimated = bool(held & _ESTIMATED)
+    moves = quantity in ("position", "velocity", "acceleration")
+    now = now or (estimated and moves)
     measured = bool(held & _MEASURED) or now or any(word.startswith("ist") for word in words)
     origin: Origin = "commanded" if commanded else "measured" if measured else "plain"
     places = {place for place, _ in nouns}
@@ -252,7 +258,7 @@ def read_name(column: str, unit: str = "") -> ColumnName:
         quantity,
         origin,
         motor,
-        bool(held & _PARTIAL),
+        bool(held & _PARTIAL) or (estimated and not moves),
         bool(held & _VARIANT),
         label,
         role,

@@ -22,6 +22,7 @@ from pipelines.log.units import canonical_unit
 __all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of", "texts_of", "unit_of_group"]
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
+_JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
 
 
 Order = Literal["robot", "numbers", "file", "text"]
@@ -39,6 +40,14 @@ class Group:
     columns: tuple[str, ...]
     order: Order  # text: as columns of text name them, and no robot has these names
     words: str  # the group in words, for comments
+
+    @property
+    def side(self) -> Literal["joint", "motor", "scaled", ""]:
+        """Return the side of the gear that the names state: q is a joint's by convention; learning may scale its data."""
+        if {"observation", "action"} & set(self.words.split()):
+            return "scaled"
+        joint = self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
+        return "motor" if self.motor else "joint" if joint else ""
 
     @property
     def rank(self) -> tuple[int, bool, bool]:

@@ -8,15 +8,19 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 
-__all__ = ["Guess", "Slope", "held", "motion_of", "normalised", "position_unit", "quarter_turns", "rollover", "sign_of",
+__all__ = ["Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
            "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
+Side = Literal["joint", "motor", "scaled", ""]  # of the gear, as far as names say it
+_OPEN_SIDES = {"motor": "named a motor's or an encoder's, whose turns no limit of a joint bounds: rad, deg or rev?",
+               "scaled": "data sets of robot learning also scale positions to -1..1 or -100..100"}
 _RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
 
 
@@ -52,7 +56,7 @@ _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
-_CLEAR = 4.0  # standard errors of a jump of friction
+_FALSE_SIGN = 1e-3  # chance that a recording without friction is given a sign
 
 
 @dataclass(frozen=True)
@@ -99,10 +103,11 @@ def _slope_over(q: Array, summed: Array, width: int) -> Slope | None:
 
 
 def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | None,
-                  joints: Sequence[Joint] = ()) -> tuple[Guess, str]:
+                  joints: Sequence[Joint] = (), side: Side = "joint") -> tuple[Guess, str]:
     """The unit of the positions of turning joints, "" where it stays open, and further keys of the recipe (counts_per_rev, wrap).
 
-    `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot.
+    `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot;
+    `side` is what the names say: only of a joint does its range of motion say anything.
     """
     span = float(np.ptp(q, axis=0).max())
     wrap = rollover(q)
@@ -123,7 +128,10 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
                      "motor side, and these are likely its gear ratios for [drive]"), further
     if _whole(q) and span > 10.0:
         return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
-    return _by_limits(q, t, joints) or _by_size(q, t, span), further
+    far = float(np.abs(q).max())  # neither -1..1 nor, of which it would be 6 %, -100..100
+    if side == "motor" or (side == "scaled" and not 1.0 < far <= 2.0 * math.pi):
+        return Guess("", "unsure", _OPEN_SIDES[side]), further
+    return _by_limits(q, joints, side) or _by_size(q, t, span), further
 
 
 def unknown_unit(named: str) -> Guess:
@@ -138,7 +146,7 @@ def _inside(q: Array, joint: Joint) -> bool:
     return bool(q.min() >= low - slack and q.max() <= high + slack)
 
 
-def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | None:
+def _by_limits(q: Array, joints: Sequence[Joint], side: Side) -> Guess | None:
     """The unit under which the motion keeps the robot's limits."""
     limited = [(j, joint) for j, joint in enumerate(joints) if all(map(math.isfinite, joint.position))]
     if not limited or len(joints) != q.shape[1]:
@@ -151,6 +159,8 @@ def _by_limits(q: Array, t: Array | None, joints: Sequence[Joint]) -> Guess | No
         return _RAD_OR_TURNS
     if inside(1.0):
         return Guess("rad", "likely", f"inside the robot's limits in rad; the largest range is {np.ptp(q, axis=0).max():.3g}")
+    if inside(math.pi / 180.0) and side == "":
+        return Guess("", "unsure", "beyond the robot's limits in rad, inside them in deg: deg, or the motor's side in rad?")
     if inside(math.pi / 180.0):
         return Guess("deg", "likely", "beyond the robot's limits in rad, inside them in deg")
     return Guess("", "unsure", "outside the robot's limits in rad and in deg: motor side, counts, or another robot?")
@@ -169,12 +179,6 @@ def _by_size(q: Array, t: Array | None, span: float) -> Guess:
     if far <= 720.0:
         return Guess("", "unsure", f"up to {far:.4g}: more than a turn in rad, so deg? or the motor's side in rad, then [drive]")
     return Guess("", "unsure", f"up to {far:.5g}: neither an arm's in rad nor in deg; motor side, or counts?")
-
-
-def normalised(q: Array) -> bool:
-    """Tell whether positions may be scaled to their range: within -1..1, or beyond that within -100..100."""
-    far = float(np.abs(q).max())
-    return far <= 1.0 or 2.0 * math.pi < far <= 100.0
 
 
 def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
@@ -262,10 +266,8 @@ def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[f
         return Guess(named, "sure", f"named so; up to {peak:.4g} {named}")
     if named is not None:
         return unknown_unit(named)
-    if current and (_whole(tau) or 60.0 < peak <= 200.0):
-        return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or the drive's own unit?")
     if current:
-        return Guess("mA" if peak > 200.0 else "A", "likely", f"named a current; up to {peak:.4g}")
+        return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or a share of the drive's rated current?")
     if _whole(tau) and peak > 20.0:
         return Guess("", "unsure", f"whole numbers up to {peak:.5g}: the drive's own, such as per mille of the rated torque?")
     use = max((float(p / limit) for p, limit in zip(peaks, limits, strict=False) if math.isfinite(limit)), default=math.nan)
@@ -282,29 +284,50 @@ def sign_of(q: Array, tau: Array) -> Guess:
     """Dry friction turns with the speed: where a joint reverses, its torque jumps the same way, and all else is smooth.
 
     About each reversal, tau = a + b k + c k² + d k³ + F sign(dq); F is positive (Coulomb's law; Armstrong-Hélouvry 1991).
+    Student's test of the mean F of a joint's reversals, at `_FALSE_SIGN` over all joints. A jump that fits better
+    elsewhere than at the reversal is no friction at it: the position leads or lags the torque.
     """
+    from scipy.special import stdtr
+
     half = max(6, len(q) // 200)
-    k = np.linspace(-1.0, 1.0, 2 * half + 1)
+    step = max(1, half // 10)
+    shifts = step * np.arange(-(half // 2 // step), half // 2 // step + 1)
     smooth = np.ones(max(3, half // 2)) / max(3, half // 2)
-    strength = np.zeros(q.shape[1])  # mean jump over its standard error
+    claims = np.zeros(q.shape[1])  # sign of F where it is significant
     for j in range(q.shape[1]):
         speed = np.gradient(np.convolve(q[:, j], smooth, mode="same"))
-        jumps = []
-        for at in np.flatnonzero(speed[half + 1 : -half - 1] * speed[half : -half - 2] < 0) + half + 1:
-            turn = np.sign(speed[at - half : at + half + 1])
-            if (turn[: half - 1] == turn[0]).all() and (turn[half + 2 :] == -turn[0]).all() and turn[0] != 0:
-                columns = np.column_stack([turn, k**0, k, k**2, k**3])
-                jumps.append(np.linalg.lstsq(columns, tau[at - half : at + half + 1, j], rcond=None)[0][0])
-        if len(jumps) > 2:
-            strength[j] = np.mean(jumps) / max(float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps)), 1e-300)
-    wrong = [str(j + 1) for j in np.flatnonzero(strength < -_CLEAR)]
+        jumps, residuals = _jumps(speed, tau[:, j], half, shifts)
+        if len(jumps) < 3 or shifts[np.argmin(residuals)] != 0:
+            continue
+        mean, error = float(np.mean(jumps)), float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps))
+        chance = 2.0 * stdtr(len(jumps) - 1, -abs(mean) / max(error, 1e-300))
+        claims[j] = np.sign(mean) if chance < _FALSE_SIGN / q.shape[1] else 0.0
+    wrong = [str(j + 1) for j in np.flatnonzero(claims < 0)]
     if wrong:
         return Guess("sign = -1?", "likely",
                      f"torque of joint {', '.join(wrong)} jumps against the speed where it reverses, unlike friction: "
                      "add sign = -1 there, unless its transmission is negative")
-    if (strength > _CLEAR).all():
+    if (claims > 0).all():
         return Guess("as recorded", "likely", "sign: torque jumps with the speed where a joint reverses, as friction does")
     return Guess("as recorded", "unsure", "sign: torque and motion do not tell")
+
+
+def _jumps(speed: Array, tau: Array, half: int, shifts: npt.NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return F of each clean reversal, and the squared residual of all with the jump moved by each shift."""
+    k = np.linspace(-1.0, 1.0, 2 * half + 1)
+    jumps, residuals = [], np.zeros(shifts.size)
+    for at in np.flatnonzero(speed[half + 1 : -half - 1] * speed[half : -half - 2] < 0) + half + 1:
+        turn = np.sign(speed[at - half : at + half + 1])
+        if not ((turn[: half - 1] == turn[0]).all() and (turn[half + 2 :] == -turn[0]).all() and turn[0] != 0):
+            continue
+        window = tau[at - half : at + half + 1]
+        for s, shift in enumerate(shifts):
+            columns = np.column_stack([turn[np.clip(np.arange(k.size) - shift, 0, k.size - 1)], k**0, k, k**2, k**3])
+            numbers = np.linalg.lstsq(columns, window, rcond=None)[0]
+            residuals[s] += np.sum((window - columns @ numbers) ** 2)
+            if shift == 0:
+                jumps.append(numbers[0])
+    return np.array(jumps), residuals
 
 
 def motion_of(q: Array, unit: str) -> list[str]:

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
@@ -26,7 +28,6 @@ from pipelines.log.recording.evidence import (
     Slope,
     held,
     motion_of,
-    normalised,
     position_unit,
     quarter_turns,
     sign_of,
@@ -106,6 +107,10 @@ def guess_recipe(path: Path, robot: str | None = None) -> Draft:
 def _sound(table: RawTable) -> RawTable:
     """Leave out what would disturb a guess: rows with a hole or an absurd number, columns of nothing else."""
     usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) for name, values in table.columns.items()}
+    topic = _topic(usable)
+    usable = {name: known[topic] for name, known in usable.items()}
+    table = replace(table, columns={name: values[topic] for name, values in table.columns.items()}, rows=table.rows[topic],
+                    lines=None if table.lines is None else table.lines[topic])
     columns = {name: values for name, values in table.columns.items() if usable[name].mean() > 0.8}
     keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
     if keep.sum() < FEWEST:
@@ -113,6 +118,12 @@ def _sound(table: RawTable) -> RawTable:
                             remedy="give a recording of a motion")
     return replace(table, columns={name: values[keep] for name, values in columns.items()}, rows=table.rows[keep],
                    lines=None if table.lines is None else table.lines[keep])
+
+
+def _topic(usable: Mapping[str, npt.NDArray[np.bool_]]) -> npt.NDArray[np.bool_]:
+    """Return the rows in which most columns hold numbers: a table of several topics leaves the cells of the others empty."""
+    masks = Counter(known.tobytes() for known in usable.values() if known.any())
+    return np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
 
 
 class _Drafting:
@@ -271,9 +282,7 @@ class _Drafting:
             elif self.t is None:
                 slope = None
             joints = [self.joints[j] for j in turning] if self.joints else ()
-            guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints)
-            if not named[turning[0]] and {"observation", "action"} & set(group.words.split()) and normalised(self.q[:, turning]):
-                guess = Guess("", "unsure", "data sets of robot learning also scale positions to -1..1 or -100..100")
+            guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints, group.side)
             for j in turning:
                 said = named[j] or ""
                 units[j] = said if said in UNITS or said == "counts" else guess.value
@@ -338,7 +347,7 @@ class _Drafting:
             guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
         elif choice.group.words == BY_FILE and guess.confidence != "sure":
             guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
-        self.current = guess.value in ("A", "mA")
+        self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
         units = [unit if unit is not None and unit in UNITS else guess.value for unit in named]
         if guess.value == "N m" and self.joints:
             units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]

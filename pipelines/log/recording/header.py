@@ -83,7 +83,7 @@ def find_header(
         return _numbered(width, first, skipped=first)
     plain = {n for n, _ in lines[:first]}
     if len(set(names)) < width:
-        names = _with_spans(names, [(n, line) for n, line, _ in above if n < min(used)], dialect)
+        names = _with_spans(names, [(n, line) for n, line, _ in above], min(used), dialect)
     named, found, again = names_and_units(names)
     found |= {
         name: unit for name, unit in zip(named, units, strict=True) if unit.lower() not in _NO_UNIT
@@ -144,14 +144,20 @@ def _names_above(
                 if rank == 0 and not comment and abs(len(cells) - width) == 1 and _words(cells):
                     odd = number, len(cells)
                 continue
-            if _are_units(fitted) and best is not None:
-                units, unit_line = tuple(cell.strip("[]() ") for cell in fitted), number
-            elif _words([fitted[j] for j in numeric]) or _counted(fitted, numeric):
+            of_units = _are_units(fitted)
+            if of_units:  # "unit" is what the line is called
+                said = [cell.strip("[]() ") for cell in fitted]
+                units = tuple("" if "unit" in cell.lower() else cell for cell in said)
+                unit_line = number
+            if _words([fitted[j] for j in numeric]) or _counted(fitted, numeric):
                 filled = [cell for cell in fitted if cell]
-                key = (int(not comment), -rank, len(filled), len(set(filled)), number)
+                names = len(filled), len(set(filled))
+                key = (int(not of_units), int(not comment), -rank, *names, number)
                 if best is None or key > best[0]:
-                    best, units, unit_line = (key, tuple(fitted), number), ("",) * width, 0
+                    best = key, tuple(fitted), number
             break
+    if best is not None and best[2] == unit_line:
+        units, unit_line = ("",) * width, 0  # the only line of words: these are the names
     if best is None:
         if odd is not None:
             raise InputRejected(
@@ -164,22 +170,29 @@ def _names_above(
     return best[1], units, {best[2], unit_line} - {0}
 
 
-def _with_spans(names: tuple[str, ...], above: Sequence[Line], dialect: Dialect) -> tuple[str, ...]:
-    """Return names that come several times with what the line above says of several columns.
+def _with_spans(
+    names: tuple[str, ...], lines: Sequence[Line], at: int, dialect: Dialect
+) -> tuple[str, ...]:
+    """Return names that come several times, in line `at`, with what another line distinguishes.
 
     "waist", "", "", "elbow", "", "" above Angle, Torque, Speed, …: "waist Angle", "waist Torque", …
+    pandas names the index in a line of its own, the first cell of which alone is filled.
     """
-    for _, line in reversed(above):
+    index, best = "", names
+    for number, line in reversed(lines):
         cells = cells_of(line, dialect.delimiter)
-        if len(cells) != len(names) or "" not in cells or not _words(cells):
+        if number == at or len(cells) != len(names) or not _words(cells):
             continue
-        span = ""
-        spanned = []
+        if number > at and not any(cells[1:]):
+            index = cells[0]
+            continue
+        span, spanned = "", []
         for cell, name in zip(cells, names, strict=True):
             span = cell or span
-            spanned.append(f"{span} {name}".strip())
-        return tuple(spanned)
-    return names
+            spanned.append((f"{name} {cell}" if number > at else f"{span} {name}").strip())
+        if len(set(spanned)) > len(set(best)):
+            best = tuple(spanned)
+    return (index, *best[1:]) if index else best
 
 
 def _fitted(cells: list[str], width: int, rows: Sequence[Sequence[str]]) -> list[str] | None:

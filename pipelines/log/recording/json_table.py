@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,9 +16,9 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
-from pipelines.log.recording.raw import RawTable, columns_of_arrays
+from pipelines.log.recording.raw import RawTable, columns_of_arrays, described, distinct
 
-__all__ = ["is_json", "read_json"]
+__all__ = ["is_json", "read_json", "table_of_frames"]
 
 _LARGEST = 200_000_000  # [bytes]; parsed, JSON takes about ten times its size
 _DEEPEST = 8  # levels of names within a frame
@@ -53,12 +53,11 @@ def read_json(data: bytes, source: str) -> RawTable:
     document = _parsed(data, source)
     frames = _frames(document, _DEEPEST)
     if frames is not None:
-        return _table_of_frames(frames, source)
-    arrays = {
-        name: values
-        for name, value in _named(document, "", _DEEPEST)
-        if (values := _array(value)) is not None
-    }
+        return table_of_frames(frames, source)
+    arrays: dict[str, Array] = {}
+    for name, value in _series(document, "", _DEEPEST):
+        if (values := _array(value)) is not None:
+            arrays[distinct(name, arrays, source)] = values
     if not arrays:
         raise InputRejected(
             "S12",
@@ -106,6 +105,22 @@ def _named(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
         yield path or "column", value
 
 
+def _series(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
+    """Yield (path, value) as `_named` does; samples in an object with a name go by it, with its unit in brackets."""
+    if isinstance(value, list) and depth > 0 and value and all(isinstance(x, dict) for x in value):
+        for k, item in enumerate(value):
+            yield from _series(item, f"{path}[{k}]", depth - 1)
+    elif isinstance(value, dict) and depth > 0:
+        name = described(value)
+        for key, item in value.items():
+            if name and isinstance(item, list):
+                yield name, item
+            else:
+                yield from _series(item, f"{path}.{key}" if path else str(key), depth - 1)
+    elif not isinstance(value, dict):
+        yield path or "column", value
+
+
 def _array(value: Any) -> Array | None:
     if not isinstance(value, list) or len(value) < FEWEST:
         return None
@@ -132,7 +147,7 @@ def _cells(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
                 yield f"{path}[{k}]", path, item
 
 
-def _table_of_frames(frames: list[Mapping[str, Any]], source: str) -> RawTable:
+def table_of_frames(frames: Sequence[Mapping[str, Any]], source: str) -> RawTable:
     columns: dict[str, Array] = {}
     groups: dict[str, list[str]] = {}
     texts: dict[str, list[str]] = {}

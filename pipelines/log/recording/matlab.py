@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
+from pipelines.log.recording.raw import described, distinct, unit_in
 
 __all__ = ["BUDGET", "damaged", "read_mat5", "read_mat73"]
 
@@ -24,7 +25,7 @@ Arrays = dict[str, npt.NDArray[np.generic]]
 
 BUDGET = 4 << 30  # [B] of samples in one file; a ten-minute log of seven joints at 5 kHz has 0.5 GB
 _MOST_MEMBERS = 2000
-_DEEPEST = 4  # levels of structures; Simulink stores q.signals.values
+_DEEPEST = 8  # levels of structures, as in JSON; Isaac Lab has six
 _NUMERIC = ("double", "single", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "logical")
 _HARMLESS = (*_NUMERIC, "char", "cell", "struct", "sparse")
 _DAMAGE = (ValueError, TypeError, IndexError, KeyError, OSError, OverflowError, EOFError, AttributeError, NotImplementedError,
@@ -62,7 +63,8 @@ def read_mat5(data: bytes, source: str) -> Arrays:
     for name in names:
         if name not in loaded:
             raise damaged(source)
-        found |= _opened(name, loaded[name], _DEEPEST)
+        opened = _opened(name, loaded[name], _DEEPEST)
+        found |= {distinct(key, found, source): values for key, values in opened}
     return found
 
 
@@ -81,17 +83,25 @@ def _wanted(listed: list[tuple[str, tuple[int, ...], str]], source: str) -> list
     return names
 
 
-def _opened(name: str, value: Any, depth: int) -> Arrays:
-    """A variable, or the numeric fields of a 1x1 structure and of those within it; cells stay closed."""
+def _opened(name: str, value: Any, depth: int) -> list[tuple[str, npt.NDArray[np.generic]]]:
+    """A variable, or the numeric fields of a structure and of those within it; cells stay closed.
+
+    Structures in an array go by the name that each of them holds: dSPACE's Y(k).Name, Simulink's signals(k).label.
+    """
     if not isinstance(value, np.ndarray):
-        return {}
+        return []
     if value.dtype.names is None:
-        return {name: value} if depth == _DEEPEST or value.dtype.kind in "fiubc" else {}
-    if value.size != 1 or depth == 0:
-        return {}
-    found: Arrays = {}
-    for field in value.dtype.names[:_MOST_MEMBERS]:
-        found |= _opened(f"{name}.{field}", value[field].reshape(-1)[0], depth - 1)
+        return [(name, value)] if depth == _DEEPEST or value.dtype.kind in "fiubc" else []
+    if depth == 0:
+        return []
+    found: list[tuple[str, npt.NDArray[np.generic]]] = []
+    for item in value.reshape(-1)[:_MOST_MEMBERS]:
+        own = described({field: str(item[field].squeeze()) for field in value.dtype.names if item[field].dtype.kind == "U"})
+        if value.size > 1 and not own:
+            return []
+        for field in value.dtype.names[:_MOST_MEMBERS]:
+            samples = own and item[field].dtype.kind in "fiu" and item[field].size > 1
+            found += _opened(own if samples else f"{name}.{field}", item[field], depth - 1)
     return found
 
 
@@ -109,7 +119,7 @@ def read_mat73(path: Path, source: str) -> Arrays:
             declared = sum(dataset.nbytes for dataset in members.values())
             if declared > BUDGET or declared > 1100 * path.stat().st_size + (64 << 20):
                 raise InputRejected("X05", f"declares {declared} bytes of samples", where=source, remedy="split the recording")
-            return {name: _read(dataset) for name, dataset in members.items()}
+            return {name + unit_in(dataset.attrs): _read(dataset) for name, dataset in members.items()}
     except InputRejected:
         raise
     except (*_DAMAGE, UnicodeError):

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import difflib
 import itertools
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
 from pipelines.log.experiment import Array
+from pipelines.log.limits import FEWEST
+from pipelines.log.recording.header import split_unit
 
 __all__ = ["RawTable", "columns_of_arrays", "expand", "unstacked"]
 
@@ -112,48 +116,87 @@ def _wrong_count(table: RawTable, signal: str, have: int, n: int, why: str) -> N
 
 
 def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str) -> RawTable:
-    """A table from named arrays of one or two dimensions (NPY, MAT), time along whichever axis is clearly longer.
+    """A table from named arrays of one or two dimensions (NPY, MAT); the samples are the side that most arrays share.
 
     Raises:
-        InputRejected: S11 where an array can be read both ways, S12 where none holds real numbers.
+        InputRejected: S11 where arrays can be read both ways, S12 where none holds real numbers.
     """
+    text = {name: problem for name, array in arrays.items() if (problem := _not_real(array)) is not None}
+    usable = {name: array for name, array in arrays.items() if name not in text and array.size > 1}
+    samples = _samples_of(usable, source)
     checks: list[Check] = []
     columns: dict[str, Array] = {}
     groups: dict[str, tuple[str, ...]] = {}
-    text: dict[str, str] = {}
-    open_arrays: list[str] = []
-
-    def add(name: str, matrix: npt.NDArray[np.generic]) -> None:
-        names = (name,) if matrix.shape[1] == 1 else tuple(f"{name}_{j + 1}" for j in range(matrix.shape[1]))
-        groups[name] = names
+    units: dict[str, str] = {}
+    for name, array in usable.items():
+        matrix = array[:, None] if array.ndim == 1 else array
+        rows, wide = matrix.shape
+        if samples not in matrix.shape or rows == wide:
+            text[name] = f"an array of shape {array.shape}, " + ("square" if rows == wide else f"not of {samples} samples")
+            continue
+        if (wide if rows == samples else rows) > _WIDEST_MATRIX:
+            continue
+        if rows != samples and rows > 1:
+            checks.append(Check.of("S11", "warn",
+                                   f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}: time along the long side",
+                                   where=source, remedy="store one row a sample"))
+        matrix = matrix if rows == samples else matrix.T
+        short, unit = split_unit(name)
+        names = (short,) if matrix.shape[1] == 1 else tuple(f"{short}_{j + 1}" for j in range(matrix.shape[1]))
+        groups[short] = names
+        units.update(dict.fromkeys(names, unit) if unit else {})
         columns.update((key, np.ascontiguousarray(matrix[:, j], dtype=np.float64)) for j, key in enumerate(names))
-
-    for name, array in arrays.items():
-        if (problem := _not_real(array)) is not None:
-            text[name] = problem
-        elif _either_way(array):
-            open_arrays.append(name)
-        elif (matrix := _upright(name, array, source, checks)) is not None:
-            add(name, matrix)
-    if open_arrays and not columns:
-        first = open_arrays[0]
-        raise InputRejected("S11", f"'{first}' has shape {arrays[first].shape}: which side is time cannot be told", where=source,
-                            remedy="store one row a sample, with many more samples than columns")
-    samples = max(map(len, columns.values()), default=0)
-    for name in open_arrays:  # the others have said how many samples there are
-        array = arrays[name]
-        if samples in array.shape:
-            add(name, array if array.shape[0] == samples else array.T)
-        else:
-            text[name] = f"an array of shape {array.shape}, not of {samples} samples"
     if not columns:
         found = ", ".join(f"{name} ({what})" for name, what in text.items()) or "nothing"
         raise InputRejected("S12", f"no array of real numbers; there is {found}", where=source,
                             remedy="save plain numeric arrays, one row a sample")
-    length = max(len(column) for column in columns.values())
-    for name in [key for key, column in columns.items() if len(column) != length]:
-        text[name] = f"{len(columns.pop(name))} numbers, not {length} samples"
-    return RawTable(source, columns, np.arange(length), groups=groups, text=text, checks=tuple(checks))
+    return RawTable(source, columns, np.arange(samples), units=units, groups=groups, text=text, checks=tuple(checks))
+
+
+def _samples_of(arrays: Mapping[str, npt.NDArray[np.generic]], source: str) -> int:
+    """Return the number of samples: the side that most arrays have, the longer one where two are shared alike.
+
+    Raises:
+        InputRejected: S11, two sides are shared alike, and neither is clearly longer.
+    """
+    shared: Counter[int] = Counter()
+    for array in arrays.values():
+        rows, wide = (array.shape[0], 1) if array.ndim == 1 else array.shape
+        shared.update({n for n, other in ((rows, wide), (wide, rows)) if n > 1 and other <= _WIDEST_MATRIX})
+    enough = {n: count for n, count in shared.items() if n >= FEWEST} or dict(shared)
+    samples = max(enough, key=lambda n: (enough[n], n), default=0)
+    square = [name for name, array in arrays.items() if array.shape == (samples, samples)]
+    alike = square if len(square) == enough.get(samples) else [
+        name for name, array in arrays.items() if samples in array.shape and _either_way(array)
+        and enough.get(sum(array.shape) - samples) == enough[samples]]
+    if alike:
+        raise InputRejected("S11", f"'{alike[0]}' has shape {arrays[alike[0]].shape}: which side is time cannot be told",
+                            where=source, remedy="store one row a sample, with many more samples than columns")
+    return samples
+
+
+def described(record: Mapping[str, Any]) -> str:
+    """Return "hip_angle [rad]" of a record that names its samples and their unit; "" where it has no name."""
+    name = next((value for key, value in record.items() if key.lower() in ("name", "label") and isinstance(value, str)), "")
+    return name[:200] + unit_in(record) if name else ""
+
+
+def distinct(name: str, found: Mapping[str, object], source: str) -> str:
+    """Return a name that is not yet among those found.
+
+    Raises:
+        InputRejected: S03, it is.
+    """
+    if name in found:
+        raise InputRejected("S03", f"two series are both named '{clean(name, 80)}'", where=source,
+                            remedy="rename one of them in the file")
+    return name
+
+
+def unit_in(record: Mapping[str, Any]) -> str:
+    """Return " [rad]" of a record, or of the attributes of an array, with an entry for the unit; "" without one."""
+    unit = next((value for key, value in record.items() if key.lower() in ("unit", "units", "einheit")), "")
+    return f" [{unit}]" if isinstance(unit, str) and 0 < len(unit) <= 20 else ""
 
 
 def _not_real(array: npt.NDArray[np.generic]) -> str | None:
@@ -173,23 +216,6 @@ def _either_way(array: npt.NDArray[np.generic]) -> bool:
         return False
     rows, wide = array.shape
     return not (rows >= 4 * wide or (rows > wide and wide <= 3) or wide >= 4 * rows)
-
-
-def _upright(name: str, array: npt.NDArray[np.generic], source: str, checks: list[Check]) -> npt.NDArray[np.generic] | None:
-    """S11: (samples, columns), or None for a scalar or something too wide to be a signal."""
-    matrix = array[:, None] if array.ndim == 1 else array
-    rows, wide = matrix.shape
-    if matrix.size <= 1:
-        return None
-    if rows > wide:
-        return matrix if wide <= _WIDEST_MATRIX else None
-    if rows > _WIDEST_MATRIX:
-        return None
-    if rows > 1:
-        checks.append(Check.of("S11", "warn",
-                               f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}: time along the long side",
-                               where=source, remedy="store one row a sample"))
-    return matrix.T
 
 
 def unstacked(table: RawTable) -> RawTable:

@@ -124,9 +124,11 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
         if (rest := tuple(c for c in g.columns if c not in used))
     ]
     n = arm.robot.n_joints if arm.robot else None
+    groups = [_without_rest(table, g, n) for g in groups]
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
         q = _unnamed_positions(table, groups, n, q)
+    q = _undisputed(table, q)
     n = n or (len(q.group.columns) if q.group else None)
     unnamed = tuple(
         g
@@ -187,6 +189,29 @@ def _with_file_name(groups: list[Group], path: Path) -> list[Group]:
         return groups
     known = "position" if quantity == "position" else "torque"
     return [replace(g, quantity=known, words=BY_FILE) if g is unnamed[0] else g for g in groups]
+
+
+def _without_rest(table: RawTable, group: Group, n: int | None) -> Group:
+    """Leave out columns behind those of the robot's joints that never change: unused axes, an object that rests."""
+    first, rest = group.columns[:n], group.columns[n:] if n else ()
+    if not rest or any(np.ptp(table.columns[c]) > 0.0 for c in rest) or any(np.ptp(table.columns[c]) == 0.0 for c in first):
+        return group
+    return replace(group, columns=first)
+
+
+def _undisputed(table: RawTable, q: Choice) -> Choice:
+    """Leave positions open beside others that are measured as well and differ by a constant: from which zero?"""
+    if q.group is None:
+        return q
+    x = matrix(table, q.group.columns)
+    for other in q.others:
+        if len(other.columns) != x.shape[1] or other.origin == "commanded" or other.motor != q.group.motor:
+            continue
+        y = matrix(table, other.columns)
+        offset, noise = np.abs(np.median(x - y, axis=0)), np.std(x - y, axis=0)
+        if noise.max() < 0.2 * np.std(x, axis=0).max() and (offset > 5.0 * noise + 1e-3 * np.std(x, axis=0)).any():
+            return Choice(None, (q.group, *q.others))
+    return q
 
 
 def _names_joints(group: Group) -> bool:
@@ -263,7 +288,8 @@ def _blocks(
         if not tau.group and not tau.others:
             tau = Choice(others[0]) if len(others) == 1 else Choice(None, tuple(others))
         return Choice(q), Choice(dq), tau
-    candidates = tuple(_block(part, "") for part in open_blocks)
+    named = tuple(g for g in groups if not g.quantity and len(g.columns) == (arm.robot.n_joints if arm.robot else 0))
+    candidates = named or tuple(_block(part, "") for part in open_blocks)
     return (
         Choice(None, candidates),
         Choice(None),

@@ -1,4 +1,4 @@
-"""Read a recorded file by what it is, not by what it is called: text, JSON, NPY, NPZ, MAT v5 or v7.3."""
+"""Read a recorded file by what it is, not by what it is called: text, JSON, NPY, NPZ, Parquet, MAT v5 or v7.3."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
 from pipelines.log.atomic import fault_of
 from pipelines.log.files import regular_file
 from pipelines.log.guard import Answer, guarded
-from pipelines.log.recording.arrays import read_npy, read_npz
+from pipelines.log.recording.arrays import read_npy, read_npz, read_parquet
 from pipelines.log.recording.dialect import TextFormat
-from pipelines.log.recording.json_table import is_json, read_json
+from pipelines.log.recording.json_table import is_json, read_json, table_of_frames
+from pipelines.log.recording.labelled import yaml_documents
 from pipelines.log.recording.matlab import damaged, read_mat5, read_mat73
 from pipelines.log.recording.raw import RawTable, columns_of_arrays, unstacked
 from pipelines.log.recording.tabular import read_text
@@ -24,11 +25,10 @@ from pipelines.log.recording.tabular import read_text
 __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
-_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "json": (".json", ".jsonl"), "text": (), "mat5": (".mat",),
-            "mat73": (".mat", ".h5", ".hdf5")}
-_REFUSED = ((b"PAR1", "F06", "a Parquet file",
-             "rrrid convert and inspect read logs; import reads CSV, JSON, MAT, NPY and NPZ"),
-            (b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
+_LARGEST_YAML = 200_000_000  # [B], as of JSON
+_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "parquet": (".parquet",), "json": (".json", ".jsonl"), "text": (),
+            "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5")}
+_REFUSED = ((b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
             (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
             (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"))
 
@@ -86,6 +86,8 @@ def _kind(data: bytes, source: str) -> str:
             raise (UsageError if code == "X12" else InputRejected)(code, f"{what}, not a recording", where=source, remedy=remedy)
     if data.startswith(b"\x93NUMPY"):
         return "npy"
+    if data.startswith(b"PAR1"):
+        return "parquet"
     if data[:1] == b"\x80" and data[1:2] in (b"\x02", b"\x03", b"\x04", b"\x05"):
         raise InputRejected("X07", "a pickle, which is never opened", where=source, remedy="save plain numbers as NPY or CSV")
     if data.startswith(b"\x89HDF\r\n\x1a\n") or data.startswith(b"MATLAB 7.3"):
@@ -101,13 +103,19 @@ def _is_mat4(data: bytes, source: str) -> bool:
 
 def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
     if kind == "text":
-        return read_text(data, source, text)
+        documents = yaml_documents(data) if text in (None, TextFormat()) and len(data) <= _LARGEST_YAML else None
+        return read_text(data, source, text) if documents is None else table_of_frames(documents, source)
     if kind == "json":
         return read_json(data, source)
     if kind == "npy":
         return columns_of_arrays(read_npy(data, source), source)
     if kind == "npz":
         return _in_child(lambda: columns_of_arrays(read_npz(data, source), source), path, source)
+    if kind == "parquet":
+        import pyarrow.compute
+        import pyarrow.parquet  # noqa: F401
+
+        return _in_child(lambda: columns_of_arrays(read_parquet(data, source), source), path, source)
     if kind == "mat5":
         import scipy.io  # noqa: F401  imported before the fork, so that every child has it
 
@@ -121,7 +129,8 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
     """The table, read where a crash or a flood of memory costs a child process only."""
     def work() -> Answer:
         table = read()
-        about = {"names": list(table.columns), "text": dict(table.text), "groups": {k: list(v) for k, v in table.groups.items()},
+        about = {"names": list(table.columns), "text": dict(table.text), "units": dict(table.units),
+                 "groups": {k: list(v) for k, v in table.groups.items()},
                  "checks": [check.as_dict() for check in table.checks]}
         return Answer(about, {str(i): values for i, values in enumerate(table.columns.values())})
 
@@ -141,6 +150,6 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
 def _told(answer: Answer, source: str) -> RawTable:
     about = answer.about
     columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
-    return RawTable(source, columns, np.arange(len(next(iter(columns.values())))), text=about["text"],
+    return RawTable(source, columns, np.arange(len(next(iter(columns.values())))), text=about["text"], units=about["units"],
                     groups={key: tuple(names) for key, names in about["groups"].items()},
                     checks=tuple(Check(**check) for check in about["checks"]))

@@ -10,6 +10,7 @@ from __future__ import annotations
 import io
 import re
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,9 @@ from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
 from pipelines.log.recording.header import Header, find_header, names_and_units, without_repeats
+from pipelines.log.recording.labelled import LabelledLines, labelled_lines
 from pipelines.log.recording.raw import RawTable
+from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["TextFormat", "read_text"]
 
@@ -30,6 +33,7 @@ _MOST_JOINTS = 32
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
+_WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
 _FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
 
@@ -41,9 +45,14 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     """
     given = given or TextFormat()
     text, checks = decode(data, source, given.encoding)
+    if '"[' in text and given == TextFormat():  # numpy breaks the lines of an array within its cell
+        parts = text.split('"')
+        text = '"'.join(part.replace("\n", " ") if k % 2 and part[:1] + part[-1:] == "[]" else part for k, part in enumerate(parts))
     lines = lines_of(text, given.comment)
     if not lines:
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy="record again, or copy the file again")
+    if given == TextFormat() and (labelled := labelled_lines(lines)) is not None:
+        return _labelled(labelled, source, checks)
     dialect = find_dialect(lines, source, given)
     if dialect.width > _WIDEST:
         raise InputRejected("F16", f"{dialect.width} cells in a line, {dialect.words}: not a table of columns", where=source,
@@ -69,10 +78,25 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     breaks = tuple(int(i) + 1 for i in np.flatnonzero(np.diff(rows) > 1))
     for name in [name for name, values in columns.items() if name.startswith("column_") and np.isnan(values).all()]:
         del columns[name]  # every line ends in a delimiter
-    clocks = {name: "s" for name in columns if name in labels and labels[name] is None}
-    return RawTable(source, columns, rows, units=units | clocks, text=words, lines=lines_kept, breaks=breaks, checks=tuple(checks),
-                    groups=_numbered(names), labels={name: label for name, label in labels.items() if isinstance(label, str)},
+    in_cells = {name: labels.pop(name) for name in columns if name in labels}
+    return RawTable(source, columns, rows, units={**units, **in_cells}, text=words, lines=lines_kept, breaks=breaks,
+                    checks=tuple(checks), groups=_numbered(names),
+                    labels={name: label for name, label in labels.items() if isinstance(label, str)},
                     cycles={name: label for name, label in labels.items() if isinstance(label, tuple)})
+
+
+def _labelled(found: LabelledLines, source: str, checks: list[Check]) -> RawTable:
+    """F09: lines of another form are left out; they are notes between the samples."""
+    if found.others:
+        checks.append(Check.of("F09", "warn", f"{found.others} lines without the numbers of the others left out", where=source,
+                               remedy="none where these are notes"))
+    body = [(number, "\t".join(row)) for number, row in found.rows]
+    columns, words, wrong, units = _parse(body, Dialect("\t", ".", len(found.names)), found.names, source)
+    keep = np.array([i not in wrong for i in range(len(body))], dtype=bool)
+    lines = np.array([number for number, _ in body], dtype=np.int64)[keep]
+    columns = {name: values[keep] for name, values in columns.items()}
+    return RawTable(source, columns, np.arange(lines.size), text=words, lines=lines,
+                    units={name: units[name] for name in columns if name in units}, checks=tuple(checks))
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
@@ -143,13 +167,13 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
             {name: np.ascontiguousarray(values[keep]) for name, values in columns.items()}, words, labels)
 
 
-_Labels = dict[str, str | tuple[str, ...] | None]
+_Labels = dict[str, Any]
 _Parsed = tuple[dict[str, Array], dict[str, str], dict[int, str], _Labels]
 
 
 def _parse(lines: list[Line], dialect: Dialect, names: tuple[str, ...], source: str) -> _Parsed:
     """Columns of numbers, columns of text with an example, the lines (by index) with a cell that is no number, and labels:
-    the text of a column that never changes, the texts that one goes through, None of a column of clock times."""
+    the text of a column that never changes, the texts that one goes through, the unit behind the numbers of one."""
     # numpy rounds every number correctly; pandas does so only where asked, and newer ones refuse to be asked.
     text = "\n".join(line for _, line in lines)
     try:
@@ -181,8 +205,11 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
         for i in bad:
             _refuse_formulas(lines[i], [cells[i][j]], (name,), source)
         if len(bad) > max(_MOST_DAMAGED, len(cells) // 2) or (bad and len(bad) == len(cells)):
-            if (clock := _clock_times([row[j] for row in cells])) is not None:
-                columns[name], labels[name] = clock, None
+            if (read := _clock_times([row[j] for row in cells]) or _with_units([row[j] for row in cells])) is not None:
+                columns[name], labels[name] = read
+                continue
+            if (arrays := _arrays([row[j] for row in cells])) is not None:
+                columns |= {f"{name}[{k}]": values for k, values in enumerate(arrays.T)}
                 continue
             words[name] = cells[bad[0]][j][:40]
             if (period := _period([row[j] for row in cells])) is not None:
@@ -201,13 +228,31 @@ def _period(cells: list[str]) -> int | None:
     return next((k for k in range(1, min(_MOST_JOINTS, len(cells) // 2) + 1) if cells[k:] == cells[:-k]), None)
 
 
-def _clock_times(cells: list[str]) -> Array | None:
+def _with_units(cells: list[str]) -> tuple[Array, str] | None:
+    """Numbers that have one known unit behind them, as MATLAB writes a duration: "0.004 sec"."""
+    found = [_WITH_UNIT.fullmatch(cell) for cell in cells]
+    units = {m[2] for m in found if m is not None}
+    if not all(found) or len(units) != 1 or (unit := canonical_unit(units.pop())) not in UNITS:
+        return None
+    return np.array([float(m[1]) for m in found if m is not None]), unit
+
+
+def _arrays(cells: list[str]) -> Array | None:
+    """Arrays of one length in the cells of a column, as Python and numpy write them: "[0.1, 0.2]". (cells, length)"""
+    if not all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells):
+        return None
+    rows = [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells]
+    alike = len({len(row) for row in rows}) == 1 and all(is_number(number) for row in rows for number in row)
+    return np.array(rows, dtype=np.float64) if alike else None
+
+
+def _clock_times(cells: list[str]) -> tuple[Array, str] | None:
     """Seconds of the day of texts such as "2024-05-17T11:30:00.125Z" or "11:30:00,125", going on over midnight. [s]"""
     found = [_TIME_OF_DAY.search(cell) for cell in cells]
     if not all(found):
         return None
     seconds = np.array([3600.0 * int(m[1]) + 60.0 * int(m[2]) + float(f"{m[3]}.{m[4] or 0}") for m in found if m is not None])
-    return seconds + 86400.0 * np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -43200.0)])
+    return seconds + 86400.0 * np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -43200.0)]), "s"
 
 
 def _refuse_formulas(line: Line, cells: list[str], names: tuple[str, ...], source: str) -> None:

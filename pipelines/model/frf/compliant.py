@@ -7,6 +7,8 @@ other joints held. Resonances are the modes under no torque, antiresonances thos
 109, p. 310, for the joint).
 
     base alone       f_r = f_b in every posture,   f_a = f_b √(I / (I + J))
+                     A rotor behind a gear turns N times as fast as the joint, and hardly feels the base: of J = J_l + J_m the base
+                     carries J_l,  K = I ω_b²,  ω_a² = K / (I + J_l),  ω_r² = K / (I + J_l J_m / J);  J_m is 0 where it rides along
     joint alone      f_a = √(k / (J - J_m)) / 2π moves with the posture,   f_r / f_a = √(J / J_m)
 """
 
@@ -25,6 +27,7 @@ from pipelines.model.frf.modes import Pair
 __all__ = ["Explained", "explain", "predicted"]
 
 _FLOOR = 1e-3  # relative deviation of a frequency, that of every bin of the fit
+_LEAST_STD = 1e-9  # relative, of an inertia that is exactly known
 _LEAST = 1e-12  # of J: less is lost in the sums of the mass matrix, which is singular then
 
 
@@ -32,34 +35,49 @@ _LEAST = 1e-12  # of J: less is lost in the sums of the mass matrix, which is si
 class Explained:
     """A set of springs fitted to the pairs of all postures."""
 
-    base: tuple[float, float] | None  # f_b [Hz], I [kg m^2]
+    base: tuple[float, float] | None  # f_b [Hz], I [kg m^2]; the base alone has a rotor's share of J as a third number
     joint: tuple[float, float] | None  # k [N m/rad], J_m [kg m^2]
-    std: tuple[float, ...]  # relative, of the numbers above in their order
-    misfit: float  # χ²
+    covariance: Array  # of the logarithms of the numbers above in their order
+    misfit: float  # χ², with the `slack` that frequencies are granted
+    worst: float  # largest relative deviation of a frequency
     freedom: int  # numbers measured less numbers fitted
 
+    @property
+    def std(self) -> tuple[float, ...]:
+        """Relative, of the numbers above in their order."""
+        return tuple(np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).tolist())
 
-def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[float, float] | None) -> tuple[Array, Array]:
-    """Antiresonances and resonances [Hz], sorted, of a joint with `inertia` [kg m^2]; NaN where no such bodies exist."""
+
+def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[float, float] | None,
+              rotor: float = 0.0) -> tuple[Array, Array]:
+    """Antiresonances and resonances [Hz], sorted, of a joint with `inertia` [kg m^2]; NaN where no such bodies exist.
+
+    `rotor` [kg m^2] of it turns behind a gear, and does not ride on the base.
+    """
     f_b, i_b = base or (1.0, 1.0)
     k, motor = joint or (1.0, 0.5 * inertia)
-    link = inertia - motor
-    kept = [i for i, there in enumerate((base is not None, True, joint is not None)) if there]
-    locked = [i for i in kept if i != 1]
-    if not np.isfinite([f_b * f_b * i_b, k, link]).all() or min(link, motor, i_b) <= _LEAST * inertia:
-        return np.full(len(locked), np.nan), np.full(len(locked), np.nan)
-    mass = np.array([[i_b + inertia, inertia, link], [inertia, inertia, link], [link, link, link]])
+    link, rides = inertia - motor, inertia - rotor
+    if not np.isfinite([f_b * f_b * i_b, k, link]).all() or min(link, motor, i_b, rides) <= _LEAST * inertia:
+        none = np.full(int(base is not None) + int(joint is not None), np.nan)
+        return none, none
+    if joint is None:  # K / (I + J_l), K / (I + J_l J_m / J)
+        alone = f_b * np.sqrt([i_b / (i_b + rides), i_b / (i_b + rides * rotor / inertia)])
+        return alone[:1], alone[1:]
+    if base is None:  # k / J_l, k J / (J_l J_m)
+        alone = np.sqrt([k / link, k * inertia / (link * motor)]) / (2.0 * np.pi)
+        return alone[:1], alone[1:]
+    mass = np.array([[i_b + rides, rides, link], [rides, inertia, link], [link, link, link]])
     spring = np.diag([i_b * (2.0 * np.pi * f_b) ** 2, 0.0, k])
 
     def frequencies(rows: list[int]) -> Array:
         values = np.linalg.eigvals(np.linalg.solve(mass[np.ix_(rows, rows)], spring[np.ix_(rows, rows)]))
         return np.sort(np.sqrt(np.maximum(values.real, 0.0))) / (2.0 * np.pi)
 
-    return frequencies(locked), frequencies(kept)[1:]
+    return frequencies([0, 2]), frequencies([0, 1, 2])[1:]
 
 
 def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: bool, joint: bool,
-            slack: float = 0.008, inertia_std: float = 0.0) -> Explained | None:
+            slack: float = 0.008, inertia_std: Sequence[float] = (), lightest: float = 0.5) -> Explained | None:
     """Springs at the base, in the joint or both, that explain the pairs of every posture best; None where counts differ.
 
     Args:
@@ -67,7 +85,8 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
         inertia: J of each posture [kg m^2].
         slack: relative deviation of a frequency that masses and springs are granted: held joints give way a little, and J is
             averaged over a turn.
-        inertia_std: relative, of all J alike: every mass and stiffness is as uncertain.
+        inertia_std: relative, of J in each posture; none: exactly known. J is fitted beside the springs, with this as its prior.
+        lightest: of the mean inertia, what a base alone weighs at least: one of nothing, under a rotor, is a link on a spring.
     """
     springs = int(base) + int(joint)
     if not pairs or springs == 0 or any(len(own) != springs for own in pairs):
@@ -75,21 +94,32 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     measured = np.log([[f.value for kind in _kinds(own) for f in kind] for own in pairs])
     spread = np.array([[np.hypot(f.std / f.value, slack) for kind in _kinds(own) for f in kind] for own in pairs])
 
-    def rest(theta: Array) -> Array:
-        b, k = _taken(theta, base, joint)
-        rows = [np.concatenate(predicted(j, b, k)) for j in inertia]
-        return _known(((np.log(rows) - measured) / spread).ravel())
+    known = np.maximum(inertia_std if len(inertia_std) else np.zeros(len(inertia)), _LEAST_STD)
+    geared = base and not joint
+    numbers = 2 * springs + int(geared)
 
-    found = [least_squares(rest, start) for start in _starts(pairs, inertia, base, joint)]
+    def rest(theta: Array) -> Array:
+        b, k = _taken(theta[:2 * springs], base, joint)
+        rotor = _share(theta[2]) * min(inertia) if geared else 0.0
+        rows = [np.concatenate(predicted(j * float(np.exp(s * off)), b, k, rotor))
+                for j, s, off in zip(inertia, known, theta[numbers:], strict=True)]
+        light = [min(theta[1] - np.log(least), 0.0) / slack] if geared else []
+        return np.concatenate([_known(((np.log(rows) - measured) / spread).ravel()), theta[numbers:], light])
+
+    least = lightest * float(np.mean(inertia))
+    starts = [np.concatenate([start, *([[rotor]] if geared else []), np.zeros(len(inertia))])
+              for start in _starts(pairs, inertia, base, joint) for rotor in ((-4.0, 0.0) if geared else (0.0,))]
+    found = [least_squares(rest, start) for start in starts]
     best = min(found, key=lambda one: float(one.rest @ one.rest))
-    b, k = _taken(best.x, base, joint)
+    b, k = _taken(best.x[:2 * springs], base, joint)
     alone = np.array([[np.hypot(f.std / f.value, _FLOOR) for kind in _kinds(own) for f in kind] for own in pairs])
-    weight = (spread / alone).ravel()  # what is left, not what was granted, says how well the numbers are known
-    jac, left = best.slope * weight[:, None], float(((best.rest * weight) ** 2).sum()) / max(measured.size - len(best.x), 1)
-    covariance = np.linalg.pinv(jac.T @ jac) * max(left, 1.0)
-    scaled = np.array([0.0, inertia_std][2 - 2 * base:] + [inertia_std, inertia_std][2 - 2 * joint:])
-    return Explained(b, k, tuple(np.sqrt(np.maximum(np.diag(covariance), 0.0) + scaled**2).tolist()), float(best.rest @ best.rest),
-                     measured.size - len(best.x))
+    # What is left, not what was granted, says how well the numbers are known.
+    weight = np.concatenate([(spread / alone).ravel(), np.ones(len(inertia) + int(geared))])
+    freedom = measured.size - numbers
+    jac, left = best.slope * weight[:, None], float(((best.rest * weight) ** 2).sum()) / max(freedom, 1)
+    covariance = np.linalg.pinv(jac.T @ jac)[:2 * springs, :2 * springs] * max(left, 1.0)
+    return Explained(b, k, covariance, float(best.rest @ best.rest),
+                     float(np.abs(best.rest[:measured.size] * spread.ravel()).max()), freedom)
 
 
 def _kinds(own: Sequence[Pair]) -> tuple[list[Known], list[Known]]:
@@ -120,3 +150,8 @@ def _starts(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
 def _known(values: Array) -> Array:
     """Bodies that cannot exist are as bad as can be."""
     return np.where(np.isfinite(values), values, 1e3)
+
+
+def _share(x: float) -> float:
+    """0 … .95 of any real number."""
+    return float(0.475 * (1.0 + np.tanh(0.5 * x)))

@@ -22,19 +22,34 @@ from pipelines.errors import InputRejected
 from pipelines.fit.rational import Known
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
+from pipelines.model.frf.grouping import Finding, Gaussian, GroupingConfig, Open, group_joint, seen_elsewhere
 from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
 from pipelines.model.frf.responses import How, Measured, measured_responses
 from pipelines.model.frf.rigid import Expected, expected_rigid
 
-__all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings"]
+__all__ = ["Finding", "Findings", "Gaussian", "Known", "Open", "Seen", "findings_of", "frf_findings", "grouped"]
 
 
-_SLOW = 20.0  # [Hz] up to which friction and delay turn the phase by less than a right angle
-_FIRST = 2.0  # times the lowest excited frequency, up to where the sign is seen first: between two modes the phase is turned round
-_RELIABLE = 0.7  # coherence
-_FEWEST = 3  # bins
-_AGAINST = -0.5  # cosine of the phase: beyond 120°
+@dataclass(frozen=True)
+class SignConfig:
+    """When a joint accelerates against its input.
+
+    Attributes:
+        slow: [Hz] up to which friction and delay turn the phase by less than a right angle
+        first: times the lowest excited frequency, up to where the sign is seen first: between two modes the phase is turned round
+        reliable: coherence
+        fewest: bins
+        against: cosine of the phase: beyond 120°
+    """
+
+    slow: float = 20.0
+    first: float = 2.0
+    reliable: float = 0.7
+    fewest: int = 3
+    against: float = -0.5
+
+
+_CONFIG = SignConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,24 +93,29 @@ def findings_of(measured: Sequence[Measured], arm: Arm | None = None, band: tupl
         _check_sign(one)
     usable = [one for one in measured if tells(one, band)]
     seen = tuple(Seen(one, fitted_modes(one, band), expected_rigid(one, arm)) for one in usable)
+    return Findings(seen, tuple(one for one in measured if not tells(one, band)), *grouped(seen))
+
+
+def grouped(seen: Sequence[Seen], config: GroupingConfig | None = None) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
+    """What is sure, and what is open, from the modes of all joints and postures."""
     sure: list[Finding] = []
     unsure: list[Open] = []
     for joint in sorted({one.measured.joint for one in seen}):
         own = [one for one in seen if one.measured.joint == joint]
         turned = own[0].measured.first
         found, left = group_joint(joint, [one.modes for one in own], turned.sample_time, turned.revolute, turned.held,
-                                  [one.measured.load for one in own])
+                                  [one.measured.load for one in own], config)
         sure += found
         unsure += left
-    return Findings(seen, tuple(one for one in measured if not tells(one, band)), *seen_elsewhere(sure, unsure))
+    return seen_elsewhere(sure, unsure, config)
 
 
 def _check_sign(measured: Measured) -> None:
     whole = relative_acceleration(measured)
-    whole = whole.where(measured.excited.holds(whole.frequency) & (whole.coherence >= _RELIABLE))
-    slow = whole.within(0.0, _SLOW)
-    slow = slow.within(0.0, _FIRST * float(slow.frequency.min(initial=_SLOW)))
-    if len(slow.frequency) >= _FEWEST and all(float(np.median(one.response.real / np.abs(one.response))) < _AGAINST
+    whole = whole.where(measured.excited.holds(whole.frequency) & (whole.coherence >= _CONFIG.reliable))
+    slow = whole.within(0.0, _CONFIG.slow)
+    slow = slow.within(0.0, _CONFIG.first * float(slow.frequency.min(initial=_CONFIG.slow)))
+    if len(slow.frequency) >= _CONFIG.fewest and all(float(np.median(one.response.real / np.abs(one.response))) < _CONFIG.against
                                               for one in (slow, whole)):
         first = measured.first
         raise InputRejected("S14", f"joint {measured.joint} accelerates against its input {first.quantity}", where=first.name,

@@ -3,48 +3,69 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pipelines.fit.rational import Known
+from pipelines.log.experiment import Array
 from pipelines.model.frf.compliant import Explained, explain
 from pipelines.model.frf.modes import Modes, Pair
 
-__all__ = ["FLAT", "Finding", "Open", "advance", "group_joint", "seen_elsewhere"]
-
-_TELLS = 9.0  # χ² by which one explanation must be better: three standard deviations
-_FITS = 4.0  # χ² per number, beyond which an explanation is none
-_HEAVY = 2.0  # rise above which what drops out outweighs the rest: no base does
-_LIGHT = 0.5  # of the arm's inertia: no base weighs less
-FLAT = 1.15  # a ratio of magnitudes below it is flat
-_SPAN = 4.0  # highest over lowest frequency, of a band in which a joint without a mode is called rigid
-_LOST = 0.5  # of the band that v drives: where most of it is not known, nothing is called rigid
-_DELAY = 0.15  # of the sample time: the smallest delay worth a word
-_SURE = 5.0  # standard deviations of it
-_NEAR = 0.03  # two joints show the same base within such a share of its frequency
-_UNFITTED = 10.0  # misfit beyond which no mode of the fit is believed
-_LEFT = 0.02  # of the response, what it may leave all the same: encoder steps that repeat are in no variance
-_TRACE = 1.3  # rise of a pair that may be only a trace of what another joint, or the base, does
-_LOCKED = 0.1  # of the frequency at which a link swings against its locked motor: where it takes the motion of other joints away
-
+__all__ = ["Finding", "GroupingConfig", "Open", "advance", "group_joint", "seen_elsewhere"]
 
 @dataclass(frozen=True)
-class LoadConfig:
-    """When a spring in a joint may be the contact of a gap.
-
-    A gap shows as such only where the load on the joint changes sign; under a steady load its teeth stay in contact, and it answers
-    as a linear spring does, damped by that contact.
+class GroupingConfig:
+    """Numbers that decide what a mode is.
 
     Attributes:
+        tells: χ² by which one explanation must be better: three standard deviations.
+        fits: χ² per number beyond which an explanation is none: two deviations.
+        heavy: rise above which what drops out outweighs the rest, (f_r/f_a)² = 1 + J_dropped/J_left: no base drops out so.
+        light: of the arm's inertia: no base weighs less, or the arm would carry it.
+        moves: ratio of inertias from which postures can tell base from joint: four of the frequencies' `slack` of .8 %.
+        flat: a ratio of magnitudes below it is flat, 1.2 dB: half the step by a motor of a quarter of the inertia. Nothing is
+            called rigid where 95 % of the frequencies are not known to as much. Sensitivity in benchmarks/README.
+        span: highest over lowest frequency, two octaves, of a band in which a joint without a mode is called rigid.
+        delay: of the sample time, the smallest worth a word; the hold alone makes half of one.
+        sure: standard deviations of a delay.
+        near: share of a frequency within which two joints show the same base.
+        misfit: over the variance of noise, beyond which no mode of the fit is believed: F of many bins at 1e-6 is near 2, and
+            variances from few averages are off by as much again.
+        left: of the response, what a misfit may leave all the same: encoder steps that repeat are in no variance.
+        trace: rise of a pair that may be only a trace of what another joint, or the base, does.
+        locked: share of the frequency at which a link swings against its locked motor, within which it takes motion away.
         closed: deviations of the torque by which its mean, less friction, keeps the load on one side: a normal one is beyond for
             one sample in 44, and the describing function of a gap moves by no more.
         contact: damping ratio that teeth in contact have at least, .03 to .17 (Kasuba, Evans 1981, ASME J. Mech. Des. 103); shafts
             have .005 to .075 (Lin, Huston, Coy 1988, NASA TM-100180).
     """
 
+    tells: float = 9.0
+    fits: float = 4.0
+    heavy: float = 2.0
+    light: float = 0.5
+    moves: float = 1.03
+    flat: float = 1.15
+    span: float = 4.0
+    delay: float = 0.15
+    sure: float = 5.0
+    near: float = 0.03
+    misfit: float = 10.0
+    left: float = 0.02
+    trace: float = 1.3
+    locked: float = 0.1
     closed: float = 2.0
     contact: float = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class Gaussian:
+    """Numbers that are known together: prior information of a later fit."""
+
+    names: tuple[str, ...]
+    mean: Array  # (numbers,) SI
+    covariance: Array  # (numbers, numbers)
 
 
 @dataclass(frozen=True)
@@ -61,6 +82,8 @@ class Finding:
     seen_at: tuple[int, ...]  # joints
     faint: bool = False  # its pairs are so small that they may be a trace of what another joint does
     stands: tuple[Known, ...] = ()  # [Hz] of a base: the antiresonance in each posture
+    frequencies: tuple[Known, ...] = ()  # [Hz] what `frequency` is in each posture
+    numbers: Gaussian | None = field(default=None, compare=False)  # `parameters` that follow from no others
 
 
 @dataclass(frozen=True)
@@ -74,14 +97,14 @@ class Open:
     experiment: str  # what to record to tell
 
 
-def advance(modes: Sequence[Modes], sample_time: float, held: bool = True) -> Known | None:
+def advance(modes: Sequence[Modes], sample_time: float, held: bool = True, config: GroupingConfig | None = None) -> Known | None:
     """The delay [s], where it is negative beyond doubt: no position comes before its torque."""
-    mean = _late(modes, sample_time, held)
+    mean = _late(modes, sample_time, held, config or GroupingConfig())
     return mean if mean is not None and mean.value < 0.0 else None
 
 
 def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool = True, held: bool = True,
-                loads: Sequence[float] = ()) -> tuple[list[Finding], list[Open]]:
+                loads: Sequence[float] = (), config: GroupingConfig | None = None) -> tuple[list[Finding], list[Open]]:
     """What the responses of one joint (1-based), one a posture, say together.
 
     Args:
@@ -90,14 +113,15 @@ def group_joint(joint: int, modes: Sequence[Modes], sample_time: float, revolute
         held: whether its input is held from one sample to the next; if it was measured, nobody knows when within a sample.
         loads: mean torque less friction over its deviation, of each posture.
     """
-    found, left = _grouped(joint, modes, sample_time, revolute, held)
-    return _loaded(found, left, loads)
+    config = config or GroupingConfig()
+    found, left = _grouped(joint, modes, sample_time, revolute, held, config)
+    return _loaded(found, left, loads, config)
 
 
-def _loaded(found: list[Finding], left: list[Open], loads: Sequence[float]) -> tuple[list[Finding], list[Open]]:
+def _loaded(found: list[Finding], left: list[Open], loads: Sequence[float],
+            config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
     """A gap answers as a spring does wherever it stays closed, and on average where it is crossed (its describing function: Gelb,
     Vander Velde 1968, ch. 2): no open question leaves it out, and no spring under a steady load that is damped as teeth are."""
-    config = LoadConfig()
     left = [replace(one, candidates=(*one.candidates, "backlash"))
             if "joint_elasticity" in one.candidates and "backlash" not in one.candidates else one for one in left]
     if not loads or min(abs(load) for load in loads) < config.closed:
@@ -113,22 +137,24 @@ def _loaded(found: list[Finding], left: list[Open], loads: Sequence[float]) -> t
     return [one for one in found if one.kind != "joint" or one.joint not in shut], left
 
 
-def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool,
-             held: bool) -> tuple[list[Finding], list[Open]]:
-    if (worst := max((m.misfit for m in modes if m.left > _LEFT), default=0.0)) > _UNFITTED:
+def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool, held: bool,
+             config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
+    count = min(len(m.pairs) for m in modes)
+    if (worst := max((m.misfit for m in modes if m.left > config.left), default=0.0)) > config.misfit:
         return [], [Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
                          f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. "
                          "A gap that is crossed, or friction that turns its sign, does so.",
                          "another strength of excitation and a faster turn; else longer")]
-    if (early := advance(modes, sample_time, held)) is not None:
-        return [], [_early(joint, modes, early)]
-    delays, unclear = _delay(joint, modes, sample_time, held)
-    count = min(len(m.pairs) for m in modes)
+    if not count and 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % within two deviations
+        return [], [_scattered(joint, modes, left, config)]
+    if (early := advance(modes, sample_time, held, config)) is not None:
+        return [], [_early(joint, modes, early, config)]
+    delays, unclear = _delay(joint, modes, sample_time, held, config)
     pairs = [_strongest(m, count) for m in modes]
     unclear += _leftover(joint, modes, count)
-    found, more = _springs(joint, modes, pairs, "kg m²" if revolute else "kg") if count else ([], [])
+    found, more = _springs(joint, modes, pairs, "kg m²" if revolute else "kg", config) if count else ([], [])
     if not (found or more or delays or unclear):
-        still = _rigid(joint, modes)
+        still = _rigid(joint, modes, config)
         found, more = ([still], []) if isinstance(still, Finding) else ([], [still])
     return [*found, *delays], [*more, *unclear]
 
@@ -154,77 +180,83 @@ def _leftover(joint: int, modes: Sequence[Modes], count: int) -> list[Open]:
     return found
 
 
-def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str) -> tuple[list[Finding], list[Open]]:
+def _springs(joint: int, modes: Sequence[Modes], pairs: list[list[Pair]], unit: str,
+             config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
     inertia, slack = [m.inertia.value if m.inertia else float("nan") for m in modes], max(m.slack for m in modes)
-    share = max((m.inertia.std / m.inertia.value for m in modes if m.inertia and m.inertia.value > 0.0), default=0.0)
     if not np.isfinite(inertia).all() or min(inertia) <= 0.0:
         return [], [_open(joint, pairs, "the inertia of the joint could not be measured")]
+    share = [m.inertia.std / m.inertia.value if m.inertia else 0.0 for m in modes]
     if len(pairs[0]) == 1:
-        return _one_spring(joint, pairs, inertia, unit, slack, share)
+        return _one_spring(joint, pairs, inertia, unit, slack, share, config)
     if len(pairs[0]) == 2:
         both = explain(pairs, inertia, True, True, slack, share)
-        if both is not None and len(pairs) > 1 and _accepted(both) and _moves(inertia):
+        if both is not None and len(pairs) > 1 and _accepted(both, config) and _moves(inertia, config):
             words = (f"{_told(pairs, inertia, unit)}. A base and a spring in the joint together explain both pairs in all "
-                     f"{len(pairs)} postures (χ² {both.misfit:.3g} for {both.freedom}).")
-            return [_as_base(both, pairs, words, joint), _as_joint(joint, both, pairs, inertia, words)], []
+                     f"{len(pairs)} postures, within {100.0 * both.worst:.2g} %.")
+            return [_as_base(both, pairs, words, joint, config), _as_joint(joint, both, pairs, inertia, words)], []
         strong = [sorted(own, key=lambda p: -p.rise) for own in pairs]
-        if all(own[0].rise > _HEAVY and own[1].rise < _TRACE for own in strong):
-            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack, share)
+        if all(own[0].rise > config.heavy and own[1].rise < config.trace for own in strong):
+            found, open_ = _one_spring(joint, [[own[0]] for own in strong], inertia, unit, slack, share, config)
             return found, [*open_, _open(joint, [[own[1]] for own in strong], "a small pair beside a large one")]
     return [], [_open(joint, pairs, f"{len(pairs[0])} pairs that no base and joint spring explain together")]
 
 
 def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit: str,
-                slack: float, share: float) -> tuple[list[Finding], list[Open]]:
-    base, spring = (explain(pairs, inertia, *which, slack, share) for which in ((True, False), (False, True)))
+                slack: float, share: Sequence[float], config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
+    base, spring = (explain(pairs, inertia, *which, slack, share, config.light) for which in ((True, False), (False, True)))
     assert base is not None
     assert spring is not None
     told = _told(pairs, inertia, unit)
     rise = float(np.mean([own[0].rise for own in pairs]))
     assert base.base is not None
-    if spring.misfit > base.misfit + _TELLS and _accepted(base):
-        if base.base[1] < _LIGHT * float(np.mean(inertia)):
-            return [], [_open(joint, pairs, f"{told}; it stays as a base's would, but {base.base[1]:.2g} {unit} are too little "
-                              "for a base")]
+    if spring.misfit > base.misfit + config.tells and _accepted(base, config):
         words = (f"{told}. The resonance stays where it is while the inertia changes, with a phase lead between the two: a base of "
-                 f"{base.base[1]:.3g} {unit} explains every frequency (χ² {base.misfit:.2g} for {base.freedom}), a spring in the "
-                 f"joint does not (χ² {spring.misfit:.3g}).")
-        return [_as_base(base, pairs, words, joint)], []
-    if base.misfit > spring.misfit + _TELLS and _accepted(spring):
+                 f"{base.base[1]:.3g} {unit} explains every frequency within {100.0 * base.worst:.2g} %, a spring in the "
+                 f"joint {_within(spring)}.")
+        return [_as_base(base, pairs, words, joint, config)], []
+    if base.misfit > spring.misfit + config.tells and _accepted(spring, config):
         assert spring.joint is not None
         words = (f"{told}. The antiresonance moves with the posture as a link on a spring does. The level above the resonance is "
                  f"{rise:.3g} times that below: 1/J of a motor of {spring.joint[1]:.3g} {unit}. A spring in the joint explains "
-                 f"every frequency (χ² {spring.misfit:.2g} for {spring.freedom}), a base does not (χ² {base.misfit:.3g}).")
+                 f"every frequency within {100.0 * spring.worst:.2g} %, a base {_within(base)}.")
         return [_as_joint(joint, spring, pairs, inertia, words)], []
-    if _accepted(spring) and all(own[0].rise > _HEAVY for own in pairs):
+    if _accepted(spring, config) and all(own[0].rise > config.heavy for own in pairs):
         assert spring.joint is not None
         words = (f"{told}. The postures do not tell base and joint apart, but the level above the resonance is {rise:.3g} times "
                  f"that below: what drops out there outweighs what is left, {spring.joint[1]:.3g} {unit}. That is a link behind a "
                  "spring, not a base lighter than its arm.")
         return [_as_joint(joint, spring, pairs, inertia, words)], []
-    why = "one posture only" if len(pairs) == 1 else "the inertia hardly differs between the postures" if not _moves(inertia) \
-        else f"a base explains it with χ² {base.misfit:.3g}, a spring in the joint with {spring.misfit:.3g} for {base.freedom}"
+    why = "one posture only" if len(pairs) == 1 else \
+        "the inertia hardly differs between the postures" if not _moves(inertia, config) \
+        else f"a base explains it {_within(base)}, a spring in the joint {_within(spring)}"
     return [], [_open(joint, pairs, f"{told}; {why}")]
 
 
-def _accepted(one: Explained) -> bool:
-    return one.misfit <= _TELLS + _FITS * one.freedom
+def _within(one: Explained) -> str:
+    return f"within {100.0 * one.worst:.2g} %" if one.worst < 1.0 else "not at all"
 
 
-def _moves(inertia: Sequence[float]) -> bool:
+def _accepted(one: Explained, config: GroupingConfig) -> bool:
+    return one.misfit <= config.tells + config.fits * one.freedom
+
+
+def _moves(inertia: Sequence[float], config: GroupingConfig) -> bool:
     """Whether postures differ enough in inertia to tell by."""
-    return max(inertia) > 1.03 * min(inertia)
+    return max(inertia) > config.moves * min(inertia)
 
 
-def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int) -> Finding:
+def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int, config: GroupingConfig) -> Finding:
     assert one.base is not None
     frequency, inertia = (Known(v, v * s) for v, s in zip(one.base, one.std[:2], strict=True))
     near = [min(own, key=lambda p: abs(p.resonance.frequency.value - frequency.value)) for own in pairs]
-    measured = _mean([p.resonance.frequency for p in near])
-    damping = _mean([p.resonance.damping for p in near])
-    return Finding("base", None, words, "base_resonance", measured, damping,
-                   {"frequency": measured, "damping_ratio": damping, "inertia": inertia}, (joint,),
-                   max(p.rise for p in near) < _TRACE, tuple(p.antiresonance.frequency for p in near))
+    each = tuple(p.resonance.frequency for p in near)
+    measured, damping = _mean(each), _mean([p.resonance.damping for p in near])
+    together = np.diag([measured.std, damping.std, inertia.std]) ** 2
+    together[0, 2] = together[2, 0] = measured.std * inertia.std * one.covariance[0, 1] / max(one.std[0] * one.std[1], 1e-300)
+    numbers = {"frequency": measured, "damping_ratio": damping, "inertia": inertia}
+    return Finding("base", None, words, "base_resonance", measured, damping, numbers, (joint,),
+                   max(p.rise for p in near) < config.trace, tuple(p.antiresonance.frequency for p in near), each,
+                   Gaussian(tuple(numbers), np.array([v.value for v in numbers.values()]), together))
 
 
 def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list[float], words: str) -> Finding:
@@ -235,14 +267,23 @@ def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list
     near = [min(own, key=lambda p: abs(p.antiresonance.frequency.value - f)) for own, f in zip(pairs, locked, strict=True)]
     damping = _mean([p.antiresonance.damping for p in near])
     d = [2.0 * p.antiresonance.damping.value * np.sqrt(stiffness.value * j) for p, j in zip(near, link, strict=True)]
-    share = float(np.hypot(damping.std / max(abs(damping.value), 1e-9), 0.5 * stiffness.std / stiffness.value))
-    mean_link = float(np.mean(link))
+    value, mean_link = float(np.mean(d)), float(np.mean(link))
+    # d = 2 ζ √(k (J - J_m)): what is known of k and J_m is in d as well.
+    slope = value * np.array([1.0 / max(abs(damping.value), 1e-9), 0.5, -0.5 * motor.value / mean_link])
+    known = np.zeros((3, 3))
+    known[0, 0], known[1:, 1:] = damping.std**2, one.covariance[-2:, -2:]  # of ζ, log k, log J_m
+    to = np.array([[0.0, stiffness.value, 0.0], slope, [0.0, 0.0, motor.value]])
+    together = to @ known @ to.T
     frequency = float(np.sqrt(stiffness.value / mean_link) / (2.0 * np.pi))
+    each = tuple(p.antiresonance.frequency for p in near)
+    scatter = float(np.std([v.value for v in each]))  # it moves with the posture: one number stands for all of them
     return Finding("joint", joint, words, "joint_elasticity",
-                   Known(frequency, frequency * max(p.antiresonance.frequency.std / p.antiresonance.frequency.value for p in near)),
-                   damping, {"stiffness": stiffness, "damping": Known(float(np.mean(d)), float(np.mean(d)) * share),
-                             "frequency": Known(frequency, 0.5 * frequency * stiffness.std / stiffness.value),
-                             "motor_inertia": motor}, (joint,))
+                   Known(frequency, float(np.hypot(scatter, frequency * max(v.std / v.value for v in each)))),
+                   damping, {"stiffness": stiffness, "damping": Known(value, float(np.sqrt(together[1, 1]))),
+                             "frequency": Known(frequency, float(np.hypot(scatter, 0.5 * frequency * one.std[-2]))),
+                             "motor_inertia": motor}, (joint,), frequencies=each,
+                   numbers=Gaussian(("stiffness", "damping", "motor_inertia"),
+                                    np.array([stiffness.value, value, motor.value]), together))
 
 
 def _mean(values: Sequence[Known]) -> Known:
@@ -255,29 +296,30 @@ def _mean(values: Sequence[Known]) -> Known:
     return Known(mean, float(np.sqrt(max(scatter, 1.0) / weight.sum())))
 
 
-def _late(modes: Sequence[Modes], sample_time: float, held: bool) -> Known | None:
+def _late(modes: Sequence[Modes], sample_time: float, held: bool, config: GroupingConfig) -> Known | None:
     """The delay [s], where there is one, of either sign."""
     mean = _mean([m.delay for m in modes])
-    least = (_DELAY if held else 1.0) * sample_time
-    return mean if np.isfinite(mean.value) and abs(mean.value) >= max(least, _SURE * mean.std) else None
+    least = (config.delay if held else 1.0) * sample_time
+    return mean if np.isfinite(mean.value) and abs(mean.value) >= max(least, config.sure * mean.std) else None
 
 
-def _early(joint: int, modes: Sequence[Modes], early: Known) -> Open:
+def _early(joint: int, modes: Sequence[Modes], early: Known, config: GroupingConfig) -> Open:
     flat = max(m.flat for m in modes)
-    other = "" if flat < FLAT else f", or a mode outside the excited band: the magnitude changes by a factor of {flat:.3g}"
-    return Open(joint, None, () if flat < FLAT else ("joint_elasticity", "base_resonance"),
+    other = "" if flat < config.flat else f", or a mode outside the excited band: the magnitude changes by a factor of {flat:.3g}"
+    return Open(joint, None, () if flat < config.flat else ("joint_elasticity", "base_resonance"),
                 f"The phase advances as with {-1e3 * early.value:.3g} ms of time gained. No lag does that: faster motion has "
                 f"folded back (aliasing), or torque and position have different clocks{other}.",
                 "all signals by one clock, at the controller's own rate")
 
 
-def _delay(joint: int, modes: Sequence[Modes], sample_time: float, held: bool) -> tuple[list[Finding], list[Open]]:
-    mean = _late(modes, sample_time, held)
+def _delay(joint: int, modes: Sequence[Modes], sample_time: float, held: bool,
+           config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
+    mean = _late(modes, sample_time, held, config)
     if mean is None:
         return [], []
     each = f"{1e3 * mean.value:.3g} ± {2e3 * mean.std:.2g}"
     flat = max(m.flat for m in modes)
-    if flat < FLAT:
+    if flat < config.flat:
         words = (f"Beside its modes the magnitude is flat within {100.0 * (flat - 1.0):.2g} % and the phase falls in proportion to "
                  f"the frequency: position comes {each} ms late in {_postures(modes)}, beyond hold and controller.")
         return [Finding("delay", joint, words, "time_delay", None, None, {"delay": mean}, (joint,))], []
@@ -286,20 +328,29 @@ def _delay(joint: int, modes: Sequence[Modes], sample_time: float, held: bool) -
                      "the measured motor current beside the command")]
 
 
-def _rigid(joint: int, modes: Sequence[Modes]) -> Finding | Open:
+def _in_all(modes: Sequence[Modes], config: GroupingConfig) -> list[Known]:
+    """Resonances of pairs that nearly cancel, at the same frequency in every posture: one alone is as likely noise."""
+    each = [[m.frequency for m in one.traces if m.kind == "resonance"] for one in modes]
+    return [first for first in each[0] if all(any(_same(first, one, config) for one in own) for own in each[1:])]
+
+
+def _scattered(joint: int, modes: Sequence[Modes], left: float, config: GroupingConfig) -> Open:
+    low, high = max(m.band[0] for m in modes), min(m.band[1] for m in modes)
+    return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
+                f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but the response scatters by {100.0 * left:.2g} % about "
+                f"a linear plant's: whether it is flat within {100.0 * (config.flat - 1.0):.2g} %, or late, is not known. Noise "
+                "does so, and a gap that is crossed.", "longer, and excited more strongly")
+
+
+def _rigid(joint: int, modes: Sequence[Modes], config: GroupingConfig) -> Finding | Open:
     flat, low, high = max(m.flat for m in modes), max(m.band[0] for m in modes), min(m.band[1] for m in modes)
-    if high < _SPAN * low:
+    if high < config.span * low:
         return Open(joint, None, ("joint_elasticity", "base_resonance"),
                     f"No mode is distinct from {low:.3g} to {high:.3g} Hz; more than that the excitation does not tell.",
                     "stronger excitation, to lower and higher frequencies")
-    if (lost := max(m.lost for m in modes)) > _LOST:
-        return Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
-                    f"No mode is distinct from {low:.3g} to {high:.3g} Hz, but {100.0 * lost:.2g} % of the band that v drives "
-                    "gives no response that is known: noise hides it, or the plant is not linear there.",
-                    "stronger excitation; and another strength, should the response change with it")
-    if flat < FLAT:
-        traces = [m.frequency for one in modes for m in one.traces if m.kind == "resonance"]
-        beside = f" A pair that nearly cancels leaves a trace at {_many(traces)} Hz: base or another joint." if traces else ""
+    if flat < config.flat:
+        traces = _in_all(modes, config) if len(modes) > 1 else []
+        beside = f" Pairs that nearly cancel recur at {_many(traces)} Hz: of a base, or of another joint." if traces else ""
         words = (f"No {'distinct ' if traces else ''}mode from {low:.3g} to {high:.3g} Hz in {_postures(modes)}: the acceleration "
                  f"per input is flat within {100.0 * (flat - 1.0):.2g} %, without delay.{beside}")
         return Finding("rigid", joint, words, None, None, None, {}, (joint,))
@@ -330,19 +381,21 @@ def _many(values: Sequence[Known]) -> str:
     return ", ".join(f"{v.value:.4g}" for v in values)
 
 
-def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
+def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open],
+                   config: GroupingConfig | None = None) -> tuple[tuple[Finding, ...], tuple[Open, ...]]:
     """Where the base is known, what other joints show at its frequency is the base as well.
 
     A base turns under the first joint before any other. What shows at one further joint alone, while another bends on a spring, may
     be that spring, where it is faint or stands still where that spring would make it: its link swings against a motor that its own
     controller, or friction, holds, and takes the motion away (a tuned absorber: Den Hartog 1934, chapter III).
     """
+    config = config or GroupingConfig()
     rest = [one for one in sure if one.kind != "base"]
     bent = [one for one in rest if one.kind == "joint"]
     bases = [one for one in sure if one.kind == "base"]
     merged: list[Finding] = []
     for one in bases:
-        same = next((k for k, m in enumerate(merged) if _same(m.frequency, one.frequency)), None)
+        same = next((k for k, m in enumerate(merged) if _same(m.frequency, one.frequency, config)), None)
         if same is None:
             merged.append(one)
         else:
@@ -351,13 +404,13 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
     left = []
     for one in [one for one in merged if len(one.seen_at) == 1 and one.seen_at != (1,)]:
         others = [other for other in bent if other.joint != one.seen_at[0]]  # at its own joint a spring has a pair of its own
-        springs = [*(other for other in others if _absorbed(one, other)), *(others if one.faint else ())]
+        springs = [*(other for other in others if _absorbed(one, other, config)), *(others if one.faint else ())]
         if springs:
             merged.remove(one)
             left.append(_trace(one, springs[0]))
     for question in unsure:
         place = next((k for k, m in enumerate(merged) if "base_resonance" in question.candidates
-                      and _same(m.frequency, question.frequency)), None)
+                      and _same(m.frequency, question.frequency, config)), None)
         if place is None:
             left.append(question)
         elif question.joint not in merged[place].seen_at:
@@ -365,10 +418,11 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open]) -> tuple[tup
     return (*merged, *rest), tuple(left)
 
 
-def _absorbed(base: Finding, spring: Finding) -> bool:
+def _absorbed(base: Finding, spring: Finding, config: GroupingConfig) -> bool:
     """Whether all that stands still for the base does so where the link behind the spring would swing."""
     own = spring.frequency
-    return own is not None and bool(base.stands) and all(abs(one.value - own.value) < _LOCKED * own.value for one in base.stands)
+    return own is not None and bool(base.stands) and \
+        all(abs(one.value - own.value) < config.locked * own.value for one in base.stands)
 
 
 def _trace(base: Finding, spring: Finding) -> Open:
@@ -379,5 +433,5 @@ def _trace(base: Finding, spring: Finding) -> Open:
                 f"joint {spring.joint} made firm, or its brake closed, then joint {joint} again")
 
 
-def _same(a: Known | None, b: Known | None) -> bool:
-    return a is not None and b is not None and abs(a.value - b.value) < _NEAR * a.value
+def _same(a: Known | None, b: Known | None, config: GroupingConfig) -> bool:
+    return a is not None and b is not None and abs(a.value - b.value) < config.near * a.value

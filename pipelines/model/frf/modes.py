@@ -25,23 +25,44 @@ from pipelines.signal.frequency_response import FrequencyResponse
 __all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration", "tells"]
 
 BAND = (4.0, 250.0)  # [Hz] below it friction and gravity are at work, above it hardly any log has signal
-_OF_RATE = 0.3  # highest, of the rate
-_STIFFEST = 0.35  # damping ratio beyond which a pair is no mode
-_SURE = 0.05  # relative std of a frequency that is known at all
-# Relative std of a damping beside noise: the slope of friction, the joint's and that of held joints, depends on how far the speed
-# swings. On the bench, with swings of a tenth of the turn, it changes damping by 2 to 6 %.
-_BY_FRICTION = 0.03
-_STRAIGHT = (8.0, 150.0)  # [Hz] over which level and delay are taken
-_FLOOR = 1e-3  # relative deviation that every bin has at least
-_FEWEST = 12  # bins
-_STUCK = 3.0  # misfit that a search which found the modes hardly leaves
-_SEEN = 3.0  # standard deviations of its damping that a trace is more than nothing
-_LONGEST = 0.05  # [s] no delay is longer
-_FRICTION = 0.1  # of the magnitude, what friction has to change to be said
 
 
-# Relative deviation of a frequency that masses and springs are granted: held joints give way a little, J is averaged over a turn.
-HELD_STILL = 0.008
+@dataclass(frozen=True)
+class ModesConfig:
+    """Numbers of the modes.
+
+    Attributes:
+        of_rate: highest frequency of a mode, of the rate
+        stiffest: damping ratio beyond which a pair is no mode
+        sure: relative std of a frequency that is known at all
+        by_friction: relative std of a damping beside noise: the slope of friction, the joint's and that of held joints, depends on
+            how far the speed swings. On the bench, with swings of a tenth of the turn, it changes damping by 2 to 6 %
+        straight: [Hz] over which level and delay are taken
+        floor: relative deviation that every bin has at least
+        fewest: bins
+        stuck: misfit that a search which found the modes hardly leaves
+        seen: standard deviations of its damping that a trace is more than nothing
+        longest: [s] no delay is longer
+        friction: of the magnitude, what friction has to change to be said
+        held_still: relative deviation of a frequency that masses and springs are granted: held joints give way a little, and J is
+            averaged over a turn
+    """
+
+    of_rate: float = 0.3
+    stiffest: float = 0.35
+    sure: float = 0.05
+    by_friction: float = 0.03
+    straight: tuple[float, float] = (8.0, 150.0)
+    floor: float = 1e-3
+    fewest: int = 12
+    stuck: float = 3.0
+    seen: float = 3.0
+    longest: float = 0.05
+    friction: float = 0.1
+    held_still: float = 0.008
+
+
+_CONFIG = ModesConfig()
 
 
 @dataclass(frozen=True)
@@ -75,8 +96,7 @@ class Modes:
     left: float  # rms of what it leaves, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
-    lost: float = 0.0  # share of the band that v drives in which the response is not known
-    slack: float = HELD_STILL  # relative deviation of a frequency that masses and springs are granted
+    slack: float = _CONFIG.held_still  # relative deviation of a frequency that masses and springs are granted
 
 
 def relative_acceleration(measured: Measured, response: FrequencyResponse | None = None) -> FrequencyResponse:
@@ -101,7 +121,7 @@ def tells(measured: Measured, band: tuple[float, float] = BAND) -> bool:
 
 def _in_band(measured: Measured, response: FrequencyResponse, band: tuple[float, float]) -> FrequencyResponse:
     """What is excited of `band` [Hz], and sampled well enough."""
-    inside = response.within(band[0], min(band[1], _OF_RATE * measured.first.rate))
+    inside = response.within(band[0], min(band[1], _CONFIG.of_rate * measured.first.rate))
     return inside.where(measured.excited.holds(inside.frequency))
 
 
@@ -119,26 +139,18 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     modes = tuple(_with_friction(to) for m, to in moving if _is_mode(m))
     traces = tuple(_with_friction(to) for m, to in moving if not m.distinct and _is_trace(m))
     pairs, single = _paired(modes)
-    rest = relative.times(1.0 / _carried(modes, relative.frequency))
+    rest = part.times(1.0 / _carried(modes, part.frequency))
     level, delay = _level_and_delay(rest)
     rise = float(np.prod([p.rise for p in pairs])) if pairs else 1.0
     above = Known(level.value * rise, float(np.hypot(level.std * rise, level.value * rise * _rise_std(pairs))))
     ratio = measured.torque_per_input
     inertia = None if ratio is None else Known(ratio / level.value, abs(ratio / level.value) *
                                                float(np.hypot(level.std / level.value, _level_drawn(measured))))
-    smooth = np.arange(_STRAIGHT[0], min(_STRAIGHT[1], part.frequency[-1]), 1.0)
+    smooth = np.arange(_CONFIG.straight[0], min(_CONFIG.straight[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
                  inertia, _friction_below(relative, level), fit.misfit, _left(fit, part),
-                 (float(part.frequency[0]), float(part.frequency[-1])), fit, _lost(measured, band))
-
-
-def _lost(measured: Measured, band: tuple[float, float]) -> float:
-    """Of what v drives of `band` [Hz], the share in which its responses are not known."""
-    low, high = measured.excited.driven
-    low, high = max(low, band[0]), min(high, band[1], _OF_RATE * measured.first.rate)
-    known = sum(max(min(b, high) - max(a, low), 0.0) for a, b in measured.excited.intervals)
-    return 1.0 - known / max(high - low, 1e-9)
+                 (float(part.frequency[0]), float(part.frequency[-1])), fit)
 
 
 def _fitted(part: FrequencyResponse) -> Rational:
@@ -148,11 +160,11 @@ def _fitted(part: FrequencyResponse) -> Rational:
                             with_delay=with_delay)
 
     first = fit(True)
-    return first if first.misfit < _STUCK else min(first, fit(False), key=lambda one: one.description)
+    return first if first.misfit < _CONFIG.stuck else min(first, fit(False), key=lambda one: one.description)
 
 
 def _left(fit: Rational, part: FrequencyResponse) -> float:
-    inside = part.within(*_STRAIGHT)
+    inside = part.within(*_CONFIG.straight)
     return float(np.sqrt(np.mean(np.abs(inside.response / fit.response(inside.frequency) - 1.0) ** 2)))
 
 
@@ -172,11 +184,11 @@ def _level_and_delay(rest: FrequencyResponse) -> tuple[Known, Known]:
 
     Deviations hold what scatters in fact, were that more than the noise.
     """
-    part = rest.within(*_STRAIGHT)
-    relative = np.maximum(part.variance / 2.0 / np.abs(part.response) ** 2, _FLOOR**2)
+    part = rest.within(*_CONFIG.straight)
+    relative = np.maximum(part.variance / 2.0 / np.abs(part.response) ** 2, _CONFIG.floor**2)
     good = np.isfinite(relative) & (relative < 0.1)
     weight, omega = 1.0 / relative[good], 2.0 * np.pi * part.frequency[good]
-    if good.sum() < _FEWEST:
+    if good.sum() < _CONFIG.fewest:
         return Known(float(np.median(np.abs(rest.response))), np.inf), Known(0.0, np.inf)
     rough = _rough_delay(part.response[good], weight, omega)
     straight = part.response[good] * np.exp(1j * omega * rough)
@@ -193,14 +205,14 @@ def _level_drawn(measured: Measured) -> float:
     if measured.held is None:
         return 0.0
     f = measured.held.response.frequency
-    inside = (f >= _STRAIGHT[0]) & (f <= _STRAIGHT[1])
+    inside = (f >= _CONFIG.straight[0]) & (f <= _CONFIG.straight[1])
     ratio = np.abs(measured.held.draws[:, inside] / measured.held.response.response[inside])
     return float(np.log(ratio).mean(axis=1).std()) if inside.any() else 0.0
 
 
 def _rough_delay(response: Complex, weight: Array, omega: Array) -> float:
     """The delay [s] that lays all phases on zero best: no phase has to be unwrapped then."""
-    tried = np.arange(-_LONGEST, _LONGEST, 0.5 / float(omega.max()))
+    tried = np.arange(-_CONFIG.longest, _CONFIG.longest, 0.5 / float(omega.max()))
     unit = weight * response / np.abs(response)
     return float(tried[np.argmax((np.exp(1j * np.outer(tried, omega)) @ unit).real)])
 
@@ -218,11 +230,11 @@ def _weighted(columns: Array, y: Array, weight: Array, correlated: float) -> tup
 def _is_mode(mode: Mode) -> bool:
     """One that is known."""
     f, damping = mode.frequency, mode.damping.value
-    return mode.distinct and damping < _STIFFEST and f.std < _SURE * f.value
+    return mode.distinct and damping < _CONFIG.stiffest and f.std < _CONFIG.sure * f.value
 
 
 def _is_trace(mode: Mode) -> bool:
-    return _is_mode(replace(mode, distinct=True)) and mode.damping.value > _SEEN * mode.damping.std
+    return _is_mode(replace(mode, distinct=True)) and mode.damping.value > _CONFIG.seen * mode.damping.std
 
 
 def _moving(measured: Measured, part: FrequencyResponse, fit: Rational) -> list[tuple[Mode, Mode]]:
@@ -254,7 +266,7 @@ def _wider(modes: tuple[Mode, ...], parts: tuple[Mode, ...], mean: tuple[Mode, .
 def _with_friction(mode: Mode) -> Mode:
     """Its damping as uncertain as friction makes it, beside the noise."""
     d = mode.damping
-    return replace(mode, damping=Known(d.value, float(np.hypot(d.std, _BY_FRICTION * abs(d.value)))))
+    return replace(mode, damping=Known(d.value, float(np.hypot(d.std, _CONFIG.by_friction * abs(d.value)))))
 
 
 def _paired(modes: tuple[Mode, ...]) -> tuple[tuple[Pair, ...], tuple[Mode, ...]]:
@@ -280,6 +292,6 @@ def _rise_std(pairs: tuple[Pair, ...]) -> float:
 def _friction_below(relative: FrequencyResponse, level: Known) -> float:
     """Up to where, from below, the magnitude is a tenth off, or the coherence too low to say."""
     low = relative.within(0.0, 2.0 * BAND[0])
-    off = np.abs(np.abs(low.response) / abs(level.value) - 1.0) > _FRICTION
-    beyond = np.flatnonzero(off & (np.sqrt(low.variance) < 0.5 * _FRICTION * abs(level.value)))
+    off = np.abs(np.abs(low.response) / abs(level.value) - 1.0) > _CONFIG.friction
+    beyond = np.flatnonzero(off & (np.sqrt(low.variance) < 0.5 * _CONFIG.friction * abs(level.value)))
     return float(low.frequency[beyond[-1]]) if len(beyond) else 0.0

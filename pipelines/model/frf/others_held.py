@@ -32,7 +32,7 @@ class HeldConfig:
 
     Attributes:
         modes: at most: a base and a spring in two joints.
-        frequencies, dampings: tried for each mode; the last damping is the largest.
+        dampings: tried for each mode; the last is the largest.
         delay: [s] the largest.
         floor: of the torque, what the model leaves out.
         alike: share of the frequency over which that is the same: its bins count as one.
@@ -42,7 +42,6 @@ class HeldConfig:
     """
 
     modes: int = 3
-    frequencies: int = 60
     dampings: tuple[float, ...] = (0.01, 0.02, 0.05, 0.1, 0.2)
     delay: float = 0.02
     floor: float = 0.01
@@ -113,7 +112,10 @@ class _Fit:
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
                 most: Array | None = None, config: HeldConfig | None = None) -> Held | None:
-    """Return the response from torque to position with the other joints held; None where none of them moves.
+    """Return the response from torque to position with the other joints held; None where their motion does not matter.
+
+    It matters where Z with columns for the others has the shorter description. Where the others hardly move, their columns are
+    nearly those of Z_jj times the same a_j, and taking them out adds more than it takes away.
 
     Args:
         responses: from v to torque and all positions, in the excited band.
@@ -135,7 +137,12 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     alike = np.maximum(config.alike * f / (responses.correlated * float(np.median(np.diff(f)))), 1.0)
     rows = _Rows(values[:, 0], values[:, 1:], covariance, config.floor * np.sqrt(alike) * np.abs(values[:, 0]),
                  np.asarray(2j * np.pi * responses.frequency), len(responses.frequency) / responses.correlated)
-    fit = _unattenuated(rows, _with_modes(rows, bound, config))
+    single = replace(rows, acceleration=rows.acceleration[:, :1], covariance=rows.covariance[:, :2, :2])
+    alone = _with_modes(single, bound[:0], config)
+    fit = _with_modes(rows, bound, config, alone.shape)
+    if not fit.passive(bound) or alone.description(rows.independent) <= fit.description(rows.independent):
+        return None
+    fit = _unattenuated(rows, fit)
     held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
     couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit, config.draws)]) / rigid[:, None]
     rest = responses.response[:, torque] - np.einsum("dbk,bk->db", couplings, responses.response[:, list(others)])
@@ -152,17 +159,28 @@ def _less(responses: Responses, kept: list[int], coupling: Complex) -> Responses
                    coherence=responses.coherence[:, kept[:2]])
 
 
-def _with_modes(rows: _Rows, most: Array, config: HeldConfig) -> _Fit:
-    """Add modes as long as they shorten the description."""
+def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array | None = None) -> _Fit:
+    """Add modes as long as they shorten the description; of bodies that could exist, where there are such.
+
+    `known_shape` of a fit with fewer joints is a further start: that fit is one of these, with no coupling.
+    """
     plain = np.sqrt(0.5 * (rows.covariance[:, 0, 0].real + rows.floor**2))
     delays = np.arange(-config.delay, config.delay, np.pi / 4.0 / abs(rows.s[-1]))
     rigid = [_linear(rows, np.array([delay]), plain) for delay in (0.0, *delays)]
-    best = known = _refined(rows, min(rigid, key=lambda one: one.cost), config)
-    frequencies = np.log(np.geomspace(abs(rows.s[0]), abs(rows.s[-1]), config.frequencies))
-    shapes = [np.array([w, np.log(z)]) for w in frequencies[1:-1] for z in config.dampings]
+    begun = [_refined(rows, min(rigid, key=lambda one: one.cost), config)]
+    if known_shape is not None:
+        free = _linear(rows, known_shape, plain, (None,) * (len(known_shape) // 2))
+        ratio = free.gains[1:rows.acceleration.shape[1]] / free.gains[0]
+        begun += [_refined(rows, start, config) for start in
+                  (free, _linear(rows, known_shape, plain, (ratio,) * (len(known_shape) // 2)))]
+    known = begun[0]
+    best = min((one for one in begun if one.passive(most)), key=lambda one: one.description(rows.independent), default=known)
+    low, high = np.log(np.abs(rows.s[[0, -1]]))  # a mode is 2 ζ ω wide: as close as that frequencies are tried
+    shapes = [np.array([w, np.log(z)]) for z in config.dampings for w in np.arange(low + z, high, 2.0 * z)]
     for _ in range(config.modes):
         starts = []
-        for kind in (known.gains[1:rows.acceleration.shape[1]] / known.gains[0], None):
+        turned = known.gains[1:rows.acceleration.shape[1]] / known.gains[0]
+        for kind in (turned, None) if len(turned) else (None,):
             for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
                 trials = (_linear(rows, np.concatenate([[delay], known.shape[1:], shape]), spread, (*known.ratios, kind))
                           for shape in shapes)

@@ -25,7 +25,7 @@ from pipelines.model.frf.controller import continuous_controller, loop_delay, sa
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
 from pipelines.model.frf.others_held import Held, others_held
 from pipelines.signal.cross_spectra import cross_spectra
-from pipelines.signal.excited_band import ExcitedBand, excited_band
+from pipelines.signal.excited_band import ExcitedBand, excited_band, powered
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
 from pipelines.signal.local_polynomial import local_polynomial
 from pipelines.signal.multisine_response import DetectionLines, MultisineResponses, multisine_responses
@@ -34,17 +34,41 @@ __all__ = ["ESTIMATORS", "How", "Measured", "double_integrator", "measured_respo
 
 ESTIMATORS = ("auto", "multisine", "local-polynomial", "welch")
 
-_SAME_POSTURE = 0.02  # [rad]
-_HIGHEST = 0.45  # of the rate
-_LOWEST = 0.5  # [Hz]
-_SEGMENTS = 4  # at least, for Welch's coherence and variance
-_NO_POWER = 1e-12  # of the strongest bin of the source
-_FOLDED = 0.1  # of the density of v in its band, near half the rate: it goes on beyond
-_COUPLED = 4.0  # [Hz] from where on friction and gravity of the other joints matter less than their inertia
-_CONSTANT = (10.0, 80.0)  # [Hz] where input and torque are compared
-_POSTURES = 3.0  # times that the inertia about a joint grows from one posture to another
-_DENSITY = 1.0  # [s] of the segments that show where v has power
-_SMOOTH = 25  # lines over which distortion is compared with noise
+
+@dataclass(frozen=True)
+class ResponseConfig:
+    """Numbers of a response.
+
+    Attributes:
+        same_posture: [rad] within which two logs are of one posture
+        highest: of the rate
+        lowest: [Hz]
+        segments: at least, for the coherence and variance of Welch's method
+        no_power: of the strongest bin of the source
+        folded: of the density of v in its band, near half the rate: it goes on beyond
+        coupled: [Hz] from where on friction and gravity of the other joints matter less than their inertia
+        octave: highest over lowest frequency of v that a rough inertia is taken from
+        constant: [Hz] where input and torque are compared
+        postures: times that the inertia about a joint grows from one posture to another, at most: it bounds the coupled modes
+        density: [s] of the segments that show where v has power, to half a hertz: Hann's window leaks into two bins
+        smooth: lines over which distortion is compared with noise
+    """
+
+    same_posture: float = 0.02
+    highest: float = 0.45
+    lowest: float = 0.5
+    segments: int = 4
+    no_power: float = 1e-12
+    folded: float = 0.1
+    coupled: float = 4.0
+    octave: float = 2.5
+    constant: tuple[float, float] = (10.0, 80.0)
+    postures: float = 3.0
+    density: float = 4.0
+    smooth: int = 25
+
+
+_CONFIG = ResponseConfig()
 
 
 @dataclass(frozen=True)
@@ -120,24 +144,31 @@ def measured_responses(logs: Iterable[ExperimentLog], how: How | None = None) ->
     inertia: dict[int, float] = {}
     for group in groups:
         known = [_roughly(one) for one in group]
-        inertia[group[0].joint] = max(_POSTURES * max(known), inertia.get(group[0].joint, 0.0))
+        inertia[group[0].joint] = max(_CONFIG.postures * max(known), inertia.get(group[0].joint, 0.0))
     return tuple(_measured(tuple(group), how, inertia) for group in groups)
 
 
 def _roughly(turned: Turned) -> float:
-    """The inertia [kg m^2] of the joint from all of a log: torque over acceleration by v, where friction matters little."""
+    """Return the inertia [kg m^2] of the joint from all of a log, torque over acceleration by v; inf where v tells none.
+
+    Over the octave and a bit where v begins to drive it: there friction matters little, and modes hardly yet.
+    """
     spectra = cross_spectra([s.signals[:, [V, TORQUE, POSITION]] for s in turned.stretches], turned.rate,
-                            min(round(_DENSITY * turned.rate), *(len(s.signals) for s in turned.stretches)))
-    inside = (spectra.frequency >= _COUPLED) & (spectra.frequency <= _CONSTANT[0])
+                            min(round(_CONFIG.density * turned.rate), *(len(s.signals) for s in turned.stretches)))
+    f = spectra.frequency
+    driven = powered(spectra.density[:, 0, 0].real) & (f >= _CONFIG.coupled)
+    inside = driven & (f <= _CONFIG.octave * f[driven].min(initial=np.inf))
+    if not inside.any():
+        return np.inf
     torque, position = spectra.density[inside, 0, 1], spectra.density[inside, 0, 2]
-    return float(np.median(np.abs(torque) / np.maximum(np.abs(position) * (2.0 * np.pi * spectra.frequency[inside]) ** 2, 1e-300)))
+    return float(np.median(np.abs(torque) / np.maximum(np.abs(position) * (2.0 * np.pi * f[inside]) ** 2, 1e-300)))
 
 
 def _together(a: Turned, b: Turned) -> bool:
     if a.settings() != b.settings() or a.lines != b.lines:
         return False
     apart = np.delete(a.posture - b.posture, a.joint - 1)
-    return bool(np.abs(apart).max(initial=0.0) < _SAME_POSTURE)
+    return bool(np.abs(apart).max(initial=0.0) < _CONFIG.same_posture)
 
 
 def _measured(turned: tuple[Turned, ...], how: How, inertia: dict[int, float]) -> Measured:
@@ -154,7 +185,7 @@ def _measured(turned: tuple[Turned, ...], how: How, inertia: dict[int, float]) -
     density, top = _density(several.frequency, stretches, first.rate)
     band = excited_band(_outputs(several, (INPUT - 1, POSITION - 1)), density)
     inside = density[band.holds(several.frequency)]
-    aliased = not first.held and bool(len(inside)) and top > _FOLDED * float(np.median(inside))
+    aliased = not first.held and bool(len(inside)) and top > _CONFIG.folded * float(np.median(inside))
     compliance = closed_loop(several, POSITION - 1, TORQUE - 1)
     ratio = _torque_per_input(plant, compliance, band)
     return Measured(turned, plant, _held(several, first, band, ratio, inertia), ratio, aliased, band,
@@ -164,7 +195,7 @@ def _measured(turned: tuple[Turned, ...], how: How, inertia: dict[int, float]) -
 
 def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tuple[Array, float]:
     """Of v [unit²/Hz] at these frequencies, and its median over the last tenth below half the rate."""
-    segment = min(round(_DENSITY * rate), *(len(s.signals) for s in stretches))
+    segment = min(round(_CONFIG.density * rate), *(len(s.signals) for s in stretches))
     spectra = cross_spectra([s.signals[:, [V]] for s in stretches], rate, segment)
     density = spectra.density[:, 0, 0].real
     return np.interp(frequency, spectra.frequency, density), float(np.median(density[spectra.frequency > 0.45 * rate]))
@@ -176,7 +207,7 @@ def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | N
 
     A joint whose inertia no log shows moves less than one before it.
     """
-    inside = _where(several, band.holds(several.frequency) & (several.frequency >= _COUPLED))
+    inside = _where(several, band.holds(several.frequency) & (several.frequency >= _CONFIG.coupled))
     rigid = np.asarray(double_integrator(inside.frequency, first.sample_time, held=first.torque_held), dtype=np.complex128)
     found = others_held(inside, rigid, TORQUE - 1, POSITION - 1, tuple(range(TORQUE, several.response.shape[1])),
                         np.array([inertia.get(k, _roughly(first) if k > first.joint else np.inf)
@@ -190,7 +221,7 @@ def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | N
 
 def _torque_per_input(plant: FrequencyResponse, compliance: FrequencyResponse, band: ExcitedBand) -> float | None:
     """τ/u, one number per joint, D̂ or 1: the median, weighted by what is known."""
-    torque, whole = (one.where(band.holds(one.frequency)).within(*_CONSTANT) for one in (compliance, plant))
+    torque, whole = (one.where(band.holds(one.frequency)).within(*_CONFIG.constant) for one in (compliance, plant))
     if not len(torque.frequency) or len(torque.frequency) != len(whole.frequency):
         return None
     ratio = (whole.response / torque.response).real
@@ -225,7 +256,7 @@ def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch],
     if how.estimator == "welch":
         return _welch(signals, turned, how, V, outputs), None, (None, None)
     spacing = how.resolution or 0.25
-    frequency = np.arange(np.ceil(_LOWEST / spacing), np.floor(_HIGHEST * first.rate / spacing) + 1) * spacing
+    frequency = np.arange(np.ceil(_CONFIG.lowest / spacing), np.floor(_CONFIG.highest * first.rate / spacing) + 1) * spacing
     return _known(local_polynomial(signals, first.rate, frequency, V, outputs)), None, (None, None)
 
 
@@ -233,7 +264,7 @@ def _detected(lines: DetectionLines | None) -> tuple[float | None, float | None]
     """Even and odd distortion of the position: mean power at the lines left out over the noise there."""
     if lines is None:
         return None, None
-    inside = lines.frequency >= _LOWEST
+    inside = lines.frequency >= _CONFIG.lowest
     power, noise = lines.power[:, POSITION - 1], np.maximum(lines.noise[:, POSITION - 1], 1e-300)
     kinds = [inside & lines.odd, inside & ~lines.odd]
     odd, even = (float(np.median(power[k] / noise[k])) if k.any() else None for k in kinds)
@@ -251,7 +282,7 @@ def _of_multisine(found: MultisineResponses) -> tuple[Responses, float | None]:
     position = POSITION - 1
     own, total = (np.maximum(r.covariance[:, position, position].real, 1e-300) for r in (noise, found.total))
     ratio = total / own
-    width = min(_SMOOTH, len(ratio))
+    width = min(_CONFIG.smooth, len(ratio))
     padded = np.pad(ratio, (width // 2, width - 1 - width // 2), mode="edge")
     local = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
     raised = np.maximum(local, 1.0)
@@ -293,14 +324,14 @@ def _segments(turned: tuple[Turned, ...], lengths: Sequence[int], how: How) -> _
     def count(segment: int) -> int:
         return sum(1 + 2 * (length - segment) // segment for length in lengths if length >= segment)
 
-    if how.resolution is None and first.period and count(2 * first.period) >= _SEGMENTS:
+    if how.resolution is None and first.period and count(2 * first.period) >= _CONFIG.segments:
         return _Segments(2 * first.period, 2)
     wanted = round(first.rate / (how.resolution or 0.25))
-    if how.resolution is not None and count(wanted) < _SEGMENTS:
+    if how.resolution is not None and count(wanted) < _CONFIG.segments:
         raise InputRejected("T08", f"{sum(lengths) / first.rate:.3g} s at constant speed are too short for {how.resolution:g} Hz",
                             where=first.name,
-                            remedy=f"record {_SEGMENTS / how.resolution:.3g} s each way, or ask for a coarser one")
-    while wanted > 64 and count(wanted) < _SEGMENTS:
+                            remedy=f"record {_CONFIG.segments / how.resolution:.3g} s each way, or ask for a coarser one")
+    while wanted > 64 and count(wanted) < _CONFIG.segments:
         wanted //= 2
     return _Segments(wanted, 1)
 
@@ -310,12 +341,12 @@ def _welch(stretches: Sequence[Array], turned: tuple[Turned, ...], how: How, sou
     segments = _segments(turned, [len(x) for x in stretches], how)
     spectra = cross_spectra(stretches, first.rate, segments.samples)
     power = spectra.density[:, source, source].real
-    excited = power > _NO_POWER * power.max()
+    excited = power > _CONFIG.no_power * power.max()
     density = spectra.density.copy()
     density[~excited, source, source] = power.max()  # of a bin that is left out below
     found = replace(spectra, density=density).responses(source, outputs)
     number = np.rint(found.frequency * segments.samples * first.sample_time)
-    inside = (found.frequency >= _LOWEST) & (found.frequency <= _HIGHEST * first.rate)
+    inside = (found.frequency >= _CONFIG.lowest) & (found.frequency <= _CONFIG.highest * first.rate)
     return _where(found, inside & excited[1:] & (number % segments.every == 0))
 
 
@@ -327,7 +358,7 @@ def _direct(signals: Sequence[Array], turned: tuple[Turned, ...], how: How) -> F
 def _with_reversal(turned: tuple[Turned, ...], how: How) -> FrequencyResponse | None:
     """From the whole log: what it would have been had nothing been left out."""
     known = [one.whole for one in turned]
-    least = _SEGMENTS * round(turned[0].rate / (how.resolution or 0.25))
+    least = _CONFIG.segments * round(turned[0].rate / (how.resolution or 0.25))
     if not all(np.isfinite(x).all() for x in known) or sum(len(x) for x in known) < least:
         return None
     return closed_loop(_welch(known, turned, how, V, (INPUT, POSITION)))

@@ -119,6 +119,7 @@ class Classified:
     damping: Known | None
     parameters: Mapping[str, Known]
     seen_at: tuple[int, ...]
+    frequencies: tuple[Known, ...] = ()  # [Hz] `frequency` in each posture
 
 
 @dataclass(frozen=True)
@@ -211,7 +212,8 @@ def _continuous(seen: Seen) -> dict[str, float]:
 
 
 def classified(found: Findings) -> tuple[Classified, ...]:
-    return tuple(Classified(f.kind, f.joint, f.evidence, f.cause, f.frequency, f.damping, dict(f.parameters), f.seen_at)
+    return tuple(Classified(f.kind, f.joint, f.evidence, f.cause, f.frequency, f.damping, dict(f.parameters), f.seen_at,
+                            f.frequencies)
                  for f in found.classification)
 
 

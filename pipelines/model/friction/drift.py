@@ -7,7 +7,7 @@ on rows that slide, beside inertia, gravity and a free curve of friction (slidin
 a curve can hold is no drift. The course that leaves least must predict blocks of time that were held out better than no change
 does: logarithms of the ratio of their squared errors, in closed form by leverage, against draws of their signs
 (fit/flips.py). A course that costs a number and gains nothing loses there. A step may lie between any two rows; the time
-constant of a trend is fitted later with the law (joint.py), and so is which part of friction changes.
+constant of a trend is fitted later with the law (joint.py).
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ import numpy.typing as npt
 
 from pipelines.fit.flips import by_flips
 from pipelines.fit.varpro import held_out
+from pipelines.model.friction.ladder import no_worse
 from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time
 from pipelines.model.rigid.body import Array
 
-__all__ = ["DriftConfig", "drift_of"]
+__all__ = ["DriftConfig", "drift_of", "orthonormal", "step_row"]
 
-_FORMS = ("whole", "viscous", "coulomb")
+_FORMS = ("whole", "coulomb", "viscous")
 _ROUNDS = 4  # of scanning for a course and fitting the curve that changes
 Index = npt.NDArray[np.intp]
 
@@ -37,7 +38,7 @@ class DriftConfig:
     """Numbers that decide whether friction drifts."""
 
     chance: float = 1e-3  # that a joint without drift gains as much in blocks held out: none in a hundred joints
-    block: float = 1.0  # [s] of rows whose errors may depend on one another
+    block: float = 0.5  # [s] of rows whose errors may depend on one another; .1 s apart they do by .15 (ten joints, one .28)
     fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
     ends: float = 0.08  # of all rows, that lie before and after a step
@@ -45,8 +46,10 @@ class DriftConfig:
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
 
 
-def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> tuple[Course, ...]:
-    """The courses of friction, one for every form, of the kind that rows show beyond chance; empty where they show none.
+def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> Course | None:
+    """The course of friction in time, where rows show one beyond chance: the first that is not measurably worse than the best.
+
+    All friction by one share comes before a part of it, and a trend before a step.
 
     Args:
         stretches: whose rows these are; they slide.
@@ -56,24 +59,33 @@ def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array,
     """
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
     known = np.hstack([rigid, curve])
-    basis, blocks = _basis(known), blocks_of_time(stretches, config.block)
+    basis, blocks = orthonormal(known), blocks_of_time(stretches, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
-        return ()
+        return None
     trends = _trends(stretches, config)
     found = [_best(kind, form, stretches, y, known, curve, basis, speed, trends, config)
-             for kind in ("trend", "step") for form in _FORMS]
-    course, own, size, _ = min(found, key=lambda one: one[3])
-    alike = tuple(one[0] for one in found if one[0].kind == course.kind)
-    gains = np.log(_held_out(basis, y, blocks) / _held_out(_basis(np.column_stack([known, own])), y, blocks))
-    whole = curve @ _least(np.column_stack([known, own]), y)[rigid.shape[1]:-1]
-    large = size >= config.least * float(np.median(np.abs(whole)))
-    return alike if large and by_flips(gains) <= config.chance else ()
+             for form in _FORMS for kind in ("trend", "step")]
+    best = min(found, key=lambda one: float(one.residual @ one.residual))
+    gains = np.log(_held_out(basis, y, blocks) / _held_out(orthonormal(np.column_stack([known, best.column])), y, blocks))
+    whole = curve @ _least(np.column_stack([known, best.column]), y)[rigid.shape[1]:-1]
+    if best.size < config.least * float(np.median(np.abs(whole))) or by_flips(gains) > config.chance:
+        return None
+    return next(one.course for one in found if no_worse(one.residual, best.residual))
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    """The best course of one kind and form."""
+
+    course: Course
+    column: Array  # (rows,) c(t) g(v)
+    size: float  # [N m] by which it changes friction
+    residual: Array  # (rows,) [N m]
 
 
 def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: Array, curve: Array, basis: Array,
-          speed: Array, trends: Sequence[Course], config: DriftConfig) -> tuple[Course, Array, float, float]:
-    """The course of this kind and form that leaves least, its column (rows,), by how much it changes friction
-    [N m], and the sum of squares it leaves.
+          speed: Array, trends: Sequence[Course], config: DriftConfig) -> _Found:
+    """The course of this kind and form that leaves least.
 
     The curve that changes as a whole is itself fitted: scan, fit, scan again.
     """
@@ -84,7 +96,7 @@ def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: A
         if form == "whole":
             shape = curve @ beta[known.shape[1] - curve.shape[1]:known.shape[1]]
         if kind == "step":
-            course = _step(stretches, form, shape, basis, left, config)[0]
+            course = _step(stretches, form, shape, basis, left, config)
         else:
             course = max((one for one in trends if one.form == form),
                          key=lambda one: _gain(_outside(one, stretches, shape, basis), left))
@@ -92,7 +104,7 @@ def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: A
         columns = np.column_stack([known, own])
         beta = _least(columns, y)
     size = abs(float(beta[-1])) * float(np.median(np.abs(shape)))
-    return course, own, size, float(np.square(y - columns @ beta).sum())
+    return _Found(course, own, size, y - columns @ beta)
 
 
 def _least(columns: Array, y: Array) -> Array:
@@ -114,7 +126,7 @@ def _gain(column: Array, left: Array) -> float:
     return float(np.square(column[:, 0] @ left) / max(float(np.square(column).sum()), 1e-300))
 
 
-def _basis(columns: Array) -> Array:
+def orthonormal(columns: Array) -> Array:
     """Orthonormal columns of the same space."""
     scale = np.linalg.norm(columns, axis=0)
     left, size, _ = np.linalg.svd(columns[:, scale > 0.0] / scale[scale > 0.0], full_matrices=False)
@@ -134,19 +146,29 @@ def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
 
 
 def _step(stretches: Sequence[Stretch], form: str, shape: Array, basis: Array, left: Array,
-          config: DriftConfig) -> tuple[Course, float]:
-    """The instant between two rows from which a step of `shape` (rows,) explains most, and how much (Andrews 1993, sup F).
-
-    A step's column is g from some row on: its products with other columns are sums over the later rows.
-    """
+          config: DriftConfig) -> Course:
+    """The course of a step at the instant between two rows from which it explains most."""
     t = np.concatenate([stretch.middle[2] for stretch in stretches])
     log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])
-    after = np.cumsum((shape[:, None] * np.column_stack([left, shape, basis]))[::-1], axis=0)[::-1]
-    outside = np.maximum(after[:, 1] - np.square(after[:, 2:]).sum(axis=1), _RANK * after[0, 1])
-    rows = np.arange(max(1, int(config.ends * len(t))), int((1.0 - config.ends) * len(t)))
-    gains = np.square(after[rows, 0]) / outside[rows]
-    row = int(rows[np.argmax(gains)])
+    row = step_row(shape, basis, left, config)
     before, here = int(log[row - 1]), int(log[row])
     starts = tuple(float(stretch.t[0]) for stretch in stretches)
     when = 0.5 * float(t[row - 1] + t[row]) - starts[here] if before == here else 0.0
-    return Course("step", form, starts, when, 0.0, when, here), float(gains.max())
+    return Course("step", form, starts, when, 0.0, when, here)
+
+
+def step_row(shape: Array, basis: Array, left: Array, config: DriftConfig) -> int:
+    """Return the row from which on a column of `shape` (rows,) lowers the sum of squares most (Andrews 1993, sup F).
+
+    Its products with other columns are sums over the later rows. A step that lies within the other columns, but for less
+    than a row, is not shown by any.
+
+    Args:
+        basis: (rows, columns) orthonormal columns of all else.
+        left: (rows,) residual of these.
+    """
+    after = np.cumsum((shape[:, None] * np.column_stack([left, shape, basis]))[::-1], axis=0)[::-1]
+    outside = after[:, 1] - np.square(after[:, 2:]).sum(axis=1)
+    shown = outside > after[0, 1] / len(shape)
+    rows = np.arange(max(1, int(config.ends * len(shape))), int((1.0 - config.ends) * len(shape)))
+    return int(rows[np.argmax(np.where(shown, np.square(after[:, 0]) / np.where(shown, outside, 1.0), 0.0)[rows])])

@@ -66,14 +66,15 @@ def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableF
     """Whether friction is against the motion at every speed up to the fastest, and one that the joint could leave its rest by.
 
     Two sigmoids nearly alike, one up and one down, fit the speeds there are and may do anything between them and zero. A joint that
-    runs came through every lower speed: friction there was no more than the largest torque on it. Of a curve that is not
-    odd only this is required.
+    runs came through every lower speed: friction there was no more than the largest torque on it, or than that of the fastest rows,
+    which may have been driven when friction had drifted. Of a curve that is not odd only this is required.
     """
     speed = float(np.abs(equations.nodes.dq).max()) * np.geomspace(1e-6, 1.0, 200)
     both = law.curve(np.concatenate([speed, -speed]), arm, found.theta, found.beta[-law.amplitudes:])
     forth, back = np.split(both, 2)
     weight = max(float(np.linalg.norm(one.gravity)) for one in equations.arms(found.beta))
-    if float(np.abs(both).max()) > equations.largest + weight:
+    most = max(equations.largest + weight, abs(float(forth[-1])), abs(float(back[-1])))
+    if float(np.abs(both).max()) > most:
         return False
     odd = bool(np.allclose(forth, -back, rtol=1e-9, atol=1e-12))
     return not odd or bool(np.all(forth >= -1e-9 * np.abs(forth).max()))

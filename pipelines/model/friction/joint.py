@@ -108,9 +108,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
     if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
-    courses = _courses(stretches, rows, arm, config, DriftConfig()) or (None,)
-    ends = [_with_course(stretches, rows.fitted, one, fit, arm) for one in courses]
-    stretches, fit, course = min(ends, key=lambda end: end[1].found.rms)
+    course = _course(stretches, rows, arm, config, DriftConfig())
+    stretches, fit, course = _with_course(stretches, rows.fitted, course, fit, arm)
     identify, validate = stretches[:rows.fitted], tuple(stretch for stretch in stretches[rows.fitted:] if stretch.rows)
     judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
     sticks = any(stretch.sticks is not None for stretch in identify)
@@ -190,11 +189,10 @@ def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, con
     return float(doubt.mean()) <= config.worse * sliding.mean_square or float(doubt.sum()) <= float(sure.sum())
 
 
-def _courses(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig,
-            drift: DriftConfig) -> tuple[Course, ...]:
-    """How friction may change in time over the logs that are fitted: a course for every form; empty where it does not."""
+def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig, drift: DriftConfig) -> Course | None:
+    """How friction changes in time over the logs that are fitted; None where it does not."""
     if not rows.any_slide:
-        return ()
+        return None
     slides = rows.sliding.slides
     if all(stretch.sticks is None for stretch in stretches):
         stretches = left_out(stretches, slides)
@@ -205,12 +203,14 @@ def _courses(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config:
 
 def _with_course(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit,
                  arm: OneJoint) -> tuple[tuple[Stretch, ...], LawFit, Course | None]:
-    """The stretches along `course`, their flexible law, and the course with its time constant fitted."""
+    """The stretches along `course`, its time constant fitted, and the flexible law fitted to these very stretches."""
+    stretches = _along(stretches, course, fit)
     for k in range(_COURSES if course is not None else 0):
-        stretches = _along(stretches, course, fit)
         fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, None if k == 0 else [fit.theta])
-        course = _next(course, fit)
-    return _along(stretches, course, fit), fit, course
+        if k + 1 < _COURSES:
+            course = _next(course, fit)
+            stretches = _along(stretches, course, fit)
+    return stretches, fit, course
 
 
 def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -> tuple[Stretch, ...]:

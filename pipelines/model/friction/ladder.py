@@ -19,7 +19,7 @@ from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.rigid.body import Array
 
-__all__ = ["Judge", "Ladder", "Tried", "climb"]
+__all__ = ["Judge", "Ladder", "Tried", "climb", "no_worse"]
 
 _SURE = 2.0  # standard errors of a difference: beyond, it is one
 _WORTH = 0.01  # of the mean square: a smaller difference is none, however sure
@@ -57,14 +57,14 @@ class Ladder:
 
     def alike(self, one: Tried) -> bool:
         """Not measurably worse than the best."""
-        return not one.reason and _alike(one.residual, self.best.residual)
+        return not one.reason and no_worse(one.residual, self.best.residual)
 
     @property
     def rivals(self) -> tuple[Tried, ...]:
         """Laws as simple as the chosen one, or nearly, that explain the fitted rows as well: nothing there speaks against them."""
         own = self.chosen.fit.found.residual
         return tuple(one for one in self.tried if one is not self.chosen and not one.reason
-                     and _alike(one.fit.found.residual, own) and one.law.size <= self.chosen.law.size + 1
+                     and no_worse(one.fit.found.residual, own) and one.law.size <= self.chosen.law.size + 1
                      and not set(self.chosen.law.members) <= set(one.law.members))
 
 
@@ -110,10 +110,10 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
         hopeful = [k for k in sorted(range(len(gains)), key=lambda k: -gains[k])[:_HOPEFUL] if gains[k] > 0.5 * _WORTH]
         more = [_worth(judge.try_law(*beside[k]), best) for k in hopeful]
         tried += more
-        if not more or _alike(best.residual, _best(tried).residual):
+        if not more or no_worse(best.residual, _best(tried).residual):
             break
     best = _best(tried)
-    able = [one for one in tried if not one.reason and _alike(one.residual, best.residual)]
+    able = [one for one in tried if not one.reason and no_worse(one.residual, best.residual)]
     chosen = min(able or [best], key=lambda one: (one.law.size, one.validate_rms))
     return Ladder(tuple(tried), chosen, best, "logs" if judge.validate is not None else "blocks", judge.torque)
 
@@ -160,7 +160,7 @@ def _best(tried: Sequence[Tried]) -> Tried:
     return min(able or list(tried), key=lambda one: one.validate_rms)
 
 
-def _alike(one: Array, best: Array) -> bool:
+def no_worse(one: Array, best: Array) -> bool:
     """Whether residuals are not measurably larger than the best law's.
 
     Σ r² - Σ b² = Σ δ² + 2 Σ δ b with δ = r - b. Where the best law is right, b is noise, and the last sum is what chance
@@ -175,10 +175,11 @@ def _alike(one: Array, best: Array) -> bool:
 def _held_out(fit: LawFit) -> Array:
     """The residual of every block of rows as the other blocks would have it.
 
-    By the first order of the law about the whole fit.
+    By the first order of the law about the whole fit; a number on its bound does not move.
     """
     found = fit.found
-    part = linear_part(found.jacobian, found.residual)
+    free = np.append(np.ones(len(found.beta), dtype=bool), ~np.array(found.at_bound, dtype=bool))
+    part = linear_part(found.jacobian[:, free], found.residual)
     blocks = np.arange(len(found.residual)) * _FOLDS // len(found.residual)
     return held_out(part.columns @ part.root, found.residual, blocks)
 
@@ -191,4 +192,9 @@ def _fault(fit: LawFit, takes: bool) -> str:
     below = [number.name for number in fit.numbers if number.low >= 0.0 and number.value < number.low - _SURE * number.std]
     if below:
         return f"{', '.join(below)} would be negative"
+    for effect in fit.law.effects[2:]:  # what the law has beyond Coulomb and viscous friction
+        own = {f"{effect.name}.{q.name}" for q in effect.parameters if not q.shape}
+        numbers = [number for number in fit.numbers if number.name in own]
+        if all(abs(number.value) <= _SURE * number.std for number in numbers):
+            return f"{', '.join(number.name for number in numbers)} may be zero"
     return "" if takes else "its curve would push at speeds that are not in these logs"

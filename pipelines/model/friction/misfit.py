@@ -14,6 +14,7 @@ from pipelines.model.words import plain_number
 __all__ = ["NAMED", "POOR", "depends_in_words", "inertia_in_words", "misfits"]
 
 POOR = 0.5  # of torque that was held out (rms): more than that left is no model
+_SURE = 3.0  # standard deviations below zero: no chance (two-sided .003)
 _SEEN = 2.0  # standard deviations: an inertia that is less is not seen
 NAMED = "let 'rrrid diagnose' say what makes it: a motor that cogs, a spring, a cable, a stop"
 _TOLD_APART = 0.9  # of a wave along the travel, that two of them differ by at least
@@ -24,12 +25,26 @@ _MOVED = 0.1  # of the inertia: less is within what a fit is good for
 
 
 def misfits(joints: Sequence[JointResult], where: str) -> tuple[Check, ...]:
-    """D19, a gate, where the law leaves most of the torque of a joint that was never driven alone; D21 where a joint ripples.
+    """D19, a gate, where the law leaves most of the torque of a joint that was never driven alone; S14, D21 where a joint ripples.
 
     A joint that was driven alone is judged by its simulated speed instead.
     """
-    found = [check for joint in joints for check in (_unexplained(joint, where), _rippling(joint, where)) if check is not None]
+    found = [check for joint in joints for check in (_unexplained(joint, where), _negative(joint, where), _rippling(joint, where))
+             if check is not None]
     return tuple(found)
+
+
+def _negative(joint: JointResult, where: str) -> Check | None:
+    """S14: an inertia below zero. That of a joint driven alone, where it is surely negative, is a finding of its log."""
+    value, std = joint.inertia.value, joint.inertia.std
+    surely = std is not None and value < -_SURE * std
+    if not joint.moved or value >= 0.0 or (surely and joint.validation.by):
+        return None
+    meaning = ("torque and position have opposite signs, or the torque lacks a part" if surely else
+               "these logs do not show it, and it is not to be relied on")
+    return Check.of("S14", "warn", f"the inertia of joint {joint.joint} comes out negative, {_written(joint.inertia)}, and no "
+                    f"inertia is: {meaning}", where=where,
+                    remedy="drive the joint alone, with accelerations that take most of its torque")
 
 
 def _unexplained(joint: JointResult, where: str) -> Check | None:

@@ -210,7 +210,10 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, n
     law, first = ladder.chosen.law, f":{j + 1}:"
     known = {key.replace(first, "."): value for key, value in arm.parameters.items() if first in key}
     members = set(law.members)
-    numbers = {key if len(members) > 1 else key.partition(".")[2]: Value(p.value, p.std, p.unit)
+    # the fit of all joints takes the non-linear numbers as known: their deviations are those of the joint's own rows
+    std = {number.name: number.std for number in ladder.chosen.fit.numbers if number.known}
+    std |= {key: p.std for key, p in known.items() if p.std is not None}
+    numbers = {key if len(members) > 1 else key.partition(".")[2]: Value(p.value, std.get(key), p.unit)
                for key, p in known.items() if key.partition(".")[0] in members}
     rungs = tuple(Rung(one.law.name, one.law.size, one.identify_rms, one.validate_rms, ladder.alike(one), one is ladder.chosen,
                        one.reason) for one in ladder.tried)

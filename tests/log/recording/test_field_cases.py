@@ -58,8 +58,8 @@ def test_the_draft_takes_the_right_columns(
 
 def test_motor_currents_are_taken_and_model_torques_offered(shared: Path) -> None:
     draft, recipe = draft_of(shared, "04")
-    assert recipe["signals"]["tau"]["unit"] == "A"
-    assert draft.blanks == ("drive.torque_constant",)
+    assert recipe["signals"]["tau"]["columns"] == [f"actual_current_{j}" for j in SIX]
+    assert draft.blanks == ("signals.tau.unit", "drive.torque_constant")
     assert "target_moment_0" in draft.text.split("also there:")[1]
 
 

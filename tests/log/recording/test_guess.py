@@ -9,7 +9,7 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.files import open_log
-from pipelines.log.recording.evidence import rollover
+from pipelines.log.recording.evidence import rollover, sign_of
 from pipelines.log.recording.guess import guess_recipe
 from pipelines.log.recording.recipe_reader import parse_recipe
 from tests.log.recording.good import Array, good, run, text, write
@@ -157,3 +157,19 @@ def test_nanoseconds_since_1970_are_a_time(tmp_path: Path) -> None:
     draft = drafted(tmp_path / "data", text({"time_ns": stamps} | {k: v for k, v in good().items() if k != "t"}))
     recipe = parse_recipe(draft.replace('use = "FILL IN"', 'use = "rrr"'))
     assert (recipe.time.column, recipe.time.unit) == ("time_ns", "ns")
+
+
+def test_a_reference_that_leads_the_torque_decides_no_sign() -> None:
+    """Positions 20 ms ahead of the torque: its jumps lie off the reversals, and a sign read from them would be a false one."""
+    t = np.arange(3000) / 250.0
+    q, ahead = (np.sin(2.0 * at) + 0.4 * np.sin(5.1 * at) for at in (t, t + 0.02))
+    speed = 2.0 * np.cos(2.0 * t) + 2.04 * np.cos(5.1 * t)
+    tau = (10.0 * np.cos(q) + 4.0 * np.tanh(speed / 0.02) + 0.05 * np.random.default_rng(3).normal(size=t.size))[:, None]
+    assert sign_of(q[:, None], -tau).value == "sign = -1?"
+    assert sign_of(ahead[:, None], tau).value == "as recorded"
+
+
+def test_positions_that_differ_by_a_constant_are_asked_about(tmp_path: Path) -> None:
+    columns = good()
+    further = {f"obs_q_{j}": columns[f"q_{j}"] - 0.3 for j in (1, 2, 3)}
+    assert "signals.q" in guess_recipe(write(tmp_path, text(columns | further))).blanks

@@ -209,3 +209,11 @@ def test_x05_a_header_that_declares_too_much_is_refused() -> None:
     content = npy(signals()["q"]).replace(b"(1200, 3)", b"(9**99,3)").replace(b"9**99", b"99999")
     with pytest.raises(InputRejected, match="RRID-F02"):
         read_npy(content, "run.npy")
+
+
+def test_the_samples_are_the_side_that_most_arrays_share() -> None:
+    """A wide array of features beside short signals: 50 samples of them, not 512 of one row each."""
+    rng = np.random.default_rng(1)
+    table = columns_of_arrays({"t": np.arange(50.0), "q": rng.normal(size=(50, 3)), "image": rng.normal(size=(50, 512))}, "run.npz")
+    assert list(table.columns) == ["t", "q_1", "q_2", "q_3"]
+    assert table.rows.size == 50

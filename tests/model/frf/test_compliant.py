@@ -103,6 +103,39 @@ def test_numbers_come_back() -> None:
     assert by_kind["joint"]["motor_inertia"].value == pytest.approx(0.2, rel=1e-3)
 
 
+def geared_arm(f_b: float, base: float, rotor: float, link: float) -> tuple[float, float]:
+    """A link on a base, turned by a rotor whose speed is that between them and which the base does not carry along."""
+    ground = base * (2.0 * np.pi * f_b) ** 2
+    m = np.array([[base + link, link], [link, link + rotor]])  # x of the base, q of the joint
+    free = eigh(np.diag([ground, 0.0]), m, eigvals_only=True)
+    return float(np.sqrt(ground / (base + link)) / (2.0 * np.pi)), float(np.sqrt(free[1]) / (2.0 * np.pi))
+
+
+def test_a_base_under_a_geared_arm_is_a_base() -> None:
+    """Two fifths of the inertia are a rotor's: its resonance moves by 1 to 2 %; its inertia comes back within 2 %."""
+    links = (0.6, 1.1)
+    pairs = [geared_arm(20.0, 5.0, 0.5, link) for link in links]
+    (base,), left = group_joint(1, [modes_of([p], link + 0.5, std=1e-4) for p, link in zip(pairs, links, strict=True)], 1e-3)
+    assert base.kind == "base"
+    assert not left
+    assert base.parameters["inertia"].value == pytest.approx(5.0, rel=0.02)
+
+
+def test_numbers_vary_as_their_covariance_says() -> None:
+    """A spring's stiffness and motor inertia from 100 draws of noisy frequencies: scatter and correlation."""
+    rng, inertia, found = np.random.default_rng(5), (1.1, 1.4), []
+    for _ in range(100):
+        pairs = [tuple(f * rng.normal(1.0, 4e-3) for f in two_masses(0.3, j - 0.3, 15000.0)) for j in inertia]
+        ((one,), _) = group_joint(1, [modes_of([(a, r)], j, std=4e-3) for (a, r), j in zip(pairs, inertia, strict=True)], 1e-3)
+        assert one.numbers is not None
+        found.append((one.numbers.mean[[0, 2]], one.numbers.covariance[np.ix_([0, 2], [0, 2])]))
+    means, told = np.array([m for m, _ in found]), np.median([c for _, c in found], axis=0)
+    scatter = np.cov(means.T)
+    assert np.sqrt(np.diag(told)) == pytest.approx(np.sqrt(np.diag(scatter)), rel=0.35)
+    correlation = [c[0, 1] / np.sqrt(c[0, 0] * c[1, 1]) for c in (told, scatter)]
+    assert correlation[0] == pytest.approx(correlation[1], abs=0.2)
+
+
 def test_one_posture_does_not_tell() -> None:
     """A small pair in one posture is open, with what to record; where the rise is large it is a link behind a spring."""
     found, left = group_joint(1, [modes_of([base_under_arm(28.0, 8.0, 1.2)], 1.2)], 1e-3)
@@ -125,9 +158,11 @@ def test_delay_and_rigid() -> None:
     assert [(one.kind, one.cause) for one in rigid] == [("rigid", None)]
     assert "trace" not in rigid[0].evidence
     faint = modes_of([(26.7, 26.8)], 0.5)
-    traced, _ = group_joint(2, [replace(faint, modes=(), pairs=(), traces=faint.modes)], 1e-3)
-    assert [one.kind for one in traced] == ["rigid"]
-    assert "26.8 Hz" in traced[0].evidence
+    trace = replace(faint, modes=(), pairs=(), traces=faint.modes)
+    for postures, said in (([trace, trace], True), ([trace], False), ([trace, modes_of([], 0.5)], False)):
+        traced, _ = group_joint(2, postures, 1e-3)
+        assert [one.kind for one in traced] == ["rigid"]
+        assert ("26.8 Hz" in traced[0].evidence) == said
 
 
 def test_modes_that_do_not_explain_are_not_believed() -> None:

@@ -39,6 +39,7 @@ class Compliance:
     open: str  # what they leave open, in words; empty where they do not
     seen: tuple[frf.Seen, ...] = field(default=(), repr=False)
     seen_at: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # place of a cause -> joints that show it
+    priors: Mapping[str, frf.Gaussian] = field(default_factory=dict, repr=False)  # place of a cause -> its numbers and covariance
 
     def answers(self, acting: Acting) -> tuple[Answer, ...]:
         """The responses that name a cause: of its joint, of the first one that shows it where it is the base."""
@@ -68,7 +69,8 @@ def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] =
     named = tuple(_acting(one, arm) for one in wanted)
     left = "; ".join(one.evidence for one in found.undecided)
     shown = {acting.place: one.seen_at for acting, one in zip(named, wanted, strict=True)}
-    return Compliance(named, not giving and not found.undecided, left, found.seen, shown)
+    known = {acting.place: one.numbers for acting, one in zip(named, wanted, strict=True) if one.numbers is not None}
+    return Compliance(named, not giving and not found.undecided, left, found.seen, shown, known)
 
 
 def compared(now: Compliance, before: Compliance) -> Compared:

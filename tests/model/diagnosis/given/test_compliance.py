@@ -24,6 +24,10 @@ def test_a_soft_base_is_named_with_its_frequency() -> None:
     numbers = found.named[0].values
     assert numbers["frequency"] == pytest.approx(28.0, abs=0.2)
     assert numbers["damping_ratio"] == pytest.approx(0.04, rel=0.1)
+    prior = found.priors["base_resonance"]  # what a later fit takes the numbers as
+    stds = {one.name: one.std for one in found.named[0].parameters}
+    assert dict(zip(prior.names, np.sqrt(np.diag(prior.covariance)).tolist(), strict=True)) == pytest.approx(stds)
+    assert dict(zip(prior.names, prior.mean.tolist(), strict=True)) == pytest.approx(numbers)
     answers = found.answers(found.named[0])
     assert [(one.joint, one.posture.shape) for one in answers] == [(1, (3,)), (1, (3,))]
     for one in answers:  # a dip, then a rise beside the frequency of the base, and no such thing elsewhere
