@@ -28,7 +28,7 @@ from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.exact import Exact, Named
 from pipelines.model.diagnosis.fitted.nominal import rigid_rows, rows_of
 from pipelines.model.diagnosis.fitted.refit import Refined
-from pipelines.model.diagnosis.fitted.slopes import slopes_of
+from pipelines.model.diagnosis.fitted.slopes import Which, slopes_of
 from pipelines.model.diagnosis.result import Standing as Told
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.worth.extended import with_uncertainty
@@ -104,7 +104,7 @@ class Trained:
         first, size = len(done.model.beta), self._sizes(state)
         lasting = np.r_[np.arange(first), first + state.lasting]
         columns = Table.stacked([self.later.base, state.effects]).take(lasting)
-        own = [k for k in range(len(done.slopes)) if k < first or done.names[k - first][0] == 1]
+        own = _fitted(self.later, state, done.names)
         slopes = (done.slopes[own] / size[:, None])[lasting]
         info = self.later.information(state)[np.ix_(lasting, lasting)]
         block, left = done.data.blocks(self.blocks), done.left.copy()
@@ -187,12 +187,17 @@ def _refined(later: Later, state: State, data: Data, weight: Array) -> Refined:
     """Return a state over rows as they are logged, with the covariance of all its numbers."""
     model = state.model
     slopes, names = slopes_of(model, data, rigid_rows(data, model.columns))
-    first = len(model.beta)
-    fitted = np.array([k < first or names[k - first][0] == 1 for k in range(len(slopes))])
+    fitted = _fitted(later, state, names)
     known = np.zeros((len(slopes), len(slopes)))
     known[np.ix_(fitted, fitted)] = covariance(later, state)
     left = data.y - model.torque(data)
     return Refined(model, data, weight, left, slopes, tuple(names), known)
+
+
+def _fitted(later: Later, state: State, names: Sequence[Which]) -> list[int]:
+    """Return which of all slopes, named `names` behind the linear ones, the state has fitted."""
+    first = len(state.model.beta)
+    return [*range(first), *(first + names.index(one) for one in later.slopes(state)[1])]
 
 
 def covariance(later: Later, state: State) -> Array:

@@ -49,7 +49,8 @@ def _friction(arm: Arm, done: Refined, std: Array) -> tuple[Acting, ...]:
     """Amplitudes have the deviation of their column; a shape moves by its logarithm."""
     columns = done.model.columns
     first, count = len(columns.kept), len(done.model.beta)
-    shapes = {(place, name): float(std[count + k]) for k, (kind, place, name) in enumerate(done.names) if kind == 0}
+    shapes = {(place, name): float(std[count + k]) for k, (kind, place, name) in enumerate(done.names)
+              if kind == 0 and std[count + k] > 0.0}
     found, kept = [], iter(arm.friction)
     for place, law in enumerate(columns.laws):
         linear = [q.name for q in law.parameters if not q.shape]
