@@ -14,7 +14,7 @@ from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior
-from pipelines.diagnosis.table import Array, by_joint
+from pipelines.diagnosis.table import Array, Indices, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
 
@@ -31,15 +31,24 @@ class Window:
     effect: Effect
     amplitudes: Array
     log: int
+    touched: Indices  # of the rows of each joint, those within it
 
 
 def best_window(
     rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array]
 ) -> Window | None:
     """Return the best window on a residual (rows of each joint) in units of the noise."""
-    data, best = rows.data, None
+    found = best_windows(rows, dictionary, arm, residual)
+    return max(found, key=lambda one: one.gain, default=None)
+
+
+def best_windows(
+    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array]
+) -> list[Window]:
+    """Return the best window of each log."""
+    data, out = rows.data, list[Window]()
     if dictionary.event is None:
-        return None
+        return out
     weight = by_joint(rows.weight, rows.joint, rows.n_joints)
     first = 0
     for place, one in enumerate(data.logs):
@@ -47,16 +56,17 @@ def best_window(
             np.stack([v[first : first + one.rows] for v in part]) for part in (residual, weight)
         )
         first += one.rows
-        torque = own / here
+        torque, found = own / here, list[Window]()
         full = np.stack([np.interp(one.motion.t, one.t, v) for v in torque], axis=1)
         for shape in dictionary.event.shapes[0].promising(one.motion, arm, full):
             columns = one.lay(shape.columns(one.motion, arm)) * here
             x = columns.reshape(len(columns), -1)
             amplitudes = np.asarray(np.linalg.lstsq(x.T, own.ravel(), rcond=1e-6)[0], np.float64)
             gain = float((x @ own.ravel()) @ amplitudes)
-            if best is None or gain > best.gain:
-                best = Window(gain, shape, amplitudes, data.first + place)
-    return best
+            touched = np.flatnonzero(columns.any(axis=(0, 1))) + first - one.rows
+            found.append(Window(gain, shape, amplitudes, data.first + place, touched))
+        out += [max(found, key=lambda window: window.gain)] if found else []
+    return out
 
 
 def event_threshold(
@@ -73,6 +83,10 @@ def event_threshold(
     mean = np.linalg.solve(prior.precision + sum(prior.grams), sum(prior.moments))
     table = prior.table(rows.nominal, dictionary.known)
     residual = [y - t for y, t in zip(rows.y, table.times(np.asarray(mean)), strict=True)]
+    if dataset.reference is None:  # a contact in each log is no measure of what is usual
+        for one in best_windows(rows, dictionary, dataset.arm, residual):
+            for own in residual:
+                own[one.touched] = 0.0
     found = best_window(rows, dictionary, dataset.arm, residual)
     usual = float(chi2.isf(-np.expm1(np.log(0.5) / config.event_candidates), _DIRECTIONS))
     dispersion = max(1.0, (found.gain if found else 0.0) / usual)

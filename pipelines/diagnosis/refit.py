@@ -170,13 +170,22 @@ class Later:
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
     def acting(self, state: State) -> Array:
-        """Return the share of each joint (joints,) in the torque of a state's effects."""
-        if not state.model.effects:
+        """Return the share of each joint (joints,) in the torque of all effects.
+
+        An event counts in the whole alone: beyond its moment it leaves nothing.
+        """
+        effects = state.model.effects
+        lasting = tuple(one for one in effects if one.log is None)
+        if not lasting:
             return np.zeros(self.rows.n_joints)
-        plain = self.rows.torque(replace(state.model, effects=()))
-        torque = [a - b for a, b in zip(self.rows.torque(state.model), plain, strict=True)]
-        power = np.array([float(x @ x) for x in torque])
-        return np.asarray(power / max(float(power.sum()), 1e-300))
+        plain, own, whole = (
+            self.rows.torque(replace(state.model, effects=some)) for some in ((), lasting, effects)
+        )
+        power, total = (
+            np.array([float(np.sum((x - y) ** 2)) for x, y in zip(torque, plain, strict=True)])
+            for torque in (own, whole)
+        )
+        return np.asarray(power / max(float(total.sum()), 1e-300))
 
     @cached_property
     def shares(self) -> Array:
