@@ -14,6 +14,7 @@ from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.screening import upper_point
 from pipelines.diagnosis.table import Array, Indices, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
@@ -74,8 +75,8 @@ def event_threshold(
 ) -> float:
     """Return the gain that a window exceeds with probability alpha where nothing touched the arm.
 
-    The largest of m independent windows has a known law; what the reference exceeds it by is the
-    over-dispersion of the rows.
+    The largest of m independent windows has a known law; what the known logs exceed it by is the
+    over-dispersion of the rows, by the largest of each half of a log (`upper_point`).
     """
     from scipy.stats import chi2
 
@@ -87,7 +88,10 @@ def event_threshold(
         for one in best_windows(rows, dictionary, dataset.arm, residual):
             for own in residual:
                 own[one.touched] = 0.0
-    found = best_window(rows, dictionary, dataset.arm, residual)
-    usual = float(chi2.isf(-np.expm1(np.log(0.5) / config.event_candidates), _DIRECTIONS))
-    dispersion = max(1.0, (found.gain if found else 0.0) / usual)
-    return dispersion * float(chi2.isf(config.alpha / config.event_candidates, _DIRECTIONS))
+    gains = []
+    for part in prior.parts:
+        here = [np.where(own, r, 0.0) for own, r in zip(part, residual, strict=True)]
+        found = best_window(rows, dictionary, dataset.arm, here)
+        gains.append(0.0 if found is None else found.gain)
+    bound = float(chi2.isf(config.alpha / config.event_candidates, _DIRECTIONS))
+    return max(bound, upper_point(gains, config.alpha))

@@ -22,7 +22,7 @@ from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.table import Array
 
-__all__ = ["Baseline", "Screened", "baseline", "best_of", "screen"]
+__all__ = ["Baseline", "Screened", "baseline", "best_of", "screen", "upper_point"]
 
 _VISIBLE = 1e-6  # numerics: eigenvalue of H in unit columns, below which a direction is absorbed
 _SPLITS = 6  # of the reference into two
@@ -110,12 +110,14 @@ def baseline(
         for one in best_of(found).values():
             bound = chi2_bound(config.alpha / families, one.freedom)
             excess.setdefault(one.group.family, []).append((one.gain - bound) / rows)
-    bias = {family: max(0.0, _upper(values, config.alpha)) for family, values in excess.items()}
+    bias = {
+        family: max(0.0, upper_point(values, config.alpha)) for family, values in excess.items()
+    }
     if dataset.reference is None:  # a fault is part of what its own family leaves
         second = sorted(bias.values())[-2]
         bias = {family: min(value, second) for family, value in bias.items()}
     return Baseline(
-        config.alpha, families, bias, _upper(fits, config.alpha), float(np.median(fits)), event
+        config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits)), event
     )
 
 
@@ -183,7 +185,7 @@ def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     return out[::step][:_SPLITS]
 
 
-def _upper(values: Sequence[float], alpha: float) -> float:
+def upper_point(values: Sequence[float], alpha: float) -> float:
     """Return the upper `alpha` point of a Gumbel law fitted to maxima by its moments."""
     x = np.asarray(values)
     scale = max(float(x.std(ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12) if len(x) > 1 else 1e-12
