@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.diagnosis.table import Array, Indices, Table, by_joint
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
@@ -221,13 +222,30 @@ def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:
     """Return the rows of prepared logs, with the nominal model of the reference or of themselves.
 
     Logs that judge are rows like the others: the score predicts each block from all others.
+
+    Raises:
+        InputRejected: T08, a joint is held in all reference logs.
     """
     own, judged, before = prepared.data, prepared.judge, prepared.reference
     kept = Kept()
     every = enumerate((*own.logs, *(judged.logs if judged else ())))
     later = Data(tuple(replace(one, place=k, kept=kept) for k, one in every), first=own.first)
+    if before is not None:
+        _refuse_held(before)
     columns, fit = fit_nominal(before or later, prepared.columns)
     model = Exact.start(columns, fit)
     start = min(float(one.motion.t[0]) for one in later.logs)
     reference = None if before is None else Rows.of(before, model)
     return Dataset(model, reference, Rows.of(later, model), tuple(frf), start)
+
+
+def _refuse_held(reference: Data) -> None:
+    """Refuse reference logs that say nothing of a joint."""
+    moving = np.bincount(reference.joint[reference.counts], minlength=reference.n_joints)
+    if not moving.all():
+        joint = int(np.argmin(moving)) + 1
+        raise InputRejected(
+            "T08",
+            f"joint {joint} is held in the logs of role 'reference'",
+            remedy=f"record a reference in which joint {joint} moves, or leave the reference out",
+        )

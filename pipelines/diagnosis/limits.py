@@ -24,7 +24,7 @@ from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.screening import Baseline
 from pipelines.diagnosis.table import Array, Table
 from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
-from pipelines.model.effects.base import Effect
+from pipelines.model.effects.base import Effect, Quantity
 
 __all__ = ["Limits", "limits_of"]
 
@@ -126,14 +126,7 @@ def _told(later: Later, one: _Shape, amplitudes: Array, visible: float) -> Detec
         size = Value(values[q.name], None, q.unit_at(turning))
         less = effect.strength < 0.0
         return Detectable(effect.name, joint, q.name, size, {}, "analytic", visible, less)
-    main = next(
-        (
-            q
-            for q in effect.parameters
-            if not q.shape and not q.derived and values.get(q.name) and np.isfinite(values[q.name])
-        ),
-        None,
-    )
+    main = _main(effect, values)
     if main is None:
         return beyond
     size = Value(abs(values[main.name]), None, main.unit_at(turning))
@@ -149,6 +142,18 @@ def _told(later: Later, one: _Shape, amplitudes: Array, visible: float) -> Detec
         if q.shape and q.name in shown and np.isfinite(values.get(q.name, np.nan))
     }
     return Detectable(effect.name, joint, main.name, size, at, "analytic", visible)
+
+
+def _main(effect: Effect, values: dict[str, float]) -> Quantity | None:
+    """Return the parameter that says how much there is of an effect; None where no value is finite."""
+    return next(
+        (
+            q
+            for q in effect.parameters
+            if not q.shape and not q.derived and values.get(q.name) and np.isfinite(values[q.name])
+        ),
+        None,
+    )
 
 
 def _hiding(later: Later, one: _Shape) -> str:

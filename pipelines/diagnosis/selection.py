@@ -194,21 +194,21 @@ def _contest(
         for key, other in others.items()
     }
     without = _scores(later, state)
+    best = _place(min(scores, key=lambda key: scores[key].sum()))
+    fails = f"{best} does not pay on blocks that it was not fitted to"
     better = {k: v for k, v in (scores | free).items() if v.sum() < without.sum()}
     if not any(one.key in better for one in tried):
-        best = min(scores, key=lambda key: scores[key].sum())
-        return None, (), f"{_place(best)} does not pay on blocks that it was not fitted to"
+        return None, (), fails
     kept = confidence_set(better, config)
-    named = [one for one in tried if one.key in kept]
-    if not named and (near := _nearly(later, state, tried, others, config)):
-        named = [near]
+    named = [one for one in tried if one.key in kept] or _nearly(
+        later, state, tried, others, config
+    )
     if not named:
-        best = min(scores, key=lambda key: scores[key].sum())
-        return None, (), f"{_place(kept[0])} predicts better than {_place(best)}"
+        return None, (), f"{_place(kept[0])} predicts better than {best}"
     pick = min(named, key=lambda one: scores[one.key].sum())
     pays = confidence_set({"with": scores[pick.key], "without": without}, config)
     if "without" in pays and not pick.event:
-        return None, (), f"{_place(pick.key)} does not pay on blocks that it was not fitted to"
+        return None, (), fails
     return pick, tuple(one.key for one in named if one is not pick), ""
 
 
@@ -218,12 +218,12 @@ def _nearly(
     tried: Sequence[Candidate],
     others: Mapping[Key, State],
     config: DiagnosisConfig,
-) -> Candidate | None:
+) -> list[Candidate]:
     """Return the cause that explains as much as any shape without a name, as far as laws are exact."""
     best = min(tried, key=lambda one: _loss(later, one.state))
     free = min(_loss(later, other) for other in others.values())
     missing = _loss(later, best.state) - free
-    return best if missing < config.relevance * (_loss(later, state) - free) else None
+    return [best] if missing < config.relevance * (_loss(later, state) - free) else []
 
 
 def _refitted(

@@ -15,13 +15,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import FORM
+from pipelines.diagnosis.candidates import FORM, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores
-from pipelines.diagnosis.screening import best_of
+from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.selection import Candidate, refit
 from pipelines.diagnosis.trained import Standing
 from pipelines.model.diagnosis.fitted.refit import refine
@@ -94,20 +94,8 @@ def _flat(prior: Prior) -> Prior:
 
 def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Candidate | None:
     """Return the cause that predicts best, None where none pays."""
-    taken = {(one.effect.name, one.effect.joint) for one in state.model.effects}
     every = best_of(own.screened(state))
-    seen = [s for key, s in every.items() if s.group.kind == "named" and key not in taken]
-    known, motions = ([one.motion for one in rows.data.logs] for rows in (own.rows, later))
-    tried = []
-    for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
-        effect = own.dictionary.families[one.group.key].shapes[one.group.shape].full()
-        done = refit(own, state, one.group.key, effect, one.amplitudes)
-        if done is None or not done.possible:
-            continue
-        without = state.mean_squares / done.state.mean_squares
-        beyond = done.state.model.effects[-1].effect.beyond(motions, known)
-        if without.max() > config.excess and not beyond:
-            tried.append(done)
+    tried = _tried(own, state, every, later, config)
     if not tried:
         return None
     best = min(tried, key=lambda one: float(one.state.losses.sum()))
@@ -120,3 +108,23 @@ def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Can
     scores = {name: log_scores(one.losses, own.block_rows) for name, one in models.items()}
     kept = confidence_set(scores, config)
     return best if "with" in kept and "without" not in kept else None
+
+
+def _tried(
+    own: Later, state: State, every: dict[Key, Screened], later: Rows, config: DiagnosisConfig
+) -> list[Candidate]:
+    """Return the causes that a joint leaves too much without, and that hold where later logs go."""
+    taken = {(one.effect.name, one.effect.joint) for one in state.model.effects}
+    seen = [s for key, s in every.items() if s.group.kind == "named" and key not in taken]
+    known, motions = ([one.motion for one in rows.data.logs] for rows in (own.rows, later))
+    tried = []
+    for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
+        effect = own.dictionary.families[one.group.key].shapes[one.group.shape].full()
+        done = refit(own, state, one.group.key, effect, one.amplitudes)
+        if done is None or not done.possible:
+            continue
+        without = state.mean_squares / done.state.mean_squares
+        beyond = done.state.model.effects[-1].effect.beyond(motions, known)
+        if without.max() > config.excess and not beyond:
+            tried.append(done)
+    return tried

@@ -64,7 +64,8 @@ def components(
     np.maximum.at(largest, own, mean_square)
     alike = np.array([g.kind == "unnamed" for g in of])  # columns that share a variance [(N m)²]
     mean_square = np.where(alike, largest[own], mean_square)
-    flat = _FLAT * np.diag(gram)[:n_nominal]
+    square = np.diag(gram)[:n_nominal]
+    flat = _FLAT * np.where(square > 0.0, square, 1.0)
     tau, mean, noise = np.full(len(own), _START), np.zeros(len(gram)), 1.0
     per_group, per_family = np.bincount(own), np.bincount(family)
     for _ in range(config.em_rounds):

@@ -6,10 +6,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from pipelines.diagnosis.engine import Diagnosis, diagnose
+from pipelines.errors import InputRejected
 from pipelines.log.hdf5 import read_parts
+from tests.healthy import with_signal
 
 _ALONE = (
     "01",
@@ -67,3 +70,15 @@ def test_a_verdict_does_not_depend_on_what_was_asked_before(shared: Path) -> Non
     _found(shared, "08")
     again, _ = _found(shared, "12")
     assert again.decision == first.decision
+
+
+def test_a_joint_that_the_reference_never_moves_is_refused(shared: Path) -> None:
+    logs = [read_parts(path)[0] for path in sorted((shared / "plant-b/arm-14").glob("*.h5"))]
+    held = [
+        with_signal(log, q=np.column_stack([np.full(log.n_samples, log.q[0, 0]), log.q[:, 1:]]))
+        if log.role == "reference"
+        else log
+        for log in logs
+    ]
+    with pytest.raises(InputRejected, match="joint 1 is held"):
+        diagnose(held)
