@@ -29,7 +29,7 @@ _TURN = 2.0 * math.pi
 UNITS: Final[dict[str, Unit]] = {
     # time
     "s": Unit("time", 1.0), "ms": Unit("time", 1e-3), "us": Unit("time", 1e-6), "µs": Unit("time", 1e-6),
-    "ns": Unit("time", 1e-9), "min": Unit("time", 60.0),
+    "ns": Unit("time", 1e-9), "100 ns": Unit("time", 1e-7), "min": Unit("time", 60.0), "d": Unit("time", 86400.0),
     # position, revolute and prismatic
     "rad": Unit("position", 1.0), "mrad": Unit("position", 1e-3), "deg": Unit("position", math.pi / 180.0),
     "°": Unit("position", math.pi / 180.0), "rev": Unit("position", _TURN), "turn": Unit("position", _TURN),

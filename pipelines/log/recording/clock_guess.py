@@ -14,21 +14,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.recording.column_names import read_name, words_of
 from pipelines.log.recording.column_roles import Group, unit_of_group
 from pipelines.log.recording.evidence import Guess, Slope, units_of_ratio
 from pipelines.log.recording.raw import RawTable
+from pipelines.log.units import UNITS
 
 __all__ = ["Clock", "find_clock", "unit_of_clock"]
 
-SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_COMMON = ("s", "ms", "us", "ns")
+SECONDS = {unit: UNITS[unit].factor for unit in (*_COMMON, "100 ns", "min", "d")}
 _RATES = (1.0, 2e4)  # [Hz] of recordings whose time has no unit
 _PACE = (
     0.02,
     50.0,
 )  # [1/s] fastest speed over range of motion; the unit of length or angle cancels
-_EPOCH = (1e9, 4e9)  # [s] since 1970: the years 2001 to 2096
+_THIS_CENTURY = (1e9, 4e9)  # [s] since 1970: the years 2001 to 2096
+# (unit, year in which it begins to count, [s] from there to 1970): Unix, LabVIEW, .NET, Windows files, spreadsheets, MATLAB
+_EPOCHS = (*((unit, "1970", 0.0) for unit in _COMMON), ("s", "1904", 2082844800.0), ("100 ns", "1", 62135596800.0),
+           ("100 ns", "1601", 11644473600.0), ("d", "1900", 25569 * 86400.0), ("d", "0", 719529 * 86400.0))
 _RISING = 0.9  # of all steps of a clock; some stamps come twice, some clocks are set back
 _EVEN = 0.3  # standard deviation over mean of the steps of a clock without a name
 _RATIO_TOLERANCE = 0.02
@@ -48,7 +54,11 @@ class Clock:
 
 
 def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
-    """Return the clock of the recording; None where no column rises like one."""
+    """Return the clock of the recording; None where no column rises like one.
+
+    Raises:
+        InputRejected: T01, the only column of time runs backwards.
+    """
     of = {column: group.quantity for group in groups for column in group.columns}
     times, counters, plain = (
         [c for c in table.columns if of.get(c) == quantity] for quantity in ("time", "index", "")
@@ -57,6 +67,9 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         clock for pair in itertools.pairwise(times) if (clock := _pair(table, *pair, named=True))
     ]
     found += [_single(table, c) for c in times if _rises(table.columns[c])]
+    if not found and (backwards := [c for c in times if _rises(-table.columns[c])]):
+        raise InputRejected("T01", "falls from row to row: the newest row is first", where=f"{table.source}, column '{backwards[0]}'",
+                            remedy="sort the rows by it, the oldest first")
     if found:
         uneven = [_unevenness(clock.values) for clock in found]
         best = min(uneven)
@@ -153,42 +166,46 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
     named = clock.units[0]
     if named and named not in SECONDS:
         return "", Guess("", "unsure", f"its name or header says '{named}': s, ms, us or ns?")
-    if named and 0.1 * _RATES[0] <= 1.0 / (median * SECONDS[named]) <= 10.0 * _RATES[1]:
-        return named, Guess(
-            named,
-            "sure",
-            f"named so, and a median step of {median:.4g} makes "
-            f"{1 / (median * SECONDS[named]):.4g} Hz",
-        )
-    fits = [unit for unit, f in SECONDS.items() if _RATES[0] <= 1.0 / (median * f) <= _RATES[1]]
-    if (
-        since := [unit for unit in fits if _EPOCH[0] < clock.values[0] * SECONDS[unit] < _EPOCH[1]]
-    ) and len(since) == 1:
-        return since[0], Guess(
-            since[0],
-            "sure",
-            f"counted since 1970, and a median step of {median:.4g} makes "
-            f"{1 / (median * SECONDS[since[0]]):.4g} Hz",
-        )
-    rates = {unit: f"{1 / (median * SECONDS[unit]):.4g} Hz in {unit}" for unit in fits}
-    counts = _counts(clock.values)
-    why = [
-        f"a median step of {median:.4g} would be {' or '.join(rates.values()) or 'no plausible rate'}"
+    rates = {unit: 1.0 / (median * f) for unit, f in SECONDS.items()}
+    by_velocity = [
+        unit
+        for unit in _COMMON
+        if slope is not None and units_of_ratio(slope.factor / SECONDS[unit], _RATIO_TOLERANCE)
     ]
-    if q is not None and (span := float(np.ptp(q, axis=0).max())) > 0:
-        pace = _pace(clock.values, q) / span
-        paced = [unit for unit in fits if _PACE[0] <= pace / SECONDS[unit] <= _PACE[1]]
+    if named and 0.1 * _RATES[0] <= rates[named] <= 10.0 * _RATES[1]:
+        if problem := _contradicts(named, rates, by_velocity, clock.values, q):
+            return "", Guess("", "unsure", f"its name or header says '{named}', but {problem}")
+        return named, Guess(
+            named, "sure", f"named so, and a median step of {median:.4g} makes {rates[named]:.4g} Hz"
+        )
+    plausible = [unit for unit, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
+    since = [
+        (unit, year)
+        for unit, year, offset in _EPOCHS
+        if unit in plausible
+        and _THIS_CENTURY[0] < clock.values[0] * SECONDS[unit] - offset < _THIS_CENTURY[1]
+    ]
+    if len(since) == 1:
+        unit, year = since[0]
+        return unit, Guess(
+            unit,
+            "sure",
+            f"counted since the year {year}, and a median step of {median:.4g} makes {rates[unit]:.4g} Hz",
+        )
+    fits = [unit for unit in plausible if unit in _COMMON]
+    counts = _counts(clock.values)
+    would = " or ".join(f"{rates[unit]:.4g} Hz in {unit}" for unit in fits)
+    why = [f"a median step of {median:.4g} would be {would or 'no plausible rate'}"]
+    if q is not None:
+        paced = _paced(fits, clock.values, q)
         if len(paced) < len(fits):
             why.append("the pace of the motion leaves " + (" or ".join(paced) or "none"))
         fits = paced
-    if slope is not None:
-        agreeing = [
-            unit for unit in fits if units_of_ratio(slope.factor / SECONDS[unit], _RATIO_TOLERANCE)
-        ]
-        if len(agreeing) == 1:
-            return agreeing[0], Guess(
-                agreeing[0], "likely", f"{'; '.join(why)}; the recorded velocity agrees"
-            )
+    agreeing = [unit for unit in fits if unit in by_velocity]
+    if len(agreeing) == 1:
+        return agreeing[0], Guess(
+            agreeing[0], "likely", f"{'; '.join(why)}; the recorded velocity agrees"
+        )
     if len(fits) == 1 and not counts:
         return fits[0], Guess(fits[0], "likely", "; ".join(why))
     why += (
@@ -199,10 +216,24 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
     return "", Guess("", "unsure", "; ".join(why))
 
 
-def _pace(t: Array, q: Array) -> float:
-    """Return the largest mean speed over a hundredth of the recording, in the recorded units."""
+def _contradicts(
+    named: str, rates: dict[str, float], by_velocity: Sequence[str], t: Array, q: Array | None
+) -> str:
+    """Return what speaks against a unit of time that is named: a recorded velocity, or rate and pace; "" where nothing does."""
+    if by_velocity and named not in by_velocity:
+        return f"the recorded velocity is the slope of the position in {' or '.join(by_velocity)}"
+    slow = rates[named] < _RATES[0] and q is not None and not _paced([named], t, q)
+    return f"that makes {rates[named]:.4g} Hz, and a motion too slow for a robot" if slow else ""
+
+
+def _paced(units: Sequence[str], t: Array, q: Array) -> list[str]:
+    """Return the units in which the largest mean speed over a hundredth of the recording is a robot's; all of one at rest."""
+    span = float(np.ptp(q, axis=0).max())
     width = max(1, t.size // 100)
     elapsed = t[width:] - t[:-width]
     moved = np.abs(q[width:] - q[:-width]).max(axis=1)
     good = elapsed > 0
-    return float((moved[good] / elapsed[good]).max()) if good.any() else 0.0
+    if span == 0.0:
+        return list(units)
+    pace = float((moved[good] / elapsed[good]).max()) / span if good.any() else 0.0
+    return [unit for unit in units if _PACE[0] <= pace / SECONDS[unit] <= _PACE[1]]

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from pipelines.log.experiment import Array
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
+from pipelines.log.units import UNITS
 
 __all__ = ["Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
            "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
@@ -44,6 +45,8 @@ def rollover(values: Array) -> float | None:
     others = np.abs(steps[np.abs(steps) <= 0.8 * size])
     if not jumps.size or (others.size and others.max() > 0.2 * size) or np.ptp(jumps) > 0.1 * jumps.mean():
         return None
+    if (np.abs(steps[1:] + steps[:-1])[np.abs(steps[1:]) > 0.8 * size] < 0.2 * size).any():
+        return None  # there and back again: numbers that stand for a lost sample
     candidates = (360.0, 2 * math.pi, 1.0, *map(float, _RESOLUTIONS))
     near = min(candidates, key=lambda c: abs(jumps.max() - c) / c)
     return near if abs(jumps.max() - near) / near < 0.1 else float(jumps.max())
@@ -53,6 +56,7 @@ def rollover(values: Array) -> float | None:
 _ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
                   6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
 _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
+_TURNING = {unit: UNITS[unit].factor for unit in ("rad", "mrad", "deg", "rev", "turn")}
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
@@ -114,14 +118,17 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
     further = f", wrap = {wrap:g}" if wrap is not None else ""
     if named == "counts" or (named is None and span > 2000.0 and _whole(q)):
         return _counts(q, span, wrap, named)
-    if named in ("rad", "mrad", "deg", "rev", "turn"):
+    if named in _TURNING:
+        if side != "motor" and (beyond := _beyond(q, joints, named)):
+            return Guess("", "unsure", f"its name or header says '{named}', {beyond}: another unit, or the motor's side?"), further
         return Guess(named, "sure" if _possible(span, named) else "unsure",
                      f"named so; the largest range is {span:.4g} {named}"), further
     if named is not None:
         return unknown_unit(named), further
     if wrap in (360.0, 2.0 * math.pi):
         return Guess("deg" if wrap == 360.0 else "rad", "likely", f"it starts again after {wrap:.4g}, one turn"), further
-    if slope is not None and (found := _by_velocity(slope)) is not None:
+    if slope is not None and (found := _by_velocity(slope)) is not None and not (
+            side != "motor" and _beyond(q, joints, found.value)):
         return found, further
     if turns := quarter_turns(q):
         return Guess("rad", "likely", f"starts at {', '.join(f'{x}' for x in turns.values())} times pi/2: "
@@ -144,6 +151,15 @@ def _inside(q: Array, joint: Joint) -> bool:
     low, high = joint.position
     slack = 0.05 * (high - low)
     return bool(q.min() >= low - slack and q.max() <= high + slack)
+
+
+def _beyond(q: Array, joints: Sequence[Joint], unit: str) -> str:
+    """Say that a joint would move over more than twice its range, as no joint does; "" where none would."""
+    for values, joint in zip(q.T, joints, strict=False):
+        span, room = float(np.ptp(values)) * _TURNING[unit], joint.position[1] - joint.position[0]
+        if math.isfinite(room) and span > 2.0 * room:
+            return f"but joint '{joint.name}' would move over {span:.4g} rad where its limits leave {room:.4g}"
+    return ""
 
 
 def _by_limits(q: Array, joints: Sequence[Joint], side: Side) -> Guess | None:
@@ -232,8 +248,13 @@ def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tup
 
 
 def units_of_ratio(factor: float, tolerance: float = 0.1) -> tuple[str, str] | None:
-    """The units of position and velocity that are a factor apart, ("", "") where both have one unit of angle, else None."""
+    """The units of position and velocity that are a factor apart, ("", "") where both have one unit of angle, else None.
+
+    A power of ten is none of angles, but of a wrong unit of time: 0.1 is not the 0.105 of rad and rpm.
+    """
     nearest = min(_ANGULAR_RATIOS, key=lambda ratio: abs(factor / ratio - 1.0))
+    if factor > 0 and abs(factor / nearest - 1.0) > abs(factor / 10.0 ** round(math.log10(factor)) - 1.0):
+        return None
     return _ANGULAR_RATIOS[nearest] if abs(factor / nearest - 1.0) <= tolerance else None
 
 

@@ -55,6 +55,7 @@ __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
+_FAR_OFF = 3.0  # ranges of the other numbers between them and one that stands for a lost sample
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
@@ -95,18 +96,35 @@ def guess_recipe(path: Path, robot: str | None = None) -> Draft:
     if len(table.columns) > _MOST_COLUMNS:
         raise InputRejected("F16", f"{len(table.columns)} columns: too many to guess what each is", where=path,
                             remedy="export the joints' signals alone, or write the recipe")
-    table = _sound(table)
+    lost = _lost_numbers(table)
+    table = _sound(table, lost)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
     companion = companion_for(reading)
     if companion is not None:
-        companion = _sound(companion)
+        companion = _sound(companion, lost)
         reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
-    return _Drafting(reading).draft()
+    return _Drafting(reading, lost).draft()
 
 
-def _sound(table: RawTable) -> RawTable:
-    """Leave out what would disturb a guess: rows with a hole or an absurd number, columns of nothing else."""
-    usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) for name, values in table.columns.items()}
+def _lost_numbers(table: RawTable) -> list[float]:
+    """Return whole numbers that stand for a lost sample: in cells of their own, farther off than all others are apart."""
+    found: Counter[float] = Counter()
+    for column in table.columns.values():
+        values = column[np.isfinite(column) & (np.abs(column) < _NO_NUMBER)]
+        for number in (float(values.min()), float(values.max())) if values.size else ():
+            others = values[values != number]
+            if number != round(number) or np.unique(others[:1000]).size < 50:
+                continue
+            room = float(np.ptp(others))
+            if min(abs(number - others.min()), abs(number - others.max())) > _FAR_OFF * room > 0.0:
+                found[number] += values.size - others.size
+    return sorted(number for number, cells in found.items() if cells > 1)
+
+
+def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
+    """Leave out what would disturb a guess: rows with a hole, an absurd or a lost number, columns of nothing else."""
+    usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
+              for name, values in table.columns.items()}
     topic = _topic(usable)
     usable = {name: known[topic] for name, known in usable.items()}
     table = replace(table, columns={name: values[topic] for name, values in table.columns.items()}, rows=table.rows[topic],
@@ -129,8 +147,9 @@ def _topic(usable: Mapping[str, npt.NDArray[np.bool_]]) -> npt.NDArray[np.bool_]
 class _Drafting:
     """Collects the lines of a draft. Not frozen: it is the pencil, the `Draft` is the result."""
 
-    def __init__(self, reading: Reading) -> None:
+    def __init__(self, reading: Reading, lost: Sequence[float]) -> None:
         self.reading = reading
+        self.lost = lost
         self.evidence: list[str] = []
         self.blanks: list[str] = []
         q, tau = reading.q.group, reading.tau.group
@@ -166,7 +185,8 @@ class _Drafting:
         lines += [f"# {clean(check.message, 200)}." for check in table.checks if check.level != "ok"]
         lines += [f"# Go through every \"check:\" and fill in what says {BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
                   ""]
-        lines += [*self._robot(), *self._log(), *self._time(), *self._signals(), *self._drive(), *self._resample()]
+        lines += [*self._robot(), *self._log(), *self._time(), *self._signals(), *self._drive(), *self._missing(),
+                  *self._resample()]
         return Draft("\n".join(lines) + "\n", tuple(self.evidence), tuple(self.blanks))
 
     def _robot(self) -> list[str]:
@@ -285,7 +305,7 @@ class _Drafting:
             guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints, group.side)
             for j in turning:
                 said = named[j] or ""
-                units[j] = said if said in UNITS or said == "counts" else guess.value
+                units[j] = said if guess.value and (said in UNITS or said == "counts") else guess.value
             why.append(guess)
             if guess.value == "rad" and "times pi/2" in guess.why:
                 self.ratios = quarter_turns(self.q)
@@ -345,6 +365,8 @@ class _Drafting:
         peak = f"up to {np.abs(self.tau).max():.4g}"
         if choice.group.words == WITHOUT_NAME:
             guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
+        elif guess.value == "N m" and guess.confidence != "sure" and self._side_open():
+            guess = Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
         elif choice.group.words == BY_FILE and guess.confidence != "sure":
             guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
         self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
@@ -394,12 +416,24 @@ class _Drafting:
             lines.append(f'torque_constant = "{blank}"             # N m/A, motor side: from the data sheet')
         return [*lines, ""]
 
+    def _side_open(self) -> bool:
+        """Tell whether no unit brings the positions inside the robot's limits: then their side of the gear is open."""
+        group = self.reading.q.group
+        return bool(self.joints) and group is not None and not group.motor and "" in self._position_units(group)[0]
+
     def joints_side(self) -> bool:
         """Tell whether positions that are named the motor's are inside the limits of the robot's joints, in some unit."""
         if not self.joints or self.q is None:
             return False
         group = self.reading.q.group
         return group is not None and "" not in self._position_units(group)[0]
+
+    def _missing(self) -> list[str]:
+        """Return [missing] with the numbers that stand for a lost sample; nothing where none does."""
+        if not self.lost:
+            return []
+        guess = Guess(str(self.lost), "likely", "far from all other numbers of its column, in several cells: a lost sample")
+        return ["[missing]", f"values = {self.lost}   {self.note('missing', guess)}", ""]
 
     def _resample(self) -> list[str]:
         if self.t is None:

@@ -44,6 +44,7 @@ __all__ = [
 
 WITHOUT_NAME, BY_FILE = "columns without a name", "columns named by their file"
 _MOST_JOINTS = 16
+_UNIT_NORM = 1e-3  # error of a quaternion's norm, written with four digits or more
 _MOST_BLOCKS = 6
 _JOINT_WORDS = frozenset(
     {"joint", "joints", "jnt", "axis", "axes", "achse", "gelenk", "j", "a", "link"}
@@ -124,7 +125,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
         if (rest := tuple(c for c in g.columns if c not in used))
     ]
     n = arm.robot.n_joints if arm.robot else None
-    groups = [_without_rest(table, g, n) for g in groups]
+    groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
         q = _unnamed_positions(table, groups, n, q)
@@ -153,11 +154,11 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
         q, dq, tau = found or (q, dq, tau)
     slope = None
     if q.group and dq.group:
-        slope = slope_of(
-            matrix(table, q.group.columns),
-            matrix(table, dq.group.columns),
-            clock.values if clock else None,
-        )
+        t, speed = clock.values if clock else None, matrix(table, dq.group.columns)
+        slope = slope_of(matrix(table, q.group.columns), speed, t)
+        rivals = [g for g in q.others if g.origin != "commanded" and len(g.columns) == speed.shape[1]]
+        if slope is None and any(slope_of(matrix(table, g.columns), speed, t) for g in rivals):
+            q = Choice(None, (q.group, *q.others))  # the velocity is another position's
     return Reading(path, table, arm, clock, q, dq, _in_one_order(q, tau), table, slope, by_evidence)
 
 
@@ -197,6 +198,14 @@ def _without_rest(table: RawTable, group: Group, n: int | None) -> Group:
     if not rest or any(np.ptp(table.columns[c]) > 0.0 for c in rest) or any(np.ptp(table.columns[c]) == 0.0 for c in first):
         return group
     return replace(group, columns=first)
+
+
+def _is_orientation(table: RawTable, group: Group) -> bool:
+    """Tell whether four columns are a unit quaternion, whatever their name says: their squares add up to one."""
+    if len(group.columns) != 4:
+        return False
+    x = matrix(table, group.columns)
+    return bool(np.ptp(x) > 0 and np.abs((x**2).sum(axis=1) - 1.0).max() < _UNIT_NORM)
 
 
 def _undisputed(table: RawTable, q: Choice) -> Choice:
