@@ -68,7 +68,8 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     ]
     found += [_single(table, c) for c in times if _rises(table.columns[c])]
     if not found and (backwards := [c for c in times if _rises(-table.columns[c])]):
-        raise InputRejected("T01", "falls from row to row: the newest row is first", where=f"{table.source}, column '{backwards[0]}'",
+        where = f"{table.source}, column '{backwards[0]}'"
+        raise InputRejected("T01", "falls from row to row: the newest row is first", where=where,
                             remedy="sort the rows by it, the oldest first")
     if found:
         uneven = [_unevenness(clock.values) for clock in found]
