@@ -186,8 +186,8 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
         if unit in plausible
         and _THIS_CENTURY[0] < clock.values[0] * SECONDS[unit] - offset < _THIS_CENTURY[1]
     ]
-    if len(since) == 1:
-        unit, year = since[0]
+    if len({unit for unit, _ in since}) == 1:
+        unit, year = since[0][0], " or ".join(year for _, year in since)
         return unit, Guess(
             unit,
             "sure",

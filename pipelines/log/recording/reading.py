@@ -15,6 +15,7 @@ import numpy as np
 from pipelines.errors import RrridError
 from pipelines.log.experiment import Array
 from pipelines.log.recording.clock_guess import Clock, find_clock
+from pipelines.log.recording.column_names import words_of
 from pipelines.log.recording.column_roles import (
     Choice,
     Group,
@@ -126,6 +127,8 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     ]
     n = arm.robot.n_joints if arm.robot else None
     groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
+    if any({"from", "start"} <= set(words_of(c)) for c in used):  # the points of a planned trajectory (ROS)
+        groups = [replace(g, origin="commanded") for g in groups]
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
         q = _unnamed_positions(table, groups, n, q)

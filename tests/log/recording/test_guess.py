@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from benchmarks.import_layouts import motion, urdf
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.files import open_log
 from pipelines.log.recording.evidence import rollover, sign_of
@@ -173,3 +175,65 @@ def test_positions_that_differ_by_a_constant_are_asked_about(tmp_path: Path) -> 
     columns = good()
     further = {f"obs_q_{j}": columns[f"q_{j}"] - 0.3 for j in (1, 2, 3)}
     assert "signals.q" in guess_recipe(write(tmp_path, text(columns | further))).blanks
+
+
+def _table(folder: Path, edit: Callable[[dict[str, Array]], None], header: Mapping[str, str]) -> str:
+    """Return the draft for 700 samples at 250 Hz of three joints within ±3.15 rad, edited, beside their robot."""
+    moved = motion(3)
+    columns: dict[str, Array] = {"t": moved.t}
+    for name, values in (("q", moved.q), ("dq", moved.dq), ("tau", moved.tau)):
+        columns |= {f"{name}{j + 1}": column for j, column in enumerate(values.T)}
+    edit(columns)
+    (folder / "arm.urdf").write_bytes(urdf(("a", "b", "c")))
+    return drafted(folder, text({header.get(name.rstrip("123"), name).replace("#", name[-1]): v for name, v in columns.items()}))
+
+
+def _scale(name: str, factor: float, offset: float = 0.0) -> Callable[[dict[str, Array]], None]:
+    def edit(columns: dict[str, Array]) -> None:
+        columns.update({c: np.round(factor * v + offset, 12) for c, v in columns.items() if c.rstrip("123") == name})
+    return edit
+
+
+def test_a_named_unit_that_the_robots_limits_contradict_is_a_blank(tmp_path: Path) -> None:
+    """No joint moves over twice its range: "[rad]" above degrees is left open, and so is the side of the torque."""
+    draft = _table(tmp_path, _scale("q", 180.0 / np.pi), {"q": "q# [rad]"})
+    assert 'q = { columns = "q{j}", unit = "FILL IN" }' in draft
+    assert "its name or header says 'rad', but joint 'a' would move over" in draft
+    assert 'tau = { columns = "tau{j}", unit = "FILL IN" }' in draft
+
+
+def test_a_named_unit_of_time_that_a_velocity_contradicts_is_a_blank(tmp_path: Path) -> None:
+    draft = _table(tmp_path, _scale("t", 1000.0), {"t": "time [s]"})
+    assert 'unit = "FILL IN"' in draft
+    assert "says 's', but the recorded velocity is the slope of the position in ms" in draft
+
+
+@pytest.mark.parametrize(("factor", "offset", "unit", "year"), [
+    (1e7, 638503345312500000.0, "100 ns", "1"), (1.0 / 86400.0, 45415.5848524, "d", "1900"), (1.0, 3.797591e9, "s", "1970 or 1904")])
+def test_a_clock_is_known_by_the_century_it_counts_to(tmp_path: Path, factor: float, offset: float, unit: str, year: str) -> None:
+    """.NET counts 100 ns since the year 1, spreadsheets days since 1900, LabVIEW seconds since 1904."""
+    draft = _table(tmp_path, _scale("t", factor, offset), {"t": "Ticks"})
+    assert f'unit = "{unit}"   # sure, counted since the year {year},' in draft
+
+
+def test_rows_with_the_newest_first_are_refused(tmp_path: Path) -> None:
+    """Torque against a motion that runs backwards would have its friction reversed."""
+    with pytest.raises(InputRejected, match=r"RRID-T01.*newest row is first.*Sort the rows"):
+        _table(tmp_path, lambda columns: columns.update({c: v[::-1] for c, v in columns.items()}), {})
+
+
+def test_a_number_that_stands_for_a_lost_sample_is_told(tmp_path: Path) -> None:
+    def lose(columns: dict[str, Array]) -> None:
+        columns["q1"][[50, 300]] = columns["tau2"][400] = -9999.0
+    draft = _table(tmp_path, lose, {})
+    assert "[missing]\nvalues = [-9999.0]" in draft
+    assert 'q = { columns = "q{j}", unit = "rad" }' in draft
+
+
+def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
+    """Four columns whose squares add up to one, called q0 to q3, beside the four joints' angles."""
+    half, moved = 0.5 * motion(4).q[:, 0], motion(4)
+    columns = {"t": moved.t} | {f"q{k}": v for k, v in enumerate((np.cos(half), 0.6 * np.sin(half), 0.8 * np.sin(half), 0.0 * half))}
+    columns |= {f"angle{j + 1}": v for j, v in enumerate(moved.q.T)} | {f"tau{j + 1}": v for j, v in enumerate(moved.tau.T)}
+    (tmp_path / "arm.urdf").write_bytes(urdf(("a", "b", "c", "d")))
+    assert 'q = { columns = "angle{j}", unit = "rad" }' in drafted(tmp_path, text(columns))
