@@ -16,7 +16,7 @@ __all__ = ["declared_step", "plausible_units", "time_of"]
 
 _NEAR = 0.2  # a rate within a fifth of the declared one is the declared one
 _FASTEST, _SLOWEST = 1e5, 1.0  # [Hz] what robots are recorded at
-_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_UNITS = {unit: UNITS[unit].factor for unit in ("s", "ms", "us", "ns")}
 
 
 def declared_step(spec: TimeSpec) -> float | None:

@@ -57,6 +57,7 @@ _ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 1
                   6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
 _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
 _TURNING = {unit: UNITS[unit].factor for unit in ("rad", "mrad", "deg", "rev", "turn")}
+_WIDEST = {"rad": 400.0, "mrad": 4e5, "deg": 36000.0, "rev": 1e4, "turn": 1e4}  # range of a motor in a recording
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
@@ -119,9 +120,12 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
     if named == "counts" or (named is None and span > 2000.0 and _whole(q)):
         return _counts(q, span, wrap, named)
     if named in _TURNING:
-        if side != "motor" and (beyond := _beyond(q, joints, named)):
-            return Guess("", "unsure", f"its name or header says '{named}', {beyond}: another unit, or the motor's side?"), further
-        return Guess(named, "sure" if _possible(span, named) else "unsure",
+        problem = "" if side == "motor" else _beyond(q, joints, named)
+        if not problem and slope is not None and (found := _by_velocity(slope)) and UNITS[found.value] != UNITS[named]:
+            problem = f"but {found.why}"
+        if problem:
+            return Guess("", "unsure", f"its name or header says '{named}', {problem}: another unit, or the motor's side?"), further
+        return Guess(named, "sure" if span <= _WIDEST[named] else "unsure",
                      f"named so; the largest range is {span:.4g} {named}"), further
     if named is not None:
         return unknown_unit(named), further
@@ -359,7 +363,3 @@ def motion_of(q: Array, unit: str) -> list[str]:
 
 def _whole(q: Array) -> bool:
     return bool((q == np.round(q)).mean() > 0.99)
-
-
-def _possible(span: float, unit: str) -> bool:
-    return span <= {"rad": 400.0, "mrad": 4e5, "deg": 36000.0, "rev": 1e4, "turn": 1e4}[unit]

@@ -11,12 +11,11 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
@@ -125,7 +124,9 @@ def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
     """Leave out what would disturb a guess: rows with a hole, an absurd or a lost number, columns of nothing else."""
     usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
               for name, values in table.columns.items()}
-    topic = _topic(usable)
+    # A table of several topics leaves the cells of the others empty: the rows in which most columns hold numbers.
+    masks = Counter(known.tobytes() for known in usable.values() if known.any())
+    topic = np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
     usable = {name: known[topic] for name, known in usable.items()}
     table = replace(table, columns={name: values[topic] for name, values in table.columns.items()}, rows=table.rows[topic],
                     lines=None if table.lines is None else table.lines[topic])
@@ -136,12 +137,6 @@ def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
                             remedy="give a recording of a motion")
     return replace(table, columns={name: values[keep] for name, values in columns.items()}, rows=table.rows[keep],
                    lines=None if table.lines is None else table.lines[keep])
-
-
-def _topic(usable: Mapping[str, npt.NDArray[np.bool_]]) -> npt.NDArray[np.bool_]:
-    """Return the rows in which most columns hold numbers: a table of several topics leaves the cells of the others empty."""
-    masks = Counter(known.tobytes() for known in usable.values() if known.any())
-    return np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
 
 
 class _Drafting:
@@ -160,10 +155,13 @@ class _Drafting:
         self.joints: tuple[Joint, ...] = arm.joints if arm is not None else ()
         self.clock_unit, self.clock_guess = "", Guess("", "unsure", "")
         self.t: Array | None = None  # [s]
+        self.slope = reading.slope if reading.clock is None else None  # of q against dq, per second (or sample)
         if reading.clock is not None:
             self.clock_unit, self.clock_guess = unit_of_clock(reading.clock, self.q, reading.slope)
             factor = 1.0 if reading.clock.paired else SECONDS.get(self.clock_unit)
-            self.t = reading.clock.values * factor if factor is not None else None
+            if factor is not None:
+                self.t = reading.clock.values * factor
+                self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
         self.current = tau is not None and tau.quantity == "current"
         self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
 
@@ -185,8 +183,8 @@ class _Drafting:
         lines += [f"# {clean(check.message, 200)}." for check in table.checks if check.level != "ok"]
         lines += [f"# Go through every \"check:\" and fill in what says {BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
                   ""]
-        lines += [*self._robot(), *self._log(), *self._time(), *self._signals(), *self._drive(), *self._missing(),
-                  *self._resample()]
+        lines += [*self._robot(), *self._log(), *self._time(), "[signals]", *self._position(), *self._velocity(),
+                  *self._torque(), "", *self._drive(), *self._missing(), *self._resample()]
         return Draft("\n".join(lines) + "\n", tuple(self.evidence), tuple(self.blanks))
 
     def _robot(self) -> list[str]:
@@ -250,8 +248,8 @@ class _Drafting:
         """Return [time] without a column: the rate, which a recorded velocity may show."""
         slope = self.reading.slope
         rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
-        near = _round_number(rate) if math.isfinite(rate) else None
-        if near is not None:
+        near = _round_below(1.005 * rate) if math.isfinite(rate) else math.nan
+        if abs(rate / near - 1.0) < 5e-3:  # recorders are set to round rates
             guess = Guess(f"{near:g} Hz", "likely", f"the recorded velocity is {rate:.5g} times the step of the position from "
                           "sample to sample, if both are in one unit of angle")
             return ["[time]", f"rate = {near:g}   {self.note('rate', guess)}", ""]
@@ -273,9 +271,6 @@ class _Drafting:
                 "#     then delete [log], [time] and [signals], and write",
                 f"#     [[table]] match = {file}, columns = {{ position = {{ column = …, unit = … }}, … }}"]
 
-    def _signals(self) -> list[str]:
-        return ["[signals]", *self._position(), *self._velocity(), *self._torque(), ""]
-
     def _position(self) -> list[str]:
         choice = self.reading.q
         if choice.group is None or self.q is None or self._out_of_order(choice.group):
@@ -295,12 +290,7 @@ class _Drafting:
         turning = [j for j in range(self.n) if not self.joints or self.joints[j].revolute]
         units, why, further = [""] * self.n, [], ""
         if turning:
-            # A velocity decides the unit of angle once the unit of time is known.
-            slope = self.reading.slope
-            if slope is not None and self.clock_unit in SECONDS and not (self.reading.clock and self.reading.clock.paired):
-                slope = Slope(slope.factor / SECONDS[self.clock_unit], slope.correlation)
-            elif self.t is None:
-                slope = None
+            slope = self.slope if self.t is not None else None  # decides the unit of angle once that of time is known
             joints = [self.joints[j] for j in turning] if self.joints else ()
             guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints, group.side)
             for j in turning:
@@ -339,19 +329,18 @@ class _Drafting:
 
     def _velocity(self) -> list[str]:
         """Return the line of a recorded velocity that is the slope of the position; nothing where none is."""
-        group, slope = self.reading.dq.group, self.reading.slope
+        group, slope = self.reading.dq.group, self.slope
         if group is None or slope is None or self.t is None or self.q is None or not self.reading.q.group:
             return []
         if any(joint.type != "revolute" for joint in self.joints) or self._out_of_order(group) or (
                 self.reading.q.group.order != group.order):
             return []
-        clock = self.reading.clock
-        factor = slope.factor if clock is None or clock.paired else slope.factor / SECONDS[self.clock_unit]
         named = unit_of_group(group.columns, self.reading.table)[0]
-        unit = velocity_unit(Slope(factor, slope.correlation), self._position_units(self.reading.q.group)[0][0])
+        unit = velocity_unit(slope, self._position_units(self.reading.q.group)[0][0])
         if not unit or named not in (None, unit):
             return []
-        guess = Guess(unit, "likely", f"the position's slope is {factor:.4g} times it; remove the line where it was not measured")
+        guess = Guess(unit, "likely",
+                      f"the position's slope is {slope.factor:.4g} times it; remove the line where it was not measured")
         columns = _columns(group.columns, self.reading.table)
         return [f"dq = {{ {columns}, unit = {_quoted(unit)} }}", f"    {self.note('dq unit', guess)}"]
 
@@ -365,7 +354,7 @@ class _Drafting:
         peak = f"up to {np.abs(self.tau).max():.4g}"
         if choice.group.words == WITHOUT_NAME:
             guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
-        elif guess.value == "N m" and guess.confidence != "sure" and self._side_open():
+        elif guess.value == "N m" and guess.confidence != "sure" and self._inside_limits() is False:
             guess = Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
         elif choice.group.words == BY_FILE and guess.confidence != "sure":
             guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
@@ -404,7 +393,7 @@ class _Drafting:
                 unknown = f"; those marked {self.blank('drive.transmission')} were near zero: from the data sheet"
             lines = ["[drive]                  # check: likely, positions start at these numbers of quarter turns: motor side",
                      f"transmission = [{ratios}]   # check: sign, + where motor and joint turn alike{unknown}"]
-        elif group and group.motor and "theta" not in group.words and not self.joints_side():
+        elif group and group.motor and "theta" not in group.words and not self._inside_limits():
             lines = ["[drive]                  # positions are named the motor's: q_motor = N q_joint, tau_joint = N^T tau_motor",
                      f'transmission = "{self.blank("drive.transmission")}"   # gear ratio of each joint; '
                      "remove [drive] where they are the joints'"]
@@ -416,17 +405,10 @@ class _Drafting:
             lines.append(f'torque_constant = "{blank}"             # N m/A, motor side: from the data sheet')
         return [*lines, ""]
 
-    def _side_open(self) -> bool:
-        """Tell whether no unit brings the positions inside the robot's limits: then their side of the gear is open."""
+    def _inside_limits(self) -> bool | None:
+        """Tell whether the positions are inside the limits of the robot's joints in some unit, None without either."""
         group = self.reading.q.group
-        return bool(self.joints) and group is not None and not group.motor and "" in self._position_units(group)[0]
-
-    def joints_side(self) -> bool:
-        """Tell whether positions that are named the motor's are inside the limits of the robot's joints, in some unit."""
-        if not self.joints or self.q is None:
-            return False
-        group = self.reading.q.group
-        return group is not None and "" not in self._position_units(group)[0]
+        return "" not in self._position_units(group)[0] if self.joints and group is not None else None
 
     def _missing(self) -> list[str]:
         """Return [missing] with the numbers that stand for a lost sample; nothing where none does."""
@@ -460,12 +442,6 @@ def _also(choice: Choice, table: RawTable) -> list[str]:
 def _round_below(rate: float) -> float:
     decade = 10.0 ** np.floor(np.log10(rate))
     return float(max(m for m in (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0) if m * decade <= rate * (1 + 1e-9)) * decade)
-
-
-def _round_number(rate: float) -> float | None:
-    """Return the rate as recorders are set to, where it is within half a per cent of one."""
-    below = _round_below(1.005 * rate)
-    return below if abs(rate / below - 1.0) < 5e-3 else None
 
 
 def _columns(names: Sequence[str], table: RawTable) -> str:

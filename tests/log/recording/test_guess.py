@@ -185,7 +185,8 @@ def _table(folder: Path, edit: Callable[[dict[str, Array]], None], header: Mappi
         columns |= {f"{name}{j + 1}": column for j, column in enumerate(values.T)}
     edit(columns)
     (folder / "arm.urdf").write_bytes(urdf(("a", "b", "c")))
-    return drafted(folder, text({header.get(name.rstrip("123"), name).replace("#", name[-1]): v for name, v in columns.items()}))
+    named = {header.get(name.rstrip("123"), name).replace("#", name[-1]): v for name, v in columns.items()}
+    return drafted(folder, text(named))
 
 
 def _scale(name: str, factor: float, offset: float = 0.0) -> Callable[[dict[str, Array]], None]:
@@ -209,7 +210,9 @@ def test_a_named_unit_of_time_that_a_velocity_contradicts_is_a_blank(tmp_path: P
 
 
 @pytest.mark.parametrize(("factor", "offset", "unit", "year"), [
-    (1e7, 638503345312500000.0, "100 ns", "1"), (1.0 / 86400.0, 45415.5848524, "d", "1900"), (1.0, 3.797591e9, "s", "1970 or 1904")])
+    (1e7, 638503345312500000.0, "100 ns", "1"),
+    (1.0 / 86400.0, 45415.5848524, "d", "1900"), (1.0, 3.797591e9, "s", "1970 or 1904"),
+])
 def test_a_clock_is_known_by_the_century_it_counts_to(tmp_path: Path, factor: float, offset: float, unit: str, year: str) -> None:
     """.NET counts 100 ns since the year 1, spreadsheets days since 1900, LabVIEW seconds since 1904."""
     draft = _table(tmp_path, _scale("t", factor, offset), {"t": "Ticks"})
@@ -233,7 +236,8 @@ def test_a_number_that_stands_for_a_lost_sample_is_told(tmp_path: Path) -> None:
 def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
     """Four columns whose squares add up to one, called q0 to q3, beside the four joints' angles."""
     half, moved = 0.5 * motion(4).q[:, 0], motion(4)
-    columns = {"t": moved.t} | {f"q{k}": v for k, v in enumerate((np.cos(half), 0.6 * np.sin(half), 0.8 * np.sin(half), 0.0 * half))}
+    turned = (np.cos(half), 0.6 * np.sin(half), 0.8 * np.sin(half), 0.0 * half)
+    columns = {"t": moved.t} | {f"q{k}": v for k, v in enumerate(turned)}
     columns |= {f"angle{j + 1}": v for j, v in enumerate(moved.q.T)} | {f"tau{j + 1}": v for j, v in enumerate(moved.tau.T)}
     (tmp_path / "arm.urdf").write_bytes(urdf(("a", "b", "c", "d")))
     assert 'q = { columns = "angle{j}", unit = "rad" }' in drafted(tmp_path, text(columns))
