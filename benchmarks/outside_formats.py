@@ -1,6 +1,10 @@
-"""Write one simulated motion as thirty real exports do, each with its right answer (see
-outside_layouts)."""
+"""Write one simulated motion as ROS tools and controllers export it, each with its right answer.
 
+The arms, and what the other sets share: `wide` makes the columns of a table and what is true of
+them from one text (see outside_layouts for what an answer is).
+"""
+
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +14,7 @@ from scipy.io import savemat
 from benchmarks.import_layouts import UR as UR_JOINTS
 from benchmarks.outside_layouts import Answer, Arm, Run, Signal, layout
 
-UR = Arm(
-    "ur5",
-    UR_JOINTS,
-    "zyyyzy",
-    (150, 150, 150, 28, 28, 28),
-)
+UR = Arm("ur5", UR_JOINTS, "zyyyzy", (150, 150, 150, 28, 28, 28))
 SIX = Arm("m0609", tuple(f"joint_{j}" for j in range(1, 7)), "zyyxyx", (194, 163, 163, 50, 50, 50))
 PANDA = Arm(
     "panda",
@@ -52,6 +51,12 @@ DEG = ("deg", "degree", "degrees", "°")
 RAD, RADS, NM = ("rad",), ("rad/s",), ("N m", "Nm", "N*m")
 DEGS, TURNS = ("deg/s", "°/s"), ("rev", "turn", "turns", "revolutions")
 
+UNITS = {"q": RAD, "q_ref": RAD, "dq": RADS, "tau": NM, "current": ("A",), "%": ("%",)}
+UNITS |= {"q°": DEG, "q_ref°": DEG, "dq°": DEGS, "counts": ("counts",), "counts/s": ("counts/s",)}
+UNITS |= {"dq_ref": RADS, "dq_ref°": DEGS, "ddq": ("rad/s^2",), "tau_ref": NM, "N mm": ("N mm",)}
+UNITS |= {"rev": ("turn", "turns", "rev"), "rev/s": ("turn/s", "turns/s", "rev/s"), "?": ()}
+UNITS |= {"mrad": ("mrad",), "mNm": ("mN m", "mNm", "N mm"), "0.1 %": ("0.1 %",), "rpm": ("rpm",)}
+
 
 def block(pattern: str, values: np.ndarray, start: int = 1) -> dict[str, np.ndarray]:
     """Return columns named after a pattern with {}, one a joint."""
@@ -62,11 +67,87 @@ def names(pattern: str, n: int, start: int = 1) -> tuple[str, ...]:
     return tuple(pattern.format(start + j) for j in range(n))
 
 
-def csv(path: Path, columns: dict[str, object], head: str = "", **how: object) -> None:
+def csv(path: Path, columns: dict, head: str = "", **how: object) -> None:
     """Write a table, below `head` as it stands."""
     encoding = str(how.pop("encoding", "utf-8"))
     how = {"index": False, "float_format": "%.6f", **how}
     path.write_bytes((head + pd.DataFrame(columns).to_csv(**how)).encode(encoding))
+
+
+table = partial(csv, float_format=None)
+
+
+def current(run: Run) -> np.ndarray:
+    """Motor currents, with noise, by torque constants that no file states."""
+    dice = np.random.default_rng(abs(int(1e6 * float(np.sum(run.q)))) % 2**32)
+    constant = dice.uniform(5, 15, run.q.shape[1])
+    return run.tau / constant * (1 + 0.02 * dice.standard_normal(run.q.shape))
+
+
+def values(run: Run) -> dict[str, np.ndarray]:
+    """What a layout may write: the motion, its times, and a tool pose [mm, rad] that follows it."""
+    a, b = run.q[:, 0], run.q[:, 1]
+    data = {"q": run.q, "dq": run.dq, "tau": run.tau, "q_ref": run.q_ref, "ext": run.tau_ext}
+    data |= {"ddq": run.ddq, "dq_ref": run.dq_ref, "tau_ref": run.tau_ref, "amps": run.current}
+    data |= {f"{s}°": np.degrees(data[s]) for s in ("q", "dq", "q_ref", "dq_ref")}
+    data |= {"current": current(run), "temp": run.temperature, "t": run.t}
+    data |= {"count": np.arange(len(run.t)), "us": np.round(run.t * 1e6).astype(np.int64)}
+    data |= {"ms": np.round(run.t * 1e3).astype(np.int64), "x": 400 + 200 * np.cos(a)}
+    data |= {"y": 300 * np.sin(a), "z": 500 + 100 * np.sin(b), "rx": 3.1 + 0.02 * b}
+    return data | {"ry": 0.05 * a, "rz": 0.3 * a + 0.1 * b}
+
+
+def anywhere(**units: tuple[str, ...]) -> dict:
+    """State units alone, of columns whose names are not compared."""
+    return {role: (Signal((), unit),) for role, unit in units.items()}
+
+
+def state(right: dict, form: str, joints, spec: str) -> None:
+    """Add a right answer "role" or "role:unit" for the columns of a form. A current (or share of
+    a rated torque) is all that is known of torque, so it may stand under either."""
+    role, _, unit = spec.partition(":")
+    columns = tuple(form.replace("{}", str(j)) for j in joints)
+    units = UNITS[unit or role]
+    signal = Signal(columns, units) if units else Signal(columns)
+    for name in ("current", "tau") if role == "current" else (role.rstrip("°"),):
+        right[name] = (signal,)
+
+
+def wide(run: Run, specs: str, joints=None, joint_wise: bool = False, **more) -> tuple[dict, dict]:
+    """Make columns, and the right answer, of "name=value; name{}=value; *name{}=value:role:unit":
+    {} is a joint (consecutive specs with it are interleaved if `joint_wise`), * marks what is
+    true (its role is the value's name unless given), a value without array is a constant."""
+    data, columns, right = values(run) | more, {}, {}
+    joints = range(1, run.q.shape[1] + 1) if joints is None else joints
+    groups: list[list[tuple[str, str]]] = []
+    for spec in specs.split(";"):
+        name, _, value = spec.strip().rpartition("=")
+        key, _, truth = value.partition(":")
+        if name.startswith("*"):
+            name = name[1:]
+            state(right, name, joints, truth or key)
+        if joint_wise and "{}" in name and groups and "{}" in groups[-1][-1][0]:
+            groups[-1].append((name, key))
+        else:
+            groups.append([(name, key)])
+    for specs_of_group in groups:
+        for k, j in enumerate(joints if "{}" in specs_of_group[0][0] else [""]):
+            for name, key in specs_of_group:
+                v = data.get(key, key)
+                matrix = isinstance(v, np.ndarray) and v.ndim == 2
+                columns[name.replace("{}", str(j))] = v[:, k] if matrix else v
+    return columns, right
+
+
+def stamps(run: Run, form: str) -> np.ndarray:
+    """Dates of the samples as text."""
+    times = pd.Timestamp("2024-05-03 14:02:11.25") + pd.to_timedelta(values(run)["us"], unit="us")
+    return times.strftime(form).to_numpy()
+
+
+def vector(numbers: np.ndarray) -> str:
+    """Write numbers between commas."""
+    return ", ".join(f"{x:.6f}" for x in numbers)
 
 
 @layout(UR)
@@ -77,42 +158,27 @@ def rostopic_echo(folder: Path, run: Run) -> Answer:
     """
     order = [2, 1, 0, 3, 4, 5]
     stamp = (1.6e18 + run.t * 1e9).astype(np.int64)
-    table = {
-        "%time": stamp,
-        "field.header.seq": np.arange(len(stamp)),
-        "field.header.stamp": stamp - 1000,
-        "field.header.frame_id": "",
-    }
-    table |= {f"field.name{k}": run.arm.joints[j] for k, j in enumerate(order)}
-    for field, values in (("position", run.q), ("velocity", run.dq), ("effort", run.tau)):
-        table |= block(f"field.{field}{{}}", values[:, order], 0)
+    head = {"%time": stamp, "field.header.seq": np.arange(len(stamp))}
+    head |= {"field.header.stamp": stamp - 1000, "field.header.frame_id": ""}
+    head |= {f"field.name{k}": run.arm.joints[j] for k, j in enumerate(order)}
+    specs = "*field.position{}=q; *field.velocity{}=dq; *field.effort{}=tau"
+    columns, right = wide(run, specs, [order.index(j) for j in range(6)])
+    parts = [f"field.{f}{k}" for f in ("position", "velocity", "effort") for k in range(6)]
+    table = head | {name: columns[name] for name in parts}
     csv(folder / "joint_states.csv", table, float_format="%.12f")
-    right = {
-        k: (Signal(tuple(f"field.{f}{order.index(j)}" for j in range(6)), u),)
-        for k, f, u in (("q", "position", RAD), ("dq", "velocity", RADS), ("tau", "effort", NM))
-    }
     return Answer("joint_states.csv", {"%time": "ns", "field.header.stamp": "ns"}, right=right)
 
 
 @layout(UR)
 def plotjuggler(folder: Path, run: Run) -> Answer:
-    """PlotJuggler's CSV of all curves: __time, one column a joint and field, sorted by name; a
-    gripper too."""
-    table = {"/joint_states/header/stamp": 1.7e9 + run.t - 0.001}
-    for j, joint in enumerate(run.arm.joints):
-        table |= {
-            f"/joint_states/{joint}/{f}": v[:, j]
-            for f, v in (("position", run.q), ("velocity", run.dq), ("effort", run.tau))
-        }
-    table |= {
-        f"/joint_states/finger_joint/{f}": np.full(len(run.t), x)
-        for f, x in (("position", 0.2), ("velocity", 0.0), ("effort", 0.4))
-    }
-    csv(folder / "curves.csv", {"__time": 1.7e9 + run.t} | dict(sorted(table.items())))
-    right = {
-        k: (Signal(tuple(f"/joint_states/{j}/{f}" for j in run.arm.joints), u),)
-        for k, f, u in (("q", "position", RAD), ("dq", "velocity", RADS), ("tau", "effort", NM))
-    }
+    """PlotJuggler's CSV of all curves: __time, one column a joint and field, sorted; a gripper."""
+    at = "/joint_states/"
+    specs = f"{at}header/stamp=stamp; *{at}{{}}/position=q; *{at}{{}}/velocity=dq; *{at}{{}}/effort=tau; "
+    specs += f"{at}finger_joint/position=grip; {at}finger_joint/velocity=still; {at}finger_joint/effort=force"
+    still = 0.0 * run.t
+    more = {"stamp": 1.7e9 + run.t - 0.001, "grip": still + 0.2, "still": still, "force": still + 0.4}
+    columns, right = wide(run, specs, run.arm.joints, **more)
+    csv(folder / "curves.csv", {"__time": 1.7e9 + run.t} | dict(sorted(columns.items())))
     return Answer("curves.csv", {"__time": "s", "/joint_states/header/stamp": "s"}, right=right)
 
 
@@ -122,17 +188,13 @@ def rosbag_long_table(folder: Path, run: Run) -> Answer:
 
     As gianmarco-ferrara/RL2025HW02 plot/db3TOcsv_position.py writes it with rosbags and pandas.
     """
-    n, order = run.n, [2, 1, 0, 3, 4, 5]
-    table = {
-        "time_s": np.repeat(1.7e9 + run.t, n),
-        "joint": [run.arm.joints[j] for j in order] * len(run.t),
-    }
-    table |= {
-        f: v[:, order].ravel()
-        for f, v in (("position", run.q), ("velocity", run.dq), ("effort", run.tau))
-    }
+    order = [2, 1, 0, 3, 4, 5]
+    table = {"time_s": np.repeat(1.7e9 + run.t, run.n)}
+    table |= {"joint": [run.arm.joints[j] for j in order] * len(run.t)}
+    for field, v in (("position", run.q), ("velocity", run.dq), ("effort", run.tau)):
+        table[field] = v[:, order].ravel()
     csv(folder / "joint_states_converted.csv", table)
-    right = {"q": (Signal((), RAD),), "dq": (Signal((), RADS),), "tau": (Signal((), NM),)}
+    right = anywhere(q=RAD, dq=RADS, tau=NM)
     return Answer("joint_states_converted.csv", right=right, texts=False)
 
 
@@ -142,307 +204,146 @@ def ur_own_logger(folder: Path, run: Run) -> Answer:
 
     Columns after MingyuTang0728/Universal-Robots-Notts CSV_READER.py.
     """
-    zero = np.zeros(len(run.t), int)
-    table = {
-        "pc_ts": 1.71e9 + run.t,
-        "runtime_state": zero + 2,
-        "robot_mode": zero + 7,
-        "safety_mode": zero + 1,
-        "speed_scaling": zero + 1.0,
-        "din_bits": zero,
-        "dout_bits": zero,
-        "ai0": zero + 0.013,
-        "ai1": zero + 0.021,
-    }
-    for name, values in (
-        ("q", run.q),
-        ("qd", run.dq),
-        ("tq", run.q_ref),
-        ("tqd", run.dq_ref),
-        ("tcp", run.pose),
-        ("tcps", 0.3 * run.pose),
-        ("tcpf", 5 + run.tau_ext),
-    ):
-        table |= block(f"{name}_{{}}", values, 0)
-    csv(folder / "UR5e_motion_full.csv", table)
-    right = {
-        "q": (Signal(names("q_{}", 6, 0), RAD),),
-        "dq": (Signal(names("qd_{}", 6, 0), RADS),),
-        "q_ref": (Signal(names("tq_{}", 6, 0), RAD),),
-        "dq_ref": (Signal(names("tqd_{}", 6, 0), RADS),),
-    }
+    specs = "pc_ts=stamp; runtime_state=2; robot_mode=7; safety_mode=1; speed_scaling=1.000000; din_bits=0; "
+    specs += "dout_bits=0; ai0=0.013000; ai1=0.021000; *q_{}=q; *qd_{}=dq; *tq_{}=q_ref; *tqd_{}=dq_ref; "
+    specs += "tcp_{}=pose; tcps_{}=slow; tcpf_{}=force"
+    more = {"pose": run.pose, "slow": 0.3 * run.pose, "force": 5 + run.tau_ext}
+    columns, right = wide(run, specs, range(6), stamp=1.71e9 + run.t, **more)
+    csv(folder / "UR5e_motion_full.csv", columns)
     return Answer("UR5e_motion_full.csv", {"pc_ts": "s"}, right=right)
 
 
 @layout(PANDA, rate=1000.0)
 def libfranka_log(folder: Path, run: Run) -> Answer:
-    """libfranka's logToCSV (src/log.cpp): time in ms, state.* and cmd.*, blanks after commas; a
-    URDF with fingers."""
-    table = {"time": (run.t * 1000).astype(int), " success_rate": 1.0}
-    zeros = np.zeros_like(run.t)
-    for name, v in (
-        ("state.q", run.q),
-        ("state.q_d", run.q_ref),
-        ("state.dq", run.dq),
-        ("state.dq_d", run.dq_ref),
-        ("state.tau_J", run.tau),
-        ("state.tau_ext_hat_filtered", run.tau_ext),
-        ("cmd.q_d", run.q * 0),
-        ("cmd.dq_d", run.q * 0),
-        ("cmd.O_T_EE_d", np.outer(zeros, np.ones(16))),
-        ("cmd.O_dP_EE_d", np.outer(zeros, np.ones(6))),
-        ("cmd.tau_J_d", run.tau_ref),
-    ):
-        table |= {f"{' ' if j else ''}{name}[{j}]": c for j, c in enumerate(v.T)}
-    csv(folder / "log.csv", table)
-    right = {
-        k: (Signal(names(f + "[{}]", 7, 0), u),)
-        for k, f, u in (
-            ("q", "state.q", RAD),
-            ("dq", "state.dq", RADS),
-            ("tau", "state.tau_J", NM),
-            ("q_ref", "state.q_d", RAD),
-            ("dq_ref", "state.dq_d", RADS),
-        )
-    }
+    """libfranka's logToCSV (src/log.cpp): ms, state.*, cmd.*, blanks after commas; fingers."""
+    specs = "time=tick; success_rate=1.000000; *state.q[{}]=q; *state.q_d[{}]=q_ref; *state.dq[{}]=dq; "
+    specs += "*state.dq_d[{}]=dq_ref; *state.tau_J[{}]=tau; state.tau_ext_hat_filtered[{}]=ext; "
+    specs += "cmd.q_d[{}]=zero; cmd.dq_d[{}]=zero"
+    tick, zero = (run.t * 1000).astype(int), 0 * run.q
+    columns, right = wide(run, specs, range(7), tick=tick, zero=zero)
+    columns |= block("cmd.O_T_EE_d[{}]", np.zeros((len(run.t), 16)), 0)
+    columns |= block("cmd.O_dP_EE_d[{}]", np.zeros((len(run.t), 6)), 0)
+    columns |= block("cmd.tau_J_d[{}]", run.tau_ref, 0)
+    first = ("time", "[0]")  # a blank follows each comma within a block
+    csv(folder / "log.csv", {n if n.endswith(first) else f" {n}": v for n, v in columns.items()})
     right["tau"] += (Signal(names("cmd.tau_J_d[{}]", 7, 0), NM, run.tau_ref),)
     return Answer("log.csv", {"time": "ms"}, right=right)
 
 
 @layout(SIX, robot=None, rate=250.0)
 def kuka_trace(folder: Path, run: Run) -> Answer:
-    """KUKA trace as tab-separated text: degree signs in Latin-1, programmed, real and difference
-    values, K and A.
+    """KUKA trace as tab-separated Latin-1 text: programmed, real and difference values, K and A.
 
     Signals after the "Robot data from the body shop" data set (NextGenDrive, 4 ms).
     """
-    d = np.degrees
-    table = {"Time [ms]": np.round(run.t * 1000).astype(int)}
-    for name, unit, v in (
-        ("Programmed Axis Position", "°", d(run.q_ref)),
-        ("Real Axis Position", "°", d(run.q)),
-        ("Difference Axis Position", "°", d(run.q_ref - run.q)),
-        ("Programmed Axis Velocity", "°/s", d(run.dq_ref)),
-        ("Real Axis Velocity", "°/s", d(run.dq)),
-        ("Calculated Axis Moment", "Nm", run.tau_model),
-        ("Real Axis Moment", "Nm", run.tau),
-        ("Difference Axis Moment", "Nm", run.tau - run.tau_model),
-        ("Motor Temperature", "K", run.temperature + 273.15),
-        ("Axis Current", "A", run.current),
-    ):
-        table |= block(f"{name} A{{}} [{unit}]", v)
-    csv(folder / "trace.txt", table, sep="\t", encoding="latin-1", lineterminator="\r\n")
-    right = {
-        "q": (Signal(names("Real Axis Position A{} [°]", 6), DEG),),
-        "dq": (Signal(names("Real Axis Velocity A{} [°/s]", 6), DEGS),),
-        "tau": (Signal(names("Real Axis Moment A{} [Nm]", 6), NM),),
-        "q_ref": (Signal(names("Programmed Axis Position A{} [°]", 6), DEG),),
-        "dq_ref": (Signal(names("Programmed Axis Velocity A{} [°/s]", 6), DEGS),),
-        "current": (Signal(names("Axis Current A{} [A]", 6), ("A",)),),
-    }
+    specs = "Time [ms]=ms; *Programmed Axis Position A{} [°]=q_ref°; *Real Axis Position A{} [°]=q°; "
+    specs += "Difference Axis Position A{} [°]=lag; *Programmed Axis Velocity A{} [°/s]=dq_ref°; "
+    specs += "*Real Axis Velocity A{} [°/s]=dq°; Calculated Axis Moment A{} [Nm]=model; "
+    specs += "*Real Axis Moment A{} [Nm]=tau; Difference Axis Moment A{} [Nm]=rest; "
+    specs += "Motor Temperature A{} [K]=kelvin; Axis Current A{} [A]=amps"
+    more = {"lag": np.degrees(run.q_ref - run.q), "model": run.tau_model}
+    more |= {"rest": run.tau - run.tau_model, "kelvin": run.temperature + 273.15}
+    columns, right = wide(run, specs, **more)
+    csv(folder / "trace.txt", columns, sep="\t", encoding="latin-1", lineterminator="\r\n")
+    right["current"] = (Signal(names("Axis Current A{} [A]", 6), ("A",)),)
     return Answer("trace.txt", {"Time [ms]": "ms"}, right=right, torque=("measured",))
 
 
 @layout(IIWA)
 def kuka_sunrise_recorder(folder: Path, run: Run) -> Answer:
-    """KUKA Sunrise DataRecorder: German clock in two columns, blanks between, external torque
-    first, degrees.
+    """KUKA Sunrise DataRecorder: clock in two columns, blanks, external torque first, degrees.
 
     Header as read by a public replay script (axisQMsr_LBR_iiwa_7_R800_1[0], degrees, '%' comments).
     """
     ns = (1.66e18 + run.t * 1e9).astype(np.int64)
-    table = {"ZeitInSec": ns // 10**9, "ZeitInNanoSec": ns % 10**9}
-    for name, v in (
-        ("axisTauExtMsr", run.tau_ext),
-        ("axisTauMsr", run.tau),
-        ("axisQMsr", np.degrees(run.q)),
-        ("axisQCmd", np.degrees(run.q_ref)),
-    ):
-        table |= block(f"{name}_LBR_iiwa_7_R800_1[{{}}]", v, 0)
+    of = "_LBR_iiwa_7_R800_1[{}]"
+    specs = f"ZeitInSec=s; ZeitInNanoSec=ns; axisTauExtMsr{of}=ext; *axisTauMsr{of}=tau; "
+    specs += f"*axisQMsr{of}=q°; *axisQCmd{of}=q_ref°"
+    columns, right = wide(run, specs, range(7), s=ns // 10**9, ns=ns % 10**9)
     for k, axis in enumerate("XYZ"):
-        table[f"cartForce1_{axis}"], table[f"cartTorque1_Tau{axis}"] = (
-            run.tau_ext[:, k],
-            0.1 * run.tau_ext[:, k + 3],
-        )
-    csv(folder / "2024-03-01_10-11-12.log", table, sep=" ")
-    name = "_LBR_iiwa_7_R800_1[{}]"
-    right = {
-        "q": (Signal(names("axisQMsr" + name, 7, 0), DEG),),
-        "tau": (Signal(names("axisTauMsr" + name, 7, 0), NM),),
-        "q_ref": (Signal(names("axisQCmd" + name, 7, 0), DEG),),
-    }
-    return Answer(
-        "2024-03-01_10-11-12.log",
-        {"ZeitInSec+ZeitInNanoSec": "s+ns"},
-        right=right,
-        torque=("measured",),
-    )
+        columns[f"cartForce1_{axis}"] = run.tau_ext[:, k]
+        columns[f"cartTorque1_Tau{axis}"] = 0.1 * run.tau_ext[:, k + 3]
+    file = "2024-03-01_10-11-12.log"
+    csv(folder / file, columns, sep=" ")
+    clock = {"ZeitInSec+ZeitInNanoSec": "s+ns"}
+    return Answer(file, clock, right=right, torque=("measured",))
 
 
 @layout(SIX)
 def doosan_realtime(folder: Path, run: Run) -> Answer:
-    """Doosan real-time data list (manual.doosanrobotics.com): two position sensors, four
-    torques; a row of units."""
-    d = np.degrees
-    parts = (
-        ("actual_joint_position", d(run.q), "deg"),
-        ("actual_joint_position_abs", d(run.q) + 1e-3, "deg"),
-        ("actual_joint_velocity", d(run.dq), "deg/s"),
-        ("actual_tcp_position", 300 * run.pose, "mm"),
-        ("external_joint_torque", run.tau_ext, "Nm"),
-        ("actual_motor_torque", run.tau, "Nm"),
-        ("raw_joint_torque", run.tau - 0.0, "Nm"),
-        ("target_joint_position", d(run.q_ref), "deg"),
-    )
-    table, units = {"time_stamp": run.t + 812.4}, ["s"]
-    for name, v, unit in parts:
-        table |= block(f"{name}_{{}}", v, 0)
+    """Doosan real-time data list (manual.doosanrobotics.com): two encoders, units in a row."""
+    specs = "time_stamp=stamp; *actual_joint_position_{}=q°; actual_joint_position_abs_{}=second; "
+    specs += "*actual_joint_velocity_{}=dq°; actual_tcp_position_{}=pose; external_joint_torque_{}=ext; "
+    specs += "*actual_motor_torque_{}=tau; raw_joint_torque_{}=tau; *target_joint_position_{}=q_ref°"
+    more = {"second": np.degrees(run.q) + 1e-3, "pose": 300 * run.pose, "stamp": run.t + 812.4}
+    columns, right = wide(run, specs, range(6), **more)
+    units = ["s"]
+    for unit in ("deg", "deg", "deg/s", "mm", "Nm", "Nm", "Nm", "deg"):
         units += [unit] * 6
-    csv(
-        folder / "rt.csv", table, head=",".join(table) + "\n" + ",".join(units) + "\n", header=False
-    )
-    right = {
-        "q": (
-            Signal(names("actual_joint_position_{}", 6, 0), DEG),
-            Signal(names("actual_joint_position_abs_{}", 6, 0), DEG),
-        ),
-        "dq": (Signal(names("actual_joint_velocity_{}", 6, 0), DEGS),),
-        "q_ref": (Signal(names("target_joint_position_{}", 6, 0), DEG),),
-        "tau": (
-            Signal(names("actual_motor_torque_{}", 6, 0), NM),
-            Signal(names("raw_joint_torque_{}", 6, 0), NM),
-        ),
-    }
+    csv(folder / "rt.csv", columns, ",".join(columns) + "\n" + ",".join(units) + "\n", header=False)
+    right["q"] += (Signal(names("actual_joint_position_abs_{}", 6, 0), DEG),)
+    right["tau"] += (Signal(names("raw_joint_torque_{}", 6, 0), NM),)
     return Answer("rt.csv", {"time_stamp": "s"}, right=right)
 
 
 @layout(THREE, robot=None)
 def twincat_scope(folder: Path, run: Run) -> Answer:
-    """TwinCAT Scope's CSV export: tabs, decimal commas, a header block a channel, a clock beside
-    each channel.
+    """TwinCAT Scope's CSV export: tabs, decimal commas, a header and a clock for each channel.
 
     After infosys.beckhoff.com tcscope2 "Export to CSV"; torque in 0.1 % of the rated torque: no
     unit can be known.
     """
-    channels = []
-    for j in range(3):
-        axis = f"GVL_Axes.axis{j + 1}"
-        channels += [
-            (f"{axis}.NcToPlc.ActPos", np.degrees(run.q[:, j])),
-            (f"{axis}.NcToPlc.ActVelo", np.degrees(run.dq[:, j])),
-            (f"{axis}.Drive.nActTorque", np.round(1000 * run.tau[:, j] / run.arm.effort[j])),
-        ]
-    rows = [
-        ("Name", "Scope Project"),
-        ("File", "C:\\Scope\\arm.tcscopex"),
-        ("StartRecord", "132537830932236900"),
-        ("EndRecord", "132537831052236900"),
-        (),
-    ]
-    for key, values in (
-        ("Name", [c.rsplit(".", 2)[1] + c.rsplit(".")[-1] for c, _ in channels]),
-        ("SymbolName", [c for c, _ in channels]),
-        ("NetId", ["5.20.1.6.1.1"] * 9),
-        ("Port", ["851"] * 9),
-        ("SampleTime[ms]", ["5"] * 9),
-        ("Data-Type", ["LREAL"] * 9),
-        ("", [""] * 9),
-    ):
-        rows.append(tuple(cell for v in values for cell in (key, v)))
-    for k, t in enumerate(run.t):
-        rows.append(
-            tuple(
-                cell
-                for _, v in channels
-                for cell in (f"{1000 * t:g}", f"{v[k]:.5f}".replace(".", ","))
-            )
-        )
+    specs = "*GVL_Axes.axis{}.NcToPlc.ActPos=q°; *GVL_Axes.axis{}.NcToPlc.ActVelo=dq°; "
+    specs += "*GVL_Axes.axis{}.Drive.nActTorque=load:tau:?"
+    load = np.round(1000 * run.tau / np.array(run.arm.effort))
+    channels, right = wide(run, specs, joint_wise=True, load=load)
+    rows = [("Name", "Scope Project"), ("File", "C:\\Scope\\arm.tcscopex")]
+    rows += [("StartRecord", "132537830932236900"), ("EndRecord", "132537831052236900"), ()]
+    head = {"Name": [c.rsplit(".", 2)[1] + c.rsplit(".")[-1] for c in channels]}
+    head |= {"SymbolName": list(channels), "NetId": ["5.20.1.6.1.1"] * 9, "Port": ["851"] * 9}
+    head |= {"SampleTime[ms]": ["5"] * 9, "Data-Type": ["LREAL"] * 9, "": [""] * 9}
+    rows += [tuple(cell for v in values for cell in (key, v)) for key, values in head.items()]
+    for t, numbers in zip(run.t, zip(*channels.values(), strict=True), strict=True):
+        texts = (f"{x:.5f}".replace(".", ",") for x in numbers)
+        rows.append(tuple(cell for x in texts for cell in (f"{1000 * t:g}", x)))
     (folder / "scope.csv").write_text("\n".join("\t".join(r) for r in rows) + "\nEOF\n")
-    right = {
-        "q": (Signal(names("GVL_Axes.axis{}.NcToPlc.ActPos", 3), DEG),),
-        "dq": (Signal(names("GVL_Axes.axis{}.NcToPlc.ActVelo", 3), DEGS),),
-        "tau": (Signal(names("GVL_Axes.axis{}.Drive.nActTorque", 3)),),
-    }
     return Answer("scope.csv", {"SymbolName": "ms"}, right=right, draftable=False)
 
 
 @layout(THREE, robot="robot.toml")
 def labview_lvm(folder: Path, run: Run) -> Answer:
-    """LabVIEW measurement file (.lvm, NI specification): header blocks, tabs, decimal commas, an
-    empty Comment column."""
-    head = (
-        "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
-        "Decimal_Separator\t,\n"
-        "Multi_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\nOperator\tlab\nDate\t2023/05/04\n"
-        "Time\t14:03:21,5\n***End_of_Header***\t\n\nChannels\t6\t\t\t\t\t\t\n"
-        + "Samples"
-        + f"\t{len(run.t)}" * 6
-        + "\t\n"
-        "Y_Unit_Label" + "\tdeg" * 3 + "\tN m" * 3 + "\t\nX_Dimension" + "\tTime" * 6 + "\t\n"
-        "X0"
-        + "\t0,0E+0" * 6
-        + "\t\nDelta_X"
-        + "\t0,005" * 6
-        + "\t\n***End_of_Header***\t\t\t\t\t\t\t\n"
-    )
-    table = (
-        {"X_Value": run.t}
-        | block("Pos_J{}", np.degrees(run.q))
-        | block("Torque_J{}", run.tau)
-        | {"Comment": ""}
-    )
-    csv(folder / "run.lvm", table, head=head, sep="\t", decimal=",")
-    right = {"q": (Signal(names("Pos_J{}", 3), DEG),), "tau": (Signal(names("Torque_J{}", 3), NM),)}
+    """LabVIEW measurement file (.lvm, NI specification): header blocks, tabs, decimal commas."""
+    end = "***End_of_Header***\t"
+    head = "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
+    head += "Decimal_Separator\t,\nMulti_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\n"
+    head += f"Operator\tlab\nDate\t2023/05/04\nTime\t14:03:21,5\n{end}\n\nChannels\t6\t\t\t\t\t\t\n"
+    head += "Samples" + f"\t{len(run.t)}" * 6 + "\t\nY_Unit_Label" + "\tdeg" * 3 + "\tN m" * 3
+    head += "\t\nX_Dimension" + "\tTime" * 6 + "\t\nX0" + "\t0,0E+0" * 6
+    head += "\t\nDelta_X" + "\t0,005" * 6 + f"\t\n{end}\t\t\t\t\t\t\n"
+    columns, right = wide(run, "X_Value=t; *Pos_J{}=q°; *Torque_J{}=tau; Comment=")
+    csv(folder / "run.lvm", columns, head=head, sep="\t", decimal=",")
     return Answer("run.lvm", {"X_Value": "s"}, right=right)
 
 
 @layout(THREE, robot="robot.toml")
 def simulink_structure(folder: Path, run: Run) -> Answer:
-    """Simulink To Workspace, "Structure With Time", saved to MAT: q.time, q.signals.values, one
-    structure a block."""
+    """Simulink To Workspace, "Structure With Time", saved to MAT: one structure a block."""
 
     def structure(values: np.ndarray, label: str) -> dict[str, object]:
         signals = {"values": values, "dimensions": 3.0, "label": label}
         return {"time": run.t[:, None], "signals": signals, "blockName": f"model/{label}"}
 
-    savemat(
-        folder / "run.mat",
-        {
-            "q_meas": structure(run.q, "q"),
-            "q_des": structure(run.q_ref, "qd"),
-            "tau_cmd": structure(run.tau_ref, "tau"),
-            "Ts": 0.005,
-        },
-    )
-    right = {
-        "q": (Signal((), RAD),),
-        "q_ref": (Signal((), RAD),),
-        "tau": (Signal((), NM, run.tau_ref),),
-    }
+    blocks: dict = {"q_meas": structure(run.q, "q"), "q_des": structure(run.q_ref, "qd")}
+    savemat(folder / "run.mat", blocks | {"tau_cmd": structure(run.tau_ref, "tau"), "Ts": 0.005})
+    right = anywhere(q=RAD, q_ref=RAD) | {"tau": (Signal((), NM, run.tau_ref),)}
     return Answer("run.mat", rate=200.0, right=right, texts=False)
 
 
 @layout(THREE, robot="robot.toml")
 def matlab_transposed(folder: Path, run: Run) -> Answer:
-    """MATLAB script results: t (1 x N), q, qd, qdd, tau (n x N), with gains and a name in the
-    same MAT file."""
-    savemat(
-        folder / "results.mat",
-        {
-            "t": run.t[None],
-            "q": run.q.T,
-            "qd": run.dq.T,
-            "qdd": run.ddq.T,
-            "tau": run.tau.T,
-            "Kp": np.diag([900.0, 700.0, 300.0]),
-            "Kd": np.diag([60.0, 40.0, 9.0]),
-            "robot": "rrr",
-        },
-    )
-    right = {
-        "q": (Signal((), RAD),),
-        "dq": (Signal((), RADS),),
-        "tau": (Signal((), NM),),
-        "ddq": (Signal((), ("rad/s^2",)),),
-    }
+    """MATLAB script results: t (1 x N), q, qd, qdd, tau (n x N), with gains and a name."""
+    data = {"t": run.t[None], "q": run.q.T, "qd": run.dq.T, "qdd": run.ddq.T, "tau": run.tau.T}
+    gains = {"Kp": np.diag([900.0, 700.0, 300.0]), "Kd": np.diag([60.0, 40.0, 9.0])}
+    savemat(folder / "results.mat", data | gains | {"robot": "rrr"})
+    right = anywhere(q=RAD, dq=RADS, tau=NM, ddq=UNITS["ddq"])
     return Answer("results.mat", rate=200.0, right=right, texts=False)

@@ -17,79 +17,24 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.outside_formats import DEG, DEGS, NM, RAD, RADS, SIX, THREE, UR
-from benchmarks.outside_layouts import Answer, Arm, Run, Signal, layout
+from benchmarks.outside_formats import (
+    SIX,
+    THREE,
+    UR,
+    current,
+    stamps,
+    state,
+    table,
+    values,
+    vector,
+    wide,
+)  # fmt: skip
+from benchmarks.outside_layouts import Answer, Arm, Run, layout
 
 ARM7 = tuple(f"arm7_joint{j}" for j in range(1, 8))
 TWO = Arm("leg2", ("hip", "knee"), "yy", (60, 40))
 SEVEN = Arm("arm7", ARM7, "zyzyzyz", (80, 80, 60, 60, 12, 12, 10))
-UNITS = {"q": RAD, "q_ref": RAD, "dq": RADS, "tau": NM, "current": ("A",), "%": ("%",)}
-UNITS |= {"q°": DEG, "q_ref°": DEG, "dq°": DEGS, "counts": ("counts",), "counts/s": ("counts/s",)}
-UNITS |= {"rev": ("turn", "turns", "rev"), "rev/s": ("turn/s", "turns/s", "rev/s"), "?": ()}
-UNITS |= {"mrad": ("mrad",), "mNm": ("mN m", "mNm", "N mm"), "0.1 %": ("0.1 %",), "rpm": ("rpm",)}
 DATE = "*"  # time of day and date as text: it has no unit
-
-
-def current(run: Run) -> np.ndarray:
-    """Motor currents, with noise, by torque constants that no file states."""
-    dice = np.random.default_rng(abs(int(1e6 * float(np.sum(run.q)))) % 2**32)
-    constant = dice.uniform(5, 15, run.q.shape[1])
-    return run.tau / constant * (1 + 0.02 * dice.standard_normal(run.q.shape))
-
-
-def values(run: Run) -> dict[str, np.ndarray]:
-    """What a layout may write: the motion, its times, and a tool pose [mm, rad] that follows it."""
-    a, b = run.q[:, 0], run.q[:, 1]
-    data = {"q": run.q, "dq": run.dq, "tau": run.tau, "q_ref": run.q_ref, "ext": run.tau_ext}
-    data |= {f"{s}°": np.degrees(data[s]) for s in ("q", "dq", "q_ref")}
-    data |= {"current": current(run), "temp": run.temperature, "t": run.t}
-    data |= {"count": np.arange(len(run.t)), "us": np.round(run.t * 1e6).astype(np.int64)}
-    data |= {"ms": np.round(run.t * 1e3).astype(np.int64), "x": 400 + 200 * np.cos(a)}
-    data |= {"y": 300 * np.sin(a), "z": 500 + 100 * np.sin(b), "rx": 3.1 + 0.02 * b}
-    return data | {"ry": 0.05 * a, "rz": 0.3 * a + 0.1 * b}
-
-
-def state(right: dict, form: str, joints, spec: str) -> None:
-    """Add a right answer "role" or "role:unit" for the columns of a form. A current (or share of
-    a rated torque) is all that is known of torque, so it may stand under either."""
-    role, _, unit = spec.partition(":")
-    columns = tuple(form.replace("{}", str(j)) for j in joints)
-    units = UNITS[unit or role]
-    signal = Signal(columns, units) if units else Signal(columns)
-    for name in ("current", "tau") if role == "current" else (role.rstrip("°"),):
-        right[name] = (signal,)
-
-
-def wide(run: Run, specs: str, joints=None, joint_wise: bool = False, **more) -> tuple[dict, dict]:
-    """Make columns, and the right answer, of "name=value; name{}=value; *name{}=value:role:unit":
-    {} is a joint (consecutive specs with it are interleaved if `joint_wise`), * marks what is
-    true (its role is the value's name unless given), a value without array is a constant."""
-    data, columns, right = values(run) | more, {}, {}
-    joints = range(1, run.q.shape[1] + 1) if joints is None else joints
-    groups: list[list[tuple[str, str]]] = []
-    for spec in specs.split(";"):
-        name, _, value = spec.strip().rpartition("=")
-        key, _, truth = value.partition(":")
-        if name.startswith("*"):
-            name = name[1:]
-            state(right, name, joints, truth or key)
-        if joint_wise and "{}" in name and groups and "{}" in groups[-1][-1][0]:
-            groups[-1].append((name, key))
-        else:
-            groups.append([(name, key)])
-    for specs_of_group in groups:
-        for k, j in enumerate(joints if "{}" in specs_of_group[0][0] else [""]):
-            for name, key in specs_of_group:
-                v = data.get(key, key)
-                matrix = isinstance(v, np.ndarray) and v.ndim == 2
-                columns[name.replace("{}", str(j))] = v[:, k] if matrix else v
-    return columns, right
-
-
-def table(path: Path, columns: dict, head: str = "", encoding: str = "utf-8", **how) -> None:
-    """Write columns as text under a free header."""
-    text = pd.DataFrame(columns).to_csv(index=False, lineterminator="\n", **how)
-    path.write_text(head + text, encoding=encoding)
 
 
 def answer(file: str, time: dict, form: str, joints, specs: str, known: bool = True) -> Answer:
@@ -110,17 +55,6 @@ def answer(file: str, time: dict, form: str, joints, specs: str, known: bool = T
 def address(name: str) -> str:
     """Return what the importer calls column k (from 0) of an array: "a/b[k]" is "a.b_<k + 1>"."""
     return re.sub(r"\[(\d+)\]$", lambda m: f"_{int(m[1]) + 1}", name.replace("/", "."))
-
-
-def stamps(run: Run, form: str) -> np.ndarray:
-    """Dates of the samples as text."""
-    times = pd.Timestamp("2024-05-03 14:02:11.25") + pd.to_timedelta(values(run)["us"], unit="us")
-    return times.strftime(form).to_numpy()
-
-
-def vector(numbers: np.ndarray) -> str:
-    """Write numbers between commas."""
-    return ", ".join(f"{x:.6f}" for x in numbers)
 
 
 @layout(SIX, rate=250.0)
