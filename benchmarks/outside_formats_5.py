@@ -1,6 +1,6 @@
 """Write one simulated motion as forty recordings, by an engineer who has not seen the importer.
 
-Only the form of a layout was known to him (`outside_formats_3`), not how files are read or how
+Only the form of a layout was known to him, not how files are read or how
 columns of nested files are addressed. Addresses are therefore neutral: the column's heading in a
 table, "path[k]" (from 0) for column k of an array at a path, "field[id]" in a long table. `known`
 is False where the file leaves something open (motor side without gear, counts, % of a rated value,

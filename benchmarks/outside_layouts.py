@@ -2,8 +2,8 @@
 
     python -m benchmarks.outside_layouts [NAME ...] [--set formats] [--keep FOLDER]
 
-Every layout of `outside_formats` (ROS, controllers), `outside_formats_2` (drives, tools, files:
-thirty with these), `outside_formats_3` (twenty made later) and `_5` (forty by a stranger) copies a
+Every layout of `outside_formats` (ROS, controllers), `outside_formats_2` (drives, tools, files; its
+last twenty, from abb_test_signals on, made later) and `_5` (forty by a stranger) copies a
 real export after its documentation or public source code, and states the right answer beside it. A draft is "right"
 where every field that is filled in is true (with no blank it is also imported, and the log compared with
 the simulated motion), "asks" where a field that it cannot know is blank, "refused" with a remedy,
@@ -27,7 +27,7 @@ import numpy as np
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("formats", "formats_2", "formats_3", "formats_5")
+SETS = ("formats", "formats_2", "formats_5")
 
 
 @dataclass(frozen=True)
