@@ -54,6 +54,7 @@ __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
+_USABLE = 0.8  # of the cells of a column that is looked at
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that stands for a lost sample
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
@@ -112,8 +113,9 @@ def _lost_numbers(table: RawTable) -> list[float]:
         values = column[np.isfinite(column) & (np.abs(column) < _NO_NUMBER)]
         for number in (float(values.min()), float(values.max())) if values.size else ():
             others = values[values != number]
-            if number != round(number) or np.unique(others[:1000]).size < 50:
-                continue
+            rare = others.size > _USABLE * values.size and np.unique(others[:1000]).size >= 50
+            if number == 0.0 or number != round(number) or not rare:
+                continue  # zero is also a joint at rest
             room = float(np.ptp(others))
             if min(abs(number - others.min()), abs(number - others.max())) > _FAR_OFF * room > 0.0:
                 found[number] += values.size - others.size
@@ -130,7 +132,7 @@ def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
     usable = {name: known[topic] for name, known in usable.items()}
     table = replace(table, columns={name: values[topic] for name, values in table.columns.items()}, rows=table.rows[topic],
                     lines=None if table.lines is None else table.lines[topic])
-    columns = {name: values for name, values in table.columns.items() if usable[name].mean() > 0.8}
+    columns = {name: values for name, values in table.columns.items() if usable[name].mean() > _USABLE}
     keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
     if keep.sum() < FEWEST:
         raise InputRejected("T08", f"{int(keep.sum())} samples without a hole", where=table.source,

@@ -20,7 +20,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.recording.dialect import MISSING, Dialect, cells_of, is_number
 from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["Header", "find_header", "names_and_units", "split_unit", "without_repeats"]
+__all__ = ["FORMULA", "Header", "find_header", "names_and_units", "split_unit", "without_repeats"]
 
 Line = tuple[int, str]
 
@@ -29,7 +29,7 @@ _SAMPLED = 20  # lines of numbers that say which columns are numbers
 _MARKS = "#%/*! "  # what a comment begins with
 _DELIMITERS = (",", ";", "\t", " ", "|")
 _NO_UNIT = frozenset({"", "-", "1", "none", "n/a", "[]"})
-_FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
+FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ def _words(cells: Sequence[str]) -> bool:
     return (
         words > 0
         and all(cell.isdecimal() for cell in numbers)
-        and not any(_FORMULA.fullmatch(cell) for cell in cells)
+        and not any(FORMULA.fullmatch(cell) for cell in cells)
     )
 
 

@@ -18,7 +18,7 @@ from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
-from pipelines.log.recording.header import Header, find_header, names_and_units, without_repeats
+from pipelines.log.recording.header import FORMULA, Header, find_header, names_and_units, without_repeats
 from pipelines.log.recording.labelled import LabelledLines, labelled_lines
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.units import UNITS, canonical_unit
@@ -34,7 +34,6 @@ _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along i
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
 _WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
-_FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
 
 def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawTable:
@@ -257,7 +256,7 @@ def _clock_times(cells: list[str]) -> tuple[Array, str] | None:
 
 def _refuse_formulas(line: Line, cells: list[str], names: tuple[str, ...], source: str) -> None:
     for j, cell in enumerate(cells):
-        if _FORMULA.fullmatch(cell):
+        if FORMULA.fullmatch(cell):
             name = names[j] if j < len(names) else str(j + 1)
             raise InputRejected("F16", f"'{cell[:30]}' in column '{name}' is a spreadsheet's formula or error",
                                 where=f"{source}, line {line[0]}",
