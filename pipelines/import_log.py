@@ -23,6 +23,7 @@ from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
 from pipelines.log.recording import filenames
 from pipelines.log.recording.examine import examine
+from pipelines.log.recording.guess import Draft, guess_recipe
 from pipelines.log.recording.joint_side import Converted, joint_side
 from pipelines.log.recording.make_log import SourceFile, make_log
 from pipelines.log.recording.recipe import ResampleSpec
@@ -30,15 +31,34 @@ from pipelines.log.recording.recordings import Map, Material, Source, assemble, 
 from pipelines.log.recording.repair import Limits, Recording, late_intervals, mend
 from pipelines.log.recording.table_columns import ImportedTable, import_table
 from pipelines.log.results import NOT_STORED
+from pipelines.log.robot import RobotDescription
 from pipelines.log.table import write_table
+from pipelines.model.rigid.choose import rigid_body
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.signal.resample import grid, resample
 from pipelines.stage import Inputs, Request, Stage, slug
 
-__all__ = ["STAGE", "ImportedLog", "Result", "Settings", "compute", "read", "report"]
+__all__ = ["STAGE", "ImportedLog", "Result", "Settings", "compute", "draft_recipe", "read", "report"]
 
 _PREVIEWS, _PREVIEW_POINTS = 3, 150
 _FINEST = 4.0  # times the recorded rate
+
+
+def draft_recipe(path: Path, robot: str | None = None) -> Draft:
+    """Return the draft of a recipe for a recording; a robot whose links are known weighs the torques.
+
+    Raises:
+        InputRejected: the file cannot be read as a table of numbers.
+    """
+    return guess_recipe(path, robot, _gravity)
+
+
+def _gravity(robot: RobotDescription, q: Array) -> Array | None:
+    """Return the gravity torques (samples, joints) [N m] at `q` [rad], None where a link of the robot is unknown."""
+    body = rigid_body(robot)
+    p = body.known_parameters()
+    still = np.zeros_like(q)
+    return None if p is None else body.torque(q, still, still, p)
 
 
 @dataclass(frozen=True)

@@ -67,9 +67,9 @@ def convert(
 
 
 def _guess(path: Path, common: Common) -> None:
-    from pipelines.log.recording.guess import guess_recipe
+    from pipelines.import_log import draft_recipe
 
-    drafted = guess_recipe(path, common.robot)
+    drafted = draft_recipe(path, common.robot)
     if common.out is not None:
         raise UsageError("C02", "--guess prints its draft", where="--out",
                          remedy="redirect it: rrrid import --guess FILE > recipe.toml")

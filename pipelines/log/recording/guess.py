@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -47,7 +47,7 @@ from pipelines.log.recording.reading import (
 )
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.recording.sources import read_table
-from pipelines.log.robot import Joint
+from pipelines.log.robot import Joint, RobotDescription
 from pipelines.log.units import UNITS
 
 __all__ = ["Draft", "guess_recipe"]
@@ -55,6 +55,7 @@ __all__ = ["Draft", "guess_recipe"]
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _USABLE = 0.8  # of the cells of a column that is looked at
+_HELD_UP = 0.1  # of the arm's own weight: torques in N m of the joints hold up at least its order of magnitude
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that stands for a lost sample
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
@@ -83,11 +84,15 @@ class Draft:
     blanks: tuple[str, ...]  # what must be filled in before it runs
 
 
-def guess_recipe(path: Path, robot: str | None = None) -> Draft:
+Weight = Callable[[RobotDescription, Array], Array | None]
+
+
+def guess_recipe(path: Path, robot: str | None = None, weight: Weight | None = None) -> Draft:
     """Return a commented recipe for the recording in `path`; companion files and the robot in its folder are used.
 
     Args:
         robot: description to use instead of the one beside the recording.
+        weight: the gravity torques (samples, joints) [N m] of a robot at positions [rad], None where its links are unknown.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
@@ -103,7 +108,7 @@ def guess_recipe(path: Path, robot: str | None = None) -> Draft:
     if companion is not None:
         companion = _sound(companion, lost)
         reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
-    return _Drafting(reading, lost).draft()
+    return _Drafting(reading, lost, weight).draft()
 
 
 def _lost_numbers(table: RawTable) -> list[float]:
@@ -144,9 +149,9 @@ def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
 class _Drafting:
     """Collects the lines of a draft. Not frozen: it is the pencil, the `Draft` is the result."""
 
-    def __init__(self, reading: Reading, lost: Sequence[float]) -> None:
+    def __init__(self, reading: Reading, lost: Sequence[float], weight: Weight | None) -> None:
         self.reading = reading
-        self.lost = lost
+        self.lost, self.weight = lost, weight
         self.evidence: list[str] = []
         self.blanks: list[str] = []
         q, tau = reading.q.group, reading.tau.group
@@ -354,6 +359,9 @@ class _Drafting:
         limits = [joint.torque for joint in self.joints]
         guess = torque_unit(self.tau, named[0], self.current, limits)
         peak = f"up to {np.abs(self.tau).max():.4g}"
+        known = UNITS.get(guess.value)
+        if known is not None and known.quantity == "torque" and (problem := self._too_weak(known.factor)):
+            guess = Guess("", "unsure", f"{'named so, but ' if named[0] else ''}{peak} {guess.value}: {problem}")
         if choice.group.words == WITHOUT_NAME:
             guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
         elif guess.value == "N m" and guess.confidence != "sure" and self._inside_limits() is False:
@@ -361,7 +369,7 @@ class _Drafting:
         elif choice.group.words == BY_FILE and guess.confidence != "sure":
             guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
         self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
-        units = [unit if unit is not None and unit in UNITS else guess.value for unit in named]
+        units = [unit if guess.value and unit is not None and unit in UNITS else guess.value for unit in named]
         if guess.value == "N m" and self.joints:
             units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]
         file = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
@@ -370,6 +378,25 @@ class _Drafting:
         if self.q is not None and self.q.shape == self.tau.shape:
             lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
         return [*lines, *_also(choice, self.reading.table)]
+
+    def _too_weak(self, factor: float) -> str:
+        """Say that torques of a unit (SI per number) would not hold up the arm where it weighs most; "" where they would."""
+        q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
+        if self.weight is None or robot is None or group is None or q is None or self.tau is None:
+            return ""
+        units = self._position_units(group)[0]
+        if not all(joint.revolute for joint in robot.joints) or not set(units) <= UNITS.keys() or self.tau.shape != q.shape:
+            return ""
+        some = slice(None, None, max(1, len(q) // 200))
+        held = self.weight(robot, q[some] * [UNITS[unit].factor for unit in units])
+        if held is None or not np.isfinite(held).all():
+            return ""
+        needed = np.abs(held).max(axis=0)
+        j = int(np.argmax(needed))
+        found = float(np.abs(self.tau[:, j]).max()) * factor
+        return "" if found >= _HELD_UP * needed[j] else (
+            f"joint '{robot.joints[j].name}' has up to {found:.3g} N m, its own weight asks for {needed[j]:.3g}: "
+            "a share of a rated torque, or the motor's side?")
 
     def _open(self, signal: str, choice: Choice) -> list[str]:
         """Return a blank line with the candidates."""

@@ -10,6 +10,7 @@ import pytest
 
 from benchmarks.import_layouts import motion, urdf
 from pipelines.errors import InputRejected, UsageError
+from pipelines.import_log import draft_recipe
 from pipelines.log.files import open_log
 from pipelines.log.recording.evidence import rollover, sign_of
 from pipelines.log.recording.guess import guess_recipe
@@ -217,6 +218,14 @@ def test_a_clock_is_known_by_the_century_it_counts_to(tmp_path: Path, factor: fl
     """.NET counts 100 ns since the year 1, spreadsheets days since 1900, LabVIEW seconds since 1904."""
     draft = _table(tmp_path, _scale("t", factor, offset), {"t": "Ticks"})
     assert f'unit = "{unit}"   # sure, counted since the year {year},' in draft
+
+
+@pytest.mark.parametrize(("factor", "header", "unit"), [
+    (1.0, "tau#", "N m"), (0.01, "tau#", "FILL IN"), (0.01, "tau# [Nm]", "FILL IN")])
+def test_torques_that_would_not_hold_up_the_arm_are_asked_about(tmp_path: Path, factor: float, header: str, unit: str) -> None:
+    """A share of a rated torque, or the motor's: a hundredth of what carries the links of the robot file."""
+    _table(tmp_path, _scale("tau", factor), {"tau": header})
+    assert f'tau = {{ columns = "tau{{j}}", unit = "{unit}" }}' in draft_recipe(tmp_path / "run.csv").text
 
 
 def test_rows_with_the_newest_first_are_refused(tmp_path: Path) -> None:

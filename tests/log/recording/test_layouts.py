@@ -9,7 +9,7 @@ import pytest
 from benchmarks import outside_layouts
 from benchmarks.import_layouts import LAYOUTS, verdict
 from benchmarks.outside_layouts import Layout, untrue, written
-from pipelines.log.recording.guess import guess_recipe
+from pipelines.import_log import draft_recipe
 
 RIGHT = {
     "clock_times", "command_only", "json_arrays", "json_frames", "json_lines_by_name", "matlab_struct", "names_in_front",
@@ -28,4 +28,4 @@ def test_a_layout_is_drafted_right_or_asked_about(name: str, tmp_path: Path) -> 
 def test_a_draft_of_a_foreign_format_claims_nothing_untrue(layout: Layout, tmp_path: Path) -> None:
     """Formats that others chose: every column, unit, clock and sign that is filled in is the true one."""
     run, answer = written(layout, tmp_path, seed=77)
-    assert untrue(guess_recipe(tmp_path / answer.file).text, layout, answer, run) == []
+    assert untrue(draft_recipe(tmp_path / answer.file).text, layout, answer, run) == []
