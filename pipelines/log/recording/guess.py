@@ -406,6 +406,8 @@ class _Drafting:
             lines[0] += "   # no column looks like it"
             return lines
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
+        if all(group.origin == "commanded" for group in found):
+            lines.append("    # named commands, or the points of a plan: what was measured?")
         texts = ", ".join(clean(text, 40) for text in texts_of(self.reading.table, ())) if found[0].order == "text" else ""
         order = f"these are {texts}" if texts else "in the order of the file"
         ask = f"{order}; write them from the base to the tip"

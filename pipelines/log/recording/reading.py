@@ -44,6 +44,8 @@ __all__ = [
 ]
 
 WITHOUT_NAME, BY_FILE = "columns without a name", "columns named by their file"
+_PLANS = frozenset({"plan", "planned", "reference", "ref", "desired", "setpoint", "setpoints", "target", "targets"})
+_FEEDFORWARD, _FEEDBACK = frozenset({"ff", "feedforward"}), frozenset({"fb", "feedback"})
 _MOST_JOINTS = 16
 _UNIT_NORM = 1e-3  # error of a quaternion's norm, written with four digits or more
 _MOST_BLOCKS = 6
@@ -127,8 +129,13 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     ]
     n = arm.robot.n_joints if arm.robot else None
     groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
-    if any({"from", "start"} <= set(words_of(c)) for c in used):  # the points of a planned trajectory (ROS)
+    planned = any({"from", "start"} <= set(words_of(c)) for c in used)  # the points of a trajectory (ROS)
+    if planned or (_PLANS & set(words_of(path.stem)) and all(g.origin != "measured" for g in groups)):
         groups = [replace(g, origin="commanded") for g in groups]
+    said = [set(g.words.split()) for g in groups]
+    if any(words & _FEEDFORWARD for words in said):  # what a controller adds to it is a part as well
+        groups = [replace(g, partial=g.partial or (g.quantity == "torque" and bool(words & _FEEDBACK)))
+                  for g, words in zip(groups, said, strict=True)]
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
         q = _unnamed_positions(table, groups, n, q)

@@ -228,6 +228,22 @@ def test_torques_that_would_not_hold_up_the_arm_are_asked_about(tmp_path: Path, 
     assert f'tau = {{ columns = "tau{{j}}", unit = "{unit}" }}' in draft_recipe(tmp_path / "run.csv").text
 
 
+@pytest.mark.parametrize(("name", "clock"), [("planned_motion.csv", "t"), ("run.csv", "time_from_start")])
+def test_a_plan_is_no_measurement(tmp_path: Path, name: str, clock: str) -> None:
+    columns = {(clock if key == "t" else key): values for key, values in good().items()}
+    draft = drafted(tmp_path, text(columns), name)
+    assert 'q = { columns = "FILL IN"' in draft
+    assert "the points of a plan: what was measured?" in draft
+
+
+def test_a_feedback_torque_beside_its_feedforward_is_a_part(tmp_path: Path) -> None:
+    """Alone, tau_fb is what an encoder or drive feeds back: the measured torque."""
+    columns = {key.replace("tau", "tau_fb"): values for key, values in good().items()}
+    assert 'tau = { columns = "tau_fb_{j}"' in drafted(tmp_path, text(columns))
+    parts = columns | {f"tau_ff_{j}": columns[f"tau_fb_{j}"] for j in (1, 2, 3)}
+    assert 'tau = { columns = "FILL IN"' in drafted(tmp_path, text(parts))
+
+
 def test_rows_with_the_newest_first_are_refused(tmp_path: Path) -> None:
     """Torque against a motion that runs backwards would have its friction reversed."""
     with pytest.raises(InputRejected, match=r"RRID-T01.*newest row is first.*Sort the rows"):
