@@ -117,8 +117,11 @@ def _place_by_words(label: Sequence[str], joints: Sequence[str]) -> int | None:
 
 
 def texts_of(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
-    """Return the joints that columns of text name, one a column, in the order of the file: name[0] is "elbow_joint" throughout."""
+    """Return the joints that columns of text name, in the order of the file: name[0] is "elbow_joint", or name "['elbow', …]"."""
     texts = list(table.labels.values())
+    for words in (re.findall(r"[\w./:-]+", text) for text in texts if text.strip()[:1] in ("[", "(")):
+        if len(words) > 1 and (set(joints) <= set(words) or not joints) and not any(word[0].isdecimal() for word in words):
+            return tuple(words)
     known = [k for k, text in enumerate(texts) if text in joints]
     if known:
         return tuple(texts[known[0]: known[-1] + 1])

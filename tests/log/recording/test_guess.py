@@ -244,6 +244,14 @@ def test_a_feedback_torque_beside_its_feedforward_is_a_part(tmp_path: Path) -> N
     assert 'tau = { columns = "FILL IN"' in drafted(tmp_path, text(parts))
 
 
+def test_a_list_of_names_in_one_cell_orders_the_joints(tmp_path: Path) -> None:
+    """As a message of ROS holds them, in an order that is not the robot's."""
+    rows = text(good()).splitlines()
+    content = "\n".join([f"name,{rows[0]}", *(f"\"['c', 'a', 'b']\",{row}" for row in rows[1:])]) + "\n"
+    (tmp_path / "arm.urdf").write_bytes(urdf(("a", "b", "c")))
+    assert 'q = { columns = ["q_2", "q_3", "q_1"],' in drafted(tmp_path, content)
+
+
 def test_rows_with_the_newest_first_are_refused(tmp_path: Path) -> None:
     """Torque against a motion that runs backwards would have its friction reversed."""
     with pytest.raises(InputRejected, match=r"RRID-T01.*newest row is first.*Sort the rows"):
