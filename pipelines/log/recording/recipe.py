@@ -86,7 +86,7 @@ class TimeSpec:
 
     __pydantic_config__ = _STRICT
     column: str | int | tuple[str | int, ...] | None = None
-    unit: Texts | None = None  # s, ms, us, ns, min, or "sample" (needs rate)
+    unit: Texts | None = None  # s, ms, us, ns, 100 ns, min, d, or "sample" (needs rate)
 
     @property
     def parts(self) -> tuple[tuple[str | int, str | None], ...]:
