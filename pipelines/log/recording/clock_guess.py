@@ -180,19 +180,10 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
             named, "sure", f"named so, and a median step of {median:.4g} makes {rates[named]:.4g} Hz"
         )
     plausible = [unit for unit, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
-    since = [
-        (unit, year)
-        for unit, year, offset in _EPOCHS
-        if unit in plausible
-        and _THIS_CENTURY[0] < clock.values[0] * SECONDS[unit] - offset < _THIS_CENTURY[1]
-    ]
-    if len({unit for unit, _ in since}) == 1:
-        unit, year = since[0][0], " or ".join(year for _, year in since)
-        return unit, Guess(
-            unit,
-            "sure",
-            f"counted since the year {year}, and a median step of {median:.4g} makes {rates[unit]:.4g} Hz",
-        )
+    if since := _since(clock.values[0], plausible):
+        unit, years = since
+        counted = f"counted since the year {years}, and a median step of {median:.4g} makes"
+        return unit, Guess(unit, "sure", f"{counted} {rates[unit]:.4g} Hz")
     fits = [unit for unit in plausible if unit in _COMMON]
     counts = _counts(clock.values)
     would = " or ".join(f"{rates[unit]:.4g} Hz in {unit}" for unit in fits)
@@ -215,6 +206,18 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
         else []
     )
     return "", Guess("", "unsure", "; ".join(why))
+
+
+def _since(first: float, units: Sequence[str]) -> tuple[str, str] | None:
+    """Return the only unit in which a clock counts to this century, and since which year; None where none or several do."""
+    low, high = _THIS_CENTURY
+    found = [
+        (unit, year)
+        for unit, year, offset in _EPOCHS
+        if unit in units and low < first * SECONDS[unit] - offset < high
+    ]
+    one = len({unit for unit, _ in found}) == 1
+    return (found[0][0], " or ".join(year for _, year in found)) if one else None
 
 
 def _contradicts(

@@ -15,7 +15,7 @@ from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 from pipelines.log.units import UNITS
 
-__all__ = ["Guess", "Slope", "held", "motion_of", "position_unit", "quarter_turns", "rollover", "sign_of",
+__all__ = ["Guess", "Slope", "held", "position_unit", "quarter_turns", "rollover", "sign_of",
            "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
 
 Confidence = Literal["sure", "likely", "unsure"]
@@ -353,12 +353,6 @@ def _jumps(speed: Array, tau: Array, half: int, shifts: npt.NDArray[np.int64]) -
             if shift == 0:
                 jumps.append(numbers[0])
     return np.array(jumps), residuals
-
-
-def motion_of(q: Array, unit: str) -> list[str]:
-    """Comments on what the motion itself shows."""
-    still = [str(j + 1) for j in np.flatnonzero(np.ptp(q, axis=0) == 0.0)]
-    return [f"# joint {', '.join(still)} never moves in this file"] if still else []
 
 
 def _whole(q: Array) -> bool:

@@ -26,7 +26,6 @@ from pipelines.log.recording.evidence import (
     Guess,
     Slope,
     held,
-    motion_of,
     position_unit,
     quarter_turns,
     sign_of,
@@ -287,7 +286,9 @@ class _Drafting:
             self.blanks.append("signals.q.counts_per_rev")
         lines = [f"q = {{ {_columns(choice.group.columns, self.reading.table)}, unit = {self._units('q', units)}{further} }}"]
         lines += [f"    {self.note('q unit', guess)}" for guess in why]
-        lines += [f"    {comment}" for comment in (*self._order(choice.group), *motion_of(self.q, units[0]))]
+        lines += [f"    {comment}" for comment in self._order(choice.group)]
+        if still := [str(j + 1) for j in np.flatnonzero(np.ptp(self.q, axis=0) == 0.0)]:
+            lines.append(f"    # joint {', '.join(still)} never moves in this file")
         return [*lines, *_also(choice, self.reading.table)]
 
     def _position_units(self, group: Group) -> tuple[list[str], str, list[Guess]]:

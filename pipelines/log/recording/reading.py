@@ -129,13 +129,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     ]
     n = arm.robot.n_joints if arm.robot else None
     groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
-    planned = any({"from", "start"} <= set(words_of(c)) for c in used)  # the points of a trajectory (ROS)
-    if planned or (_PLANS & set(words_of(path.stem)) and all(g.origin != "measured" for g in groups)):
-        groups = [replace(g, origin="commanded") for g in groups]
-    said = [set(g.words.split()) for g in groups]
-    if any(words & _FEEDFORWARD for words in said):  # what a controller adds to it is a part as well
-        groups = [replace(g, partial=g.partial or (g.quantity == "torque" and bool(words & _FEEDBACK)))
-                  for g, words in zip(groups, said, strict=True)]
+    groups = _parts_and_plans(groups, path, used)
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
         q = _unnamed_positions(table, groups, n, q)
@@ -144,7 +138,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     unnamed = tuple(
         g
         for g in groups
-        if not g.quantity and n in (None, len(g.columns)) and g.columns != _columns_of(q)
+        if not g.quantity and n in (None, len(g.columns)) and not (q.group and g.columns == q.group.columns)
     )
     tau = choose(groups, ("torque", "current"), n, commanded=True)
     if q.group and tau.group and _equal(
@@ -210,6 +204,20 @@ def _without_rest(table: RawTable, group: Group, n: int | None) -> Group:
     return replace(group, columns=first)
 
 
+def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> list[Group]:
+    """Tell the points of a plan, by its clock (ROS: time_from_start) or file, and the parts of a controller's torque."""
+    planned = any({"from", "start"} <= set(words_of(column)) for column in clock)
+    if planned or (_PLANS & set(words_of(path.stem)) and all(g.origin != "measured" for g in groups)):
+        groups = [replace(g, origin="commanded") for g in groups]
+    said = [set(g.words.split()) for g in groups]
+    if not any(words & _FEEDFORWARD for words in said):
+        return groups
+    return [
+        replace(g, partial=g.partial or (g.quantity == "torque" and bool(words & _FEEDBACK)))
+        for g, words in zip(groups, said, strict=True)
+    ]
+
+
 def _is_orientation(table: RawTable, group: Group) -> bool:
     """Tell whether four columns are a unit quaternion, whatever their name says: their squares add up to one."""
     if len(group.columns) != 4:
@@ -235,10 +243,6 @@ def _undisputed(table: RawTable, q: Choice) -> Choice:
 
 def _names_joints(group: Group) -> bool:
     return group.order == "robot" or bool(set(group.words.split()) & _JOINT_WORDS)
-
-
-def _columns_of(choice: Choice) -> tuple[str, ...]:
-    return choice.group.columns if choice.group else ()
 
 
 def _unnamed_positions(
