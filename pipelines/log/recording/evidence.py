@@ -46,7 +46,7 @@ def rollover(values: Array) -> float | None:
     if not jumps.size or (others.size and others.max() > 0.2 * size) or np.ptp(jumps) > 0.1 * jumps.mean():
         return None
     if (np.abs(steps[1:] + steps[:-1])[np.abs(steps[1:]) > 0.8 * size] < 0.2 * size).any():
-        return None  # there and back again: numbers that stand for a lost sample
+        return None  # there and back again: numbers that mark a lost sample
     candidates = (360.0, 2 * math.pi, 1.0, *map(float, _RESOLUTIONS))
     near = min(candidates, key=lambda c: abs(jumps.max() - c) / c)
     return near if abs(jumps.max() - near) / near < 0.1 else float(jumps.max())

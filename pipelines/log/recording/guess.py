@@ -55,7 +55,7 @@ _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _USABLE = 0.8  # of the cells of a column that is looked at
 _HELD_UP = 0.1  # of the arm's own weight: torques in N m of the joints hold up at least its order of magnitude
-_FAR_OFF = 3.0  # ranges of the other numbers between them and one that stands for a lost sample
+_FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
@@ -111,7 +111,7 @@ def guess_recipe(path: Path, robot: str | None = None, weight: Weight | None = N
 
 
 def _lost_numbers(table: RawTable) -> list[float]:
-    """Return whole numbers that stand for a lost sample: in cells of their own, farther off than all others are apart."""
+    """Return whole numbers that mark a lost sample: in cells of their own, farther off than all others are apart."""
     found: Counter[float] = Counter()
     for column in table.columns.values():
         values = column[np.isfinite(column) & (np.abs(column) < _NO_NUMBER)]
@@ -443,7 +443,7 @@ class _Drafting:
         return "" not in self._position_units(group)[0] if self.joints and group is not None else None
 
     def _missing(self) -> list[str]:
-        """Return [missing] with the numbers that stand for a lost sample; nothing where none does."""
+        """Return [missing] with the numbers that mark a lost sample; nothing where none does."""
         if not self.lost:
             return []
         guess = Guess(str(self.lost), "likely", "far from all other numbers of its column, in several cells: a lost sample")

@@ -219,7 +219,7 @@ def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> l
 
 
 def _is_orientation(table: RawTable, group: Group) -> bool:
-    """Tell whether four columns are a unit quaternion, whatever their name says: their squares add up to one."""
+    """Tell whether four columns are a unit quaternion by any name: their squares add up to one."""
     if len(group.columns) != 4:
         return False
     x = matrix(table, group.columns)

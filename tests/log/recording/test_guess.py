@@ -179,7 +179,7 @@ def test_positions_that_differ_by_a_constant_are_asked_about(tmp_path: Path) -> 
 
 
 def _table(folder: Path, edit: Callable[[dict[str, Array]], None], header: Mapping[str, str]) -> str:
-    """Return the draft for 700 samples at 250 Hz of three joints within ±3.15 rad, edited, beside their robot."""
+    """Return the draft for 700 samples at 250 Hz of three joints, edited, with their robot in the folder."""
     moved = motion(3)
     columns: dict[str, Array] = {"t": moved.t}
     for name, values in (("q", moved.q), ("dq", moved.dq), ("tau", moved.tau)):
@@ -258,7 +258,7 @@ def test_rows_with_the_newest_first_are_refused(tmp_path: Path) -> None:
         _table(tmp_path, lambda columns: columns.update({c: v[::-1] for c, v in columns.items()}), {})
 
 
-def test_a_number_that_stands_for_a_lost_sample_is_told(tmp_path: Path) -> None:
+def test_a_number_that_marks_a_lost_sample_is_proposed(tmp_path: Path) -> None:
     def lose(columns: dict[str, Array]) -> None:
         columns["q1"][[50, 300]] = columns["tau2"][400] = -9999.0
     draft = _table(tmp_path, lose, {})
@@ -267,7 +267,7 @@ def test_a_number_that_stands_for_a_lost_sample_is_told(tmp_path: Path) -> None:
 
 
 def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
-    """Four columns whose squares add up to one, called q0 to q3, beside the four joints' angles."""
+    """Four columns whose squares add up to one, called q0 to q3, and the four joints' angles."""
     half, moved = 0.5 * motion(4).q[:, 0], motion(4)
     turned = (np.cos(half), 0.6 * np.sin(half), 0.8 * np.sin(half), 0.0 * half)
     columns = {"t": moved.t} | {f"q{k}": v for k, v in enumerate(turned)}
