@@ -2,7 +2,8 @@
 
     motion by the smoother → refined about a flexible law → ladder → refined about the chosen law → the fit
 
-Rows in which the joint does not slide (sliding.py) are left out, where the flexible law does not follow them as well.
+Rows in which the joint rests are left out, of all but laws that know these: torque at rest is an inequality (Karnopp 1985).
+So are other rows in which it does not slide (sliding.py), where the flexible law does not follow them as well.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from pipelines.model.friction.postures import alike
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
 from pipelines.model.friction.simulate import Simulated, simulate_joint
-from pipelines.model.friction.sliding import Sliding, SlidingConfig, free_curve, left_out, sliding_rows
+from pipelines.model.friction.sliding import Mask, Sliding, SlidingConfig, free_curve, left_out, sliding_rows
 from pipelines.model.friction.speed_map import SpeedMap, speed_map
 from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
@@ -105,8 +106,9 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     beside = _swaying(logs)
     config = config or SlidingConfig()
     rows = _usable_rows(logs, window, beside, arm, config)
-    stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
-    if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, config):
+    moves = ~rows.sliding.resting if rows.any_slide and (law is None or law.pointwise) else np.ones_like(rows.sliding.resting)
+    stretches, fit = _about_a_flexible_law(left_out(rows.stretches, moves), rows.fitted, arm, resolution)
+    if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, moves, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
     course = _course(stretches, rows, arm, config, DriftConfig())
     stretches, fit, course = _with_course(stretches, rows.fitted, course, fit, arm)
@@ -182,10 +184,15 @@ def _about_a_flexible_law(stretches: tuple[Stretch, ...], fitted: int, arm: OneJ
     return stretches, fit
 
 
-def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, config: SlidingConfig) -> bool:
-    """Whether one curve follows the rows of doubt as well as those that surely slide, or these do not rule what it leaves."""
+def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, moves: Mask,
+              config: SlidingConfig) -> bool:
+    """Whether one curve follows the rows of doubt as well as those that surely slide, or these do not rule what it leaves.
+
+    Args:
+        moves: which rows of all are those of `stretches`.
+    """
     square = np.square(LawEquations.of(stretches, fit.joint).predicted(fit).residual)
-    doubt, sure = square[~sliding.slides], square[sliding.slides]
+    doubt, sure = square[~sliding.slides[moves]], square[sliding.slides[moves]]
     return float(doubt.mean()) <= config.worse * sliding.mean_square or float(doubt.sum()) <= float(sure.sum())
 
 
@@ -193,10 +200,7 @@ def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: 
     """How friction changes in time over the logs that are fitted; None where it does not."""
     if not rows.any_slide:
         return None
-    slides = rows.sliding.slides
-    if all(stretch.sticks is None for stretch in stretches):
-        stretches = left_out(stretches, slides)
-    fitted = stretches[:rows.fitted]
+    fitted = left_out(stretches, rows.sliding.slides)[:rows.fitted]
     equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
     return drift_of(fitted, equations.y, equations.fixed, free_curve(speed, config), drift)
 

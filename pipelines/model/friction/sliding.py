@@ -53,24 +53,24 @@ class Sliding:
     """Rows that slide, of stretches one after the other."""
 
     slides: Mask  # (rows,)
-    resting: Mask  # (rows,) at rest or turning back within
+    resting: Mask  # (rows,) at rest throughout
     travel: Array  # (rows,) [rad] since the last rest or reversal, or until the next
     distance: float  # [rad] of travel from which rows slide
     mean_square: float  # [N² m²] that the free curve leaves of them
     attenuation: float  # noise of the acceleration over acceleration (variance), outside all other columns
-    doubtful: bool  # whether some rows do not follow the free curve
+    doubtful: bool  # whether some of the rows that do not rest do not follow the free curve
 
 
 def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingConfig) -> Sliding:
     """Order rows by travel and take them in while friction is a function of speed."""
     equations = LawEquations.of(stretches, joint)
-    travel = np.concatenate([_travel(stretch, config)[stretch.kept] for stretch in stretches])
+    travel, rests = (np.concatenate([of(stretch, config)[stretch.kept] for stretch in stretches]) for of in (_travel, _rests))
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
     steady = np.hstack([equations.fixed, free_curve(speed, config)])
     columns = np.hstack([steady, _free_course(speed, config)])
     moving = travel > 0.0
     if not moving.any():
-        return Sliding(moving, ~moving, travel, 0.0, 0.0, np.inf, True)
+        return Sliding(moving, rests, travel, 0.0, 0.0, np.inf, True)
     reach = start = float(np.median(travel[moving]))
     slides = travel >= reach
     while slides.sum() < min(config.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()):
@@ -91,10 +91,9 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     slides &= travel >= reach
     left, count = _left(columns[slides], equations.y[slides])
     mean_square = left / max(count, 1)
-    whole, count_whole = _left(columns, equations.y)
-    rest = int((~slides).sum())
-    doubtful = rest > 0 and (whole - left) / max(count_whole - count, 1) > config.worse * mean_square
-    return Sliding(slides, ~moving, travel, reach, mean_square,
+    whole, count_whole = _left(columns[~rests], equations.y[~rests])
+    doubtful = not bool(np.all(slides | rests)) and (whole - left) / max(count_whole - count, 1) > config.worse * mean_square
+    return Sliding(slides, rests, travel, reach, mean_square,
                    _attenuation(stretches, steady[slides], slides, len(equations.postures)), bool(doubtful))
 
 
@@ -113,9 +112,9 @@ def _step(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
 
 
 def left_out(stretches: Sequence[Stretch], slides: Mask) -> tuple[Stretch, ...]:
-    """The stretches without the rows that do not slide."""
-    parts = np.split(slides, np.cumsum([stretch.rows for stretch in stretches])[:-1])
-    return tuple(stretch.without(~part) for stretch, part in zip(stretches, parts, strict=True))
+    """The stretches without those of their usable rows that do not slide."""
+    parts = np.split(slides, np.cumsum([stretch.usable.sum() for stretch in stretches])[:-1])
+    return tuple(stretch.only(part) for stretch, part in zip(stretches, parts, strict=True))
 
 
 def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
@@ -130,6 +129,12 @@ def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
     edges = stretch.edges
     within = np.minimum.reduceat(travel, edges)[:len(edges) - 1]
     return np.asarray(np.minimum(within, travel[edges[1:]]))
+
+
+def _rests(stretch: Stretch, config: SlidingConfig) -> Mask:
+    """(windows,) whether the speed is never told from zero."""
+    moves = np.abs(stretch.dq) > config.rest * stretch.speed_std
+    return ~np.logical_or.reduceat(moves, stretch.edges)[:len(stretch.edges) - 1]
 
 
 def free_curve(speed: Array, config: SlidingConfig) -> Array:
