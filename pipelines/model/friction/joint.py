@@ -108,7 +108,7 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     rows = _usable_rows(logs, window, beside, arm, config)
     moves = ~rows.sliding.resting if rows.any_slide and (law is None or law.pointwise) else np.ones_like(rows.sliding.resting)
     stretches, fit = _about_a_flexible_law(left_out(rows.stretches, moves), rows.fitted, arm, resolution)
-    if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, moves, config):
+    if rows.any_slide and not _followed(stretches, fit, rows.sliding, moves, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
     course = _course(stretches, rows, arm, config, DriftConfig())
     stretches, fit, course = _with_course(stretches, rows.fitted, course, fit, arm)
@@ -193,7 +193,7 @@ def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, mov
     """
     square = np.square(LawEquations.of(stretches, fit.joint).predicted(fit).residual)
     doubt, sure = square[~sliding.slides[moves]], square[sliding.slides[moves]]
-    return float(doubt.mean()) <= config.worse * sliding.mean_square or float(doubt.sum()) <= float(sure.sum())
+    return not doubt.size or float(doubt.mean()) <= config.worse * float(sure.mean()) or float(doubt.sum()) <= float(sure.sum())
 
 
 def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig, drift: DriftConfig) -> Course | None:

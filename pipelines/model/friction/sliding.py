@@ -56,9 +56,7 @@ class Sliding:
     resting: Mask  # (rows,) at rest throughout
     travel: Array  # (rows,) [rad] since the last rest or reversal, or until the next
     distance: float  # [rad] of travel from which rows slide
-    mean_square: float  # [N² m²] that the free curve leaves of them
     attenuation: float  # noise of the acceleration over acceleration (variance), outside all other columns
-    doubtful: bool  # whether some of the rows that do not rest do not follow the free curve
 
 
 def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingConfig) -> Sliding:
@@ -70,7 +68,7 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     columns = np.hstack([steady, _free_course(speed, config)])
     moving = travel > 0.0
     if not moving.any():
-        return Sliding(moving, rests, travel, 0.0, 0.0, np.inf, True)
+        return Sliding(moving, rests, travel, 0.0, np.inf)
     reach = start = float(np.median(travel[moving]))
     slides = travel >= reach
     while slides.sum() < min(config.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()):
@@ -89,12 +87,8 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
         reach = lower
     reach = min(config.margin * reach, start)
     slides &= travel >= reach
-    left, count = _left(columns[slides], equations.y[slides])
-    mean_square = left / max(count, 1)
-    whole, count_whole = _left(columns[~rests], equations.y[~rests])
-    doubtful = not bool(np.all(slides | rests)) and (whole - left) / max(count_whole - count, 1) > config.worse * mean_square
-    return Sliding(slides, rests, travel, reach, mean_square,
-                   _attenuation(stretches, steady[slides], slides, len(equations.postures)), bool(doubtful))
+    return Sliding(slides, rests, travel, reach,
+                   _attenuation(stretches, steady[slides], slides, len(equations.postures)))
 
 
 def _follows(columns: Array, y: Array, wider: Mask, more: Mask, config: SlidingConfig) -> bool:
