@@ -38,6 +38,7 @@ class SlidingConfig:
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
     worse: float = 4.0  # median square of a class over that of the rows before: 3 std of the logarithm of the median square of
     # 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
+    good: float = 0.03  # of friction: what a law is good for (DriftConfig.least); with `margin`, its fourth power, 1e-6, remains
     rows: int = 3  # for every column of the free curve, that the first class has at least
     margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel) (Dahl 1968), 2 %
     classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
@@ -64,7 +65,7 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     equations = LawEquations.of(stretches, joint)
     travel, rests = (np.concatenate([of(stretch, config)[stretch.kept] for stretch in stretches]) for of in (_travel, _rests))
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
-    steady = np.hstack([equations.fixed, free_curve(speed, config)])
+    rigid, steady = equations.fixed.shape[1], np.hstack([equations.fixed, free_curve(speed, config)])
     columns = np.hstack([steady, _free_course(speed, config)])
     moving = travel > 0.0
     if not moving.any():
@@ -79,9 +80,9 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
         wider = moving & (travel >= lower)
         more = wider & ~slides
         if more.any():
-            if not _follows(columns, equations.y, wider, more, config):
+            if not _follows(columns, rigid, equations.y, wider, more, config):
                 columns = np.hstack([columns, _step(columns, equations.y, speed, wider)])
-                if not _follows(columns, equations.y, wider, more, config):
+                if not _follows(columns, rigid, equations.y, wider, more, config):
                     break
             slides = wider
         reach = lower
@@ -91,10 +92,16 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
                    _attenuation(stretches, steady[slides], slides, len(equations.postures)))
 
 
-def _follows(columns: Array, y: Array, wider: Mask, more: Mask, config: SlidingConfig) -> bool:
-    """Whether least squares over `wider` rows leaves no more of `more` of them than of the others."""
-    square = np.square(_residual(columns[wider], y[wider]))
-    return bool(np.median(square[more[wider]]) <= config.worse * np.median(square[~more[wider]]))
+def _follows(columns: Array, rigid: int, y: Array, wider: Mask, more: Mask, config: SlidingConfig) -> bool:
+    """Whether least squares over `wider` rows leaves no more of `more` of them than of the others, or than a law is good for.
+
+    Args:
+        columns: (rows, columns) the first `rigid` of them are no friction.
+    """
+    beta, residual = _least_squares(columns[wider], y[wider])
+    square, friction = np.square(residual), np.square(columns[wider][:, rigid:] @ beta[rigid:])
+    most = max(config.worse * np.median(square[~more[wider]]), config.good**2 * np.median(friction))
+    return bool(np.median(square[more[wider]]) <= most)
 
 
 def _step(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
@@ -151,18 +158,12 @@ def _free_course(speed: Array, config: SlidingConfig) -> Array:
     return np.hstack([hats * np.sign(speed)[:, None], hats * speed[:, None]])
 
 
-def _left(columns: Array, y: Array) -> tuple[float, int]:
-    """Sum of squares that least squares leaves, and its degrees of freedom."""
+def _least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
+    """Return coefficients (columns,) and residual (rows,)."""
     scale = np.linalg.norm(columns, axis=0)
-    residual = _residual(columns, y)
-    return float(residual @ residual), len(y) - int(np.sum(scale > 0.0))
-
-
-def _residual(columns: Array, y: Array) -> Array:
-    """Return the residual of least squares (rows,)."""
-    scale = np.linalg.norm(columns, axis=0)
-    unit = columns[:, scale > 0.0] / scale[scale > 0.0]
-    return np.asarray(y - unit @ np.linalg.lstsq(unit, y, rcond=1e-9)[0])
+    scale = np.where(scale > 0.0, scale, 1.0)
+    beta = np.asarray(np.linalg.lstsq(columns / scale, y, rcond=1e-9)[0] / scale)
+    return beta, y - columns @ beta
 
 
 def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask, postures: int) -> float:
@@ -177,6 +178,6 @@ def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask, pos
     for k in range(postures):
         own = columns[:, width * k]
         others = np.delete(columns, width * k, axis=1)
-        outside, _ = _left(others, own)
-        shares.append(float(noise[own != 0.0].sum()) / max(outside, 1e-300))
+        outside = _least_squares(others, own)[1]
+        shares.append(float(noise[own != 0.0].sum()) / max(float(outside @ outside), 1e-300))
     return max(shares)
