@@ -51,7 +51,7 @@ _UNFOLDED = "log all signals by one clock at the controller's own rate; or thin 
 
 @dataclass(frozen=True)
 class FrfConfig:
-    """What is warned of.
+    """Limits of warnings.
 
     Attributes:
         swing: of the turning speed, std of the speed that v makes; beyond it a normal swing turns friction's sign

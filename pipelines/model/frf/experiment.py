@@ -29,7 +29,7 @@ V, INPUT, POSITION, TORQUE = range(4)  # channels of a stretch; behind them the 
 
 @dataclass(frozen=True)
 class TurningConfig:
-    """What of a log is at constant speed, and what repeats in it.
+    """Limits of constant speed and of a repeated excitation.
 
     Attributes:
         plateau: of the largest speed, within which a reference is constant: the ramps of a trapezoid are left out
@@ -40,7 +40,7 @@ class TurningConfig:
         still: [rad/s] a slower joint does not turn: a turn in two hours
         same: of the largest v, two periods are equal: rounding of a text with ten digits
         lost: of the samples; beyond, what is filled in weighs as much as what was recorded (-20 dB)
-        line: of the strongest line's amplitude, a weaker one is none: -60 dB, above leakage and rounding
+        line: of the strongest line's amplitude, below which a line does not count: -60 dB, above leakage and rounding
     """
 
     plateau: float = 0.02

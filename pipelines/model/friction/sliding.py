@@ -8,7 +8,8 @@ encoder decides. From the longest travel down, a further class of travel is take
 
     τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed, each way apart
 
-leaves no more of it than of the rows before; f may change slowly in time, or at an instant that explains a class which does
+leaves no more of it than of the rows before, or no more than a law is good for; f may change slowly in time, or at an instant
+that explains a class which does
 not follow otherwise. No law is assumed.
 """
 
@@ -93,7 +94,7 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
 
 
 def _follows(columns: Array, rigid: int, y: Array, wider: Mask, more: Mask, config: SlidingConfig) -> bool:
-    """Whether least squares over `wider` rows leaves no more of `more` of them than of the others, or than a law is good for.
+    """Return whether least squares over `wider` rows fits `more` of them as well as the others, or as well as any law does.
 
     Args:
         columns: (rows, columns) the first `rigid` of them are no friction.
@@ -133,7 +134,7 @@ def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
 
 
 def _rests(stretch: Stretch, config: SlidingConfig) -> Mask:
-    """(windows,) whether the speed is never told from zero."""
+    """Return a mask (windows,): the speed does not differ from zero throughout."""
     moves = np.abs(stretch.dq) > config.rest * stretch.speed_std
     return ~np.logical_or.reduceat(moves, stretch.edges)[:len(stretch.edges) - 1]
 
