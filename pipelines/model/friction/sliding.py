@@ -8,7 +8,7 @@ encoder decides. From the longest travel down, a further class of travel is take
 
     τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed, each way apart
 
-leaves no more of it than of the rows before, or no more than a law is good for; f may change slowly in time, or at an instant
+leaves no more of it than of the first rows, or no more than a law is good for; f may change slowly in time, or at an instant
 that explains a class which does
 not follow otherwise. No law is assumed.
 """
@@ -37,7 +37,7 @@ class SlidingConfig:
     """Numbers that decide which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
-    worse: float = 4.0  # median square of a class over that of the rows before: 3 std of the logarithm of the median square of
+    worse: float = 4.0  # median square of a class over that of the first rows: 3 std of the logarithm of the median square of
     # 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
     good: float = 0.03  # of friction: what a law is good for (DriftConfig.least); with `margin`, its fourth power, 1e-6, remains
     rows: int = 3  # for every column of the free curve, that the first class has at least
@@ -76,14 +76,15 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
     while slides.sum() < min(config.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()):
         reach = start = reach / config.halving
         slides = moving & (travel >= reach)
+    noise = _noise(columns[slides], equations.y[slides])
     while reach > 0.0:
         lower = reach / config.halving if (moving & (travel < reach)).any() else 0.0
         wider = moving & (travel >= lower)
         more = wider & ~slides
         if more.any():
-            if not _follows(columns, rigid, equations.y, wider, more, config):
+            if not _follows(columns[wider], rigid, equations.y[wider], more[wider], noise, config):
                 columns = np.hstack([columns, _step(columns, equations.y, speed, wider)])
-                if not _follows(columns, rigid, equations.y, wider, more, config):
+                if not _follows(columns[wider], rigid, equations.y[wider], more[wider], noise, config):
                     break
             slides = wider
         reach = lower
@@ -93,16 +94,24 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingC
                    _attenuation(stretches, steady[slides], slides, len(equations.postures)))
 
 
-def _follows(columns: Array, rigid: int, y: Array, wider: Mask, more: Mask, config: SlidingConfig) -> bool:
-    """Return whether least squares over `wider` rows fits `more` of them as well as the others, or as well as any law does.
+def _noise(columns: Array, y: Array) -> float:
+    """Return the median square [N² m²] that least squares leaves, over the share of its degrees of freedom."""
+    used = np.any(columns != 0.0, axis=0).sum() / len(y)
+    return float(np.median(np.square(_least_squares(columns, y)[1])) / max(1.0 - used, 1.0 / len(y)))
+
+
+def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float, config: SlidingConfig) -> bool:
+    """Return whether least squares fits `more` of the rows to within their `noise`, or as well as any law does.
 
     Args:
         columns: (rows, columns) the first `rigid` of them are no friction.
+        noise: [N² m²] median square of the rows with the longest travel. It stays: rows that fit a little worse, taken in,
+            would let in what fits worse again.
     """
-    beta, residual = _least_squares(columns[wider], y[wider])
-    square, friction = np.square(residual), np.square(columns[wider][:, rigid:] @ beta[rigid:])
-    most = max(config.worse * np.median(square[~more[wider]]), config.good**2 * np.median(friction))
-    return bool(np.median(square[more[wider]]) <= most)
+    beta, residual = _least_squares(columns, y)
+    friction = np.square(columns[:, rigid:] @ beta[rigid:])
+    most = max(config.worse * noise, config.good**2 * float(np.median(friction)))
+    return float(np.median(np.square(residual[more]))) <= most
 
 
 def _step(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
