@@ -79,8 +79,6 @@ MACHINES = {
     # its slowest speed first, its fastest last, so that a step is nearly a bend of the curve
     "ordered": replace(draw("step", 4014), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=11.3, drift=-0.3),
     "step": replace(draw("step", 1), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=9.0, drift=0.3),
-    # steps of the encoder make the loop shake the joint: what it does at rest is small beside what its motion leaves
-    "coarse": replace(draw("12-bit", 30013), rate=draw("rests", 1).rate, seconds=20.0, weight=0.0),
     # slow speeds before the step, fast ones after it, and noise of a thousandth of its friction
     "quiet": replace(draw("step", 11006), rate=draw("rests", 1).rate, seconds=20.0, rests=0.4, when=10.1),
 }
@@ -149,17 +147,6 @@ def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve(logs: dic
     curve, band = (np.interp(speed, joint.series.speed, x) for x in (joint.series.curve, joint.series.band))
     assert np.all(np.abs(curve - machine.friction(speed)) <= 3.0 * band)
     assert np.all(band <= 0.05 * np.abs(curve))
-
-
-def test_a_coarse_encoder_does_not_decide_for_a_law(logs: dict[str, ExperimentLog]) -> None:
-    """12 bits do not show that friction differs both ways: the band of a free choice of laws, of either kind, holds the truth."""
-    machine = MACHINES["coarse"]
-    joint, _ = computed(logs["coarse"], None)
-    speed = joint.driven[1] * np.array([-0.9, -0.5, -0.25, 0.25, 0.5, 0.9])
-    curve, band = (np.interp(speed, joint.series.speed, x) for x in (joint.series.curve, joint.series.band))
-    assert np.all(np.abs(curve - machine.friction(speed)) <= 3.0 * band)
-    assert np.all(band <= 0.5 * np.abs(machine.friction(speed)))
-    assert sure(joint.inertia, machine.inertia)
 
 
 def test_a_step_of_a_quiet_joint_is_not_taken_for_sticking(logs: dict[str, ExperimentLog]) -> None:

@@ -77,15 +77,6 @@ class Ladder:
         """Not measurably worse than the best."""
         return not one.reason and no_worse(one.residual, self.best.residual)
 
-    def choice_std(self, speed: Array) -> Array:
-        """Deviation (samples,) [N m] of the curve by the choice among laws that judge alike, each as likely.
-
-        √mean (f_k - f)² over these laws k (Buckland, Burnham & Augustin 1997, Biometrics 53, p. 603, eq. (9)).
-        """
-        chosen = self.chosen.fit.curve(speed)
-        alike = [one.fit.curve(speed) for one in self.tried if one is self.chosen or self.alike(one)]
-        return np.asarray(np.sqrt(np.mean(np.square(np.array(alike) - chosen), axis=0)))
-
     @property
     def rivals(self) -> tuple[Tried, ...]:
         """Laws as simple as the chosen one, or nearly, that explain the fitted rows as well: nothing there speaks against them."""

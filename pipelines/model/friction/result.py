@@ -221,8 +221,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, n
     side = np.concatenate([[0.0], np.geomspace(1e-3 * fastest, fastest, _CURVE // 2)])
     axis = np.concatenate([-side[:0:-1], side])
     nothing = np.zeros(0)
-    band = np.hypot(ladder.chosen.fit.curve_std(axis), ladder.choice_std(axis))
-    series = Series(axis, ladder.chosen.fit.curve(axis), band, *(nothing,) * 15)
+    series = Series(axis, ladder.chosen.fit.curve(axis), ladder.chosen.fit.curve_std(axis), *(nothing,) * 15)
     inertia = _inertia(found.fitted, arm, j, middle)
     ripple = _rippled(found.ripples[j], None if found.beside_ripples is None else _inertia(found.beside_ripples, arm, j, middle),
                       arm.robot.joints[j].revolute)
@@ -357,6 +356,5 @@ def _series(joint: JointFit) -> Series:
     thin = [np.asarray(x[::every]) for x in (
         stretch.t - stretch.t[0], stretch.tau, friction, gravity, inertial, stretch.q, stretch.dq, driven.with_friction.q,
         driven.with_friction.dq, driven.without.q, driven.without.dq)]
-    band = np.hypot(joint.fit.curve_std(speed), joint.ladder.choice_std(speed))
-    return Series(speed, joint.fit.curve(speed), band, points.speed, points.odd, points.odd_std, points.even,
+    return Series(speed, joint.fit.curve(speed), joint.fit.curve_std(speed), points.speed, points.odd, points.odd_std, points.even,
                   *thin)
