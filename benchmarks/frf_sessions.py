@@ -22,12 +22,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.frf_plants import KINDS, PLANTS, Session, recorded
+from benchmarks.hidden_effects.table import wilson
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log, write_log
 from pipelines.model.frf.findings import Findings, frf_findings, grouped
 from pipelines.model.frf.grouping import GroupingConfig
 
-__all__ = ["drawn", "interval", "judged", "main"]
+__all__ = ["drawn", "judged", "main"]
 
 RATES = (100, 250, 500, 1000, 2000, 5000)  # [Hz]
 _RUNAWAY = 1.0  # [rad] from the reference: a controller too fast for its rate and a light motor
@@ -79,13 +80,6 @@ def judged(session: Session, found: Findings) -> str:
     return "right" if said and not found.undecided else "undecided"
 
 
-def interval(number: int, total: int) -> tuple[float, float]:
-    """95 % of a share; Wilson 1927."""
-    z, p = 1.96, number / total
-    middle, half = p + z * z / (2 * total), z * np.sqrt(p * (1 - p) / total + z * z / (4 * total**2))
-    return (middle - half) / (1 + z * z / total), (middle + half) / (1 + z * z / total)
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -112,7 +106,7 @@ def main() -> None:
     for group in dict.fromkeys(group for group, _ in sorted(tally)):
         total = sum(tally[group, v] for v in ("right", "undecided", "wrong"))
         print(f"{group:10}", *("{}: {} of {}, {:.2f} to {:.2f};".format(
-            v, tally[group, v], total, *interval(tally[group, v], total))
+            v, tally[group, v], total, *wilson(tally[group, v], total))
             for v in ("right", "undecided", "wrong")))
 
 

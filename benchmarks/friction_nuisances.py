@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden_effects.table import wilson
 from pipelines import fit_friction
 from pipelines.errors import RrridError
 from pipelines.fit_friction import Settings
@@ -31,14 +32,10 @@ from tests.model.friction.closed_loop import KINDS, Machine, draw, logs_of
 _PLACES = (0.25, 0.5, 0.9)  # of the fastest speed of the fit
 
 
-def wilson(right: int, count: int) -> str:
+def rate(right: int, count: int) -> str:
     """Share and its interval in per cent."""
-    if not count:
-        return "none"
-    share, z = right / count, 1.96
-    middle = (share + z**2 / (2 * count)) / (1 + z**2 / count)
-    half = z / (1 + z**2 / count) * math.sqrt(share * (1 - share) / count + z**2 / (4 * count**2))
-    return f"{right}/{count} = {100 * share:.1f} % ({100 * (middle - half):.1f} to {100 * (middle + half):.1f})"
+    low, high = wilson(right, count)
+    return f"{right}/{count} = {100 * right / count:.1f} % ({100 * low:.1f} to {100 * high:.1f})" if count else "none"
 
 
 def judge(machine: Machine, log: ExperimentLog) -> dict[str, Any]:
@@ -78,11 +75,11 @@ def table(kind: str, rows: list[dict[str, Any]]) -> None:
     as_kind = sum(row["drift"][0] == kind for row in named)
     seconds = np.mean([row["seconds"] for row in fits]) if fits else math.nan
     print(f"{kind:12s} refused {len(rows) - len(fits)}/{len(rows)}; J {_within(inertia)}, median error {100 * relative:.2f} %; "
-          f"curve {_within(curve)}; drift named {wilson(len(named), len(fits))}, as {kind} {as_kind}; {seconds:.1f} s", flush=True)
+          f"curve {_within(curve)}; drift named {rate(len(named), len(fits))}, as {kind} {as_kind}; {seconds:.1f} s", flush=True)
 
 
 def _within(errors: Array) -> str:
-    return wilson(int(np.sum(np.abs(errors) <= 2.0)), len(errors))
+    return rate(int(np.sum(np.abs(errors) <= 2.0)), len(errors))
 
 
 def main() -> None:

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.hidden_effects.table import wilson
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.log.doctor.checks_subject import Subject
@@ -647,16 +648,6 @@ def _field(told: object, true: object) -> str:
 def _told(told: object, true: object, blind: bool) -> str:
     """Return "right" for null where no log can determine the value."""
     return "right" if told is None and blind else _field(told, true)
-
-
-def wilson(hits: int, total: int) -> tuple[float, float]:
-    """Return the 95 % interval of a rate (Wilson 1927)."""
-    z, n = 1.96, max(total, 1)
-    middle, half = (
-        (hits + z * z / 2) / (n + z * z),
-        z * np.sqrt(hits * (n - hits) / n + z * z / 4) / (n + z * z),
-    )
-    return float(middle - half), float(middle + half)
 
 
 def table(results: Iterable[dict[str, Any]]) -> str:

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from benchmarks.hidden_effects.table import wilson
 from pipelines.estimate_bps import Result, Settings, compute
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.files import Opened
@@ -133,15 +134,6 @@ def scores(one: Drawn, found: Result) -> tuple[Array, Array]:
                          ([p.value for p in seen], [p.std for p in seen], [known[p.name] for p in seen]))
     every = [np.nan if p.std is None else p.std for p in found.parameters]
     return (value - truth) / std, np.array(every, dtype=np.float64)
-
-
-def wilson(hits: int, count: int) -> tuple[float, float]:
-    """Return the 95 % interval of a rate (Wilson 1927)."""
-    z, p = 1.96, hits / count
-    middle = p + z**2 / (2 * count)
-    half = z * np.sqrt(p * (1 - p) / count + z**2 / (4 * count**2))
-    scale = 1 + z**2 / count
-    return float((middle - half) / scale), float((middle + half) / scale)
 
 
 def main(seed: int, count: int) -> None:

@@ -27,7 +27,17 @@ from pipelines.model.frf.findings import Findings, frf_findings
 from pipelines.model.frf.grouping import GroupingConfig, advance
 from pipelines.model.frf.modes import BAND
 from pipelines.model.frf.responses import How, Measured
-from pipelines.model.frf.result import Classified, Method, Posture, Undecided, classified, methods_of, posture_of, undecided
+from pipelines.model.frf.result import (
+    COHERENCE,
+    Classified,
+    Method,
+    Posture,
+    Undecided,
+    classified,
+    methods_of,
+    posture_of,
+    undecided,
+)
 from pipelines.report.frf_report import frf_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
@@ -37,8 +47,21 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 _RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans "
            "one, at home or where --home says")
 _UNFOLDED = "log all signals by one clock at the controller's own rate; or thin them out behind the same low-pass"
-_RELIABLE = 0.7
-_SWING = 0.25  # of the turning speed: beyond it friction now and then turns its sign
+
+
+@dataclass(frozen=True)
+class FrfConfig:
+    """Limits of warnings.
+
+    Attributes:
+        swing: of the turning speed, std of the speed that v makes; beyond it a normal swing turns friction's sign
+            (four deviations) in one sample of 30,000 or more often
+    """
+
+    swing: float = 0.25
+
+
+_CONFIG = FrfConfig()
 
 
 @dataclass(frozen=True)
@@ -149,9 +172,9 @@ def _complaints(found: Findings, settings: Settings) -> list[Check]:
     for seen in found.seen:
         m = seen.measured
         inside = m.plant.within(*seen.modes.band)
-        low = float(np.mean(inside.coherence < _RELIABLE))
+        low = float(np.mean(inside.coherence < COHERENCE))
         if low > 0.0:
-            said.append(Check.of("D13", "warn", f"the coherence of joint {m.joint} is under {_RELIABLE:g} at {100.0 * low:.2g} % "
+            said.append(Check.of("D13", "warn", f"the coherence of joint {m.joint} is under {COHERENCE:g} at {100.0 * low:.2g} % "
                                  "of the frequencies of its excited band; they are shaded and hardly weigh", where=_logs_of(m),
                                  remedy="excite these frequencies more strongly, or record longer"))
         said += _turning(m.joint, m.first.speed, max(t.swing for t in m.turned), _logs_of(m))
@@ -166,7 +189,7 @@ def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Che
     if speed == 0.0:
         return [Check.of("D09", "warn", f"joint {joint} did not turn: friction sticks, and stands in the response like a spring",
                          where=where, remedy="let it turn slowly while it is excited")]
-    if swing > _SWING * speed:
+    if swing > _CONFIG.swing * speed:
         return [Check.of("D09", "warn", f"the excitation swings the speed of joint {joint} by {swing:.2g} about {speed:.2g} rad/s: "
                          "friction now and then turns its sign, which adds damping", where=where,
                          remedy="turn faster, or excite more weakly")]

@@ -47,12 +47,6 @@ class Separable:
     def columns(self, theta: Array) -> Array:
         return np.hstack([self.fixed, self.build(theta)])
 
-    def of_rows(self, rows: npt.NDArray[np.intp]) -> Separable:
-        """Some of its rows."""
-        slopes = self.slopes
-        some = None if slopes is None else lambda theta, own: slopes(theta, own)[rows]
-        return Separable(self.y[rows], self.fixed[rows], lambda theta: self.build(theta)[rows], self.lower, self.upper, some)
-
 
 @dataclass(frozen=True, eq=False)
 class Linear:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.frequency_response import Array, Complex, FrequencyResponse, Responses
+from pipelines.signal.frequency_response import Array, Complex, Responses
 
 __all__ = ["CrossSpectra", "cross_spectra", "welch_responses"]
 
@@ -71,13 +71,6 @@ class CrossSpectra:
         n = self.averages
         return Responses(self.frequency[1:], response, noise / ((n - 1.0) * power)[:, None, None], coherence, "welch",
                          _HANN_WIDTH * float(self.frequency[1]), n, _HANN_BINS, n - 1.0)
-
-    def second_estimate(self, source: int, output: int) -> FrequencyResponse:
-        """H₂ = Φ_zz / Φ_zx: unbiased where the noise is in the source instead. Variance as that of H₁, over the coherence."""
-        first = self.responses(source, (output,)).of(0)
-        coherence = np.where(first.coherence > 0.0, first.coherence, np.nan)
-        return FrequencyResponse(first.frequency, first.response / coherence, first.variance / coherence**2, first.coherence,
-                                 "welch", first.resolution, first.averages, first.correlated, first.freedom)
 
 
 def cross_spectra(stretches: Sequence[Array], rate: float, segment: int) -> CrossSpectra:

@@ -14,12 +14,10 @@ Equations (28), (29): Kostić et al. 2004. Variances: Pintelon, Schoukens 2012, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
-
-from pipelines.errors import UsageError
 
 __all__ = ["Array", "Complex", "FrequencyResponse", "Responses", "bands_below", "closed_loop", "indirect"]
 
@@ -47,32 +45,12 @@ class FrequencyResponse:
 
     def where(self, kept: npt.NDArray[np.bool_]) -> FrequencyResponse:
         """The bins that are `kept` (bins,)."""
-        return FrequencyResponse(self.frequency[kept], self.response[kept], self.variance[kept], self.coherence[kept], self.method,
-                                 self.resolution, self.averages, self.correlated, self.freedom)
+        return replace(self, frequency=self.frequency[kept], response=self.response[kept], variance=self.variance[kept],
+                       coherence=self.coherence[kept])
 
     def times(self, factor: Complex) -> FrequencyResponse:
         """Response times a `factor` (bins,) that is exactly known, as (jω)² of a second derivative or 1/(jω)."""
-        return FrequencyResponse(self.frequency, self.response * factor, self.variance * np.abs(factor) ** 2, self.coherence,
-                                 self.method, self.resolution, self.averages, self.correlated, self.freedom)
-
-    def magnitude_band(self, confidence: float = 0.95) -> tuple[Array, Array]:
-        """Lowest and highest magnitude (bins,) in the disc that holds the true response with this probability.
-
-        |Ĝ - G|² / variance is exponentially distributed: the radius is √(-ln(1 - confidence) variance). ibid., eq. (2-40).
-        """
-        radius = self._radius(confidence)
-        return np.maximum(np.abs(self.response) - radius, 0.0), np.abs(self.response) + radius
-
-    def phase_radius(self, confidence: float = 0.95) -> Array:
-        """Half the angle [rad] (bins,) under which that disc is seen from the origin; π where it holds the origin."""
-        size = np.abs(self.response)
-        share = self._radius(confidence) / np.where(size > 0.0, size, 1.0)
-        return np.where((share < 1.0) & (size > 0.0), np.arcsin(np.minimum(share, 1.0)), np.pi)
-
-    def _radius(self, confidence: float) -> Array:
-        if not 0.0 < confidence < 1.0:
-            raise UsageError("C02", f"a confidence of {confidence:g}", remedy="give one between 0 and 1")
-        return np.asarray(np.sqrt(-np.log1p(-confidence) * self.variance))
+        return replace(self, response=self.response * factor, variance=self.variance * np.abs(factor) ** 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,9 +101,8 @@ def indirect(sensitivity: FrequencyResponse, controller: Complex) -> FrequencyRe
     there = np.isfinite(sensitivity.response) & (sensitivity.response != 0.0) & (controller != 0.0)
     s, c = np.where(there, sensitivity.response, 1.0), np.where(there, controller, 1.0)
     variance = sensitivity.variance / np.abs(c * s**2) ** 2
-    return FrequencyResponse(sensitivity.frequency, np.where(there, (1.0 - s) / (c * s), np.nan), np.where(there, variance, np.inf),
-                             np.where(there, sensitivity.coherence, 0.0), sensitivity.method, sensitivity.resolution,
-                             sensitivity.averages, sensitivity.correlated, sensitivity.freedom)
+    return replace(sensitivity, response=np.where(there, (1.0 - s) / (c * s), np.nan), variance=np.where(there, variance, np.inf),
+                   coherence=np.where(there, sensitivity.coherence, 0.0))
 
 
 def bands_below(frequency: Array, coherence: Array, limit: float = 0.7) -> tuple[tuple[float, float], ...]:

@@ -74,10 +74,3 @@ def test_bounds_hold_and_are_named() -> None:
     found = fit_separable(tight, [np.log([0.5, 1.5])])
     assert found.at_bound == (False, True)
     assert found.theta[1] <= np.log(2.0) + 1e-12
-
-
-def test_some_rows() -> None:
-    """Rows left out are left out of every column."""
-    one = problem(np.random.default_rng(7))
-    few = one.of_rows(np.arange(0, 400, 2))
-    np.testing.assert_array_equal(few.columns(THETA), one.columns(THETA)[::2])

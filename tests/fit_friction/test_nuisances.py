@@ -79,6 +79,8 @@ MACHINES = {
     # its slowest speed first, its fastest last, so that a step is nearly a bend of the curve
     "ordered": replace(draw("step", 4014), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=11.3, drift=-0.3),
     "step": replace(draw("step", 1), rate=draw("rests", 1).rate, seconds=20.0, rests=0.2, when=9.0, drift=0.3),
+    # slow speeds before the step, fast ones after it, and noise of a thousandth of its friction
+    "quiet": replace(draw("step", 11006), rate=draw("rests", 1).rate, seconds=20.0, rests=0.4, when=10.1),
 }
 
 
@@ -145,6 +147,16 @@ def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve(logs: dic
     curve, band = (np.interp(speed, joint.series.speed, x) for x in (joint.series.curve, joint.series.band))
     assert np.all(np.abs(curve - machine.friction(speed)) <= 3.0 * band)
     assert np.all(band <= 0.05 * np.abs(curve))
+
+
+def test_a_step_of_a_quiet_joint_is_not_taken_for_sticking(logs: dict[str, ExperimentLog]) -> None:
+    """The rows that show it, slow ones in fast ramps, are fitted: its instant within a rest, its size within .03."""
+    machine = MACHINES["quiet"]
+    joint, _ = computed(logs["quiet"], None)
+    assert joint.drift is not None
+    assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
+    assert joint.drift.when == pytest.approx(machine.when, abs=machine.rests)
+    assert joint.drift.change.value == pytest.approx(machine.drift, abs=0.03)
 
 
 def test_an_inertia_below_zero_is_remarked(logs: dict[str, ExperimentLog]) -> None:

@@ -26,9 +26,27 @@ from pipelines.model.frf.modes import Pair
 
 __all__ = ["Explained", "explain", "predicted"]
 
-_FLOOR = 1e-3  # relative deviation of a frequency, that of every bin of the fit
-_LEAST_STD = 1e-9  # relative, of an inertia that is exactly known
-_LEAST = 1e-12  # of J: less is lost in the sums of the mass matrix, which is singular then
+
+@dataclass(frozen=True)
+class SpringsConfig:
+    """Numbers of the fit of masses and springs.
+
+    Attributes:
+        floor: relative deviation of a frequency, at least: that of every bin of the fit (modes.ModesConfig.floor)
+        known: relative deviation of an inertia that is exactly known: a prior that holds it to nine digits
+        singular: of J: a body of less is lost in the sums of the mass matrix, with 16 digits and squares of frequencies
+        rotor: of the least J, at most turns behind a gear: of all of it, nothing would be left to ride on the base
+        impossible: deviations that bodies which cannot exist count as
+    """
+
+    floor: float = 1e-3
+    known: float = 1e-9
+    singular: float = 1e-12
+    rotor: float = 0.95
+    impossible: float = 1e3
+
+
+_CONFIG = SpringsConfig()
 
 
 @dataclass(frozen=True)
@@ -57,7 +75,7 @@ def predicted(inertia: float, base: tuple[float, float] | None, joint: tuple[flo
     f_b, i_b = base or (1.0, 1.0)
     k, motor = joint or (1.0, 0.5 * inertia)
     link, rides = inertia - motor, inertia - rotor
-    if not np.isfinite([f_b * f_b * i_b, k, link]).all() or min(link, motor, i_b, rides) <= _LEAST * inertia:
+    if not np.isfinite([f_b * f_b * i_b, k, link]).all() or min(link, motor, i_b, rides) <= _CONFIG.singular * inertia:
         none = np.full(int(base is not None) + int(joint is not None), np.nan)
         return none, none
     if joint is None:  # K / (I + J_l), K / (I + J_l J_m / J)
@@ -94,17 +112,19 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     measured = np.log([[f.value for kind in _kinds(own) for f in kind] for own in pairs])
     spread = np.array([[np.hypot(f.std / f.value, slack) for kind in _kinds(own) for f in kind] for own in pairs])
 
-    known = np.maximum(inertia_std if len(inertia_std) else np.zeros(len(inertia)), _LEAST_STD)
+    known = np.maximum(inertia_std if len(inertia_std) else np.zeros(len(inertia)), _CONFIG.known)
     geared = base and not joint
     numbers = 2 * springs + int(geared)
 
     def rest(theta: Array) -> Array:
         b, k = _taken(theta[:2 * springs], base, joint)
-        rotor = _share(theta[2]) * min(inertia) if geared else 0.0
-        rows = [np.concatenate(predicted(j * float(np.exp(s * off)), b, k, rotor))
-                for j, s, off in zip(inertia, known, theta[numbers:], strict=True)]
+        # 0 … `rotor` of any real number
+        rotor = 0.5 * _CONFIG.rotor * (1.0 + float(np.tanh(0.5 * theta[2]))) * min(inertia) if geared else 0.0
+        rows = [np.concatenate(predicted(j * float(np.exp(s * more)), b, k, rotor))
+                for j, s, more in zip(inertia, known, theta[numbers:], strict=True)]
         light = [min(theta[1] - np.log(least), 0.0) / slack] if geared else []
-        return np.concatenate([_known(((np.log(rows) - measured) / spread).ravel()), theta[numbers:], light])
+        off = ((np.log(rows) - measured) / spread).ravel()
+        return np.concatenate([np.where(np.isfinite(off), off, _CONFIG.impossible), theta[numbers:], light])
 
     least = lightest * float(np.mean(inertia))
     starts = [np.concatenate([start, *([[rotor]] if geared else []), np.zeros(len(inertia))])
@@ -112,7 +132,7 @@ def explain(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     found = [least_squares(rest, start) for start in starts]
     best = min(found, key=lambda one: float(one.rest @ one.rest))
     b, k = _taken(best.x[:2 * springs], base, joint)
-    alone = np.array([[np.hypot(f.std / f.value, _FLOOR) for kind in _kinds(own) for f in kind] for own in pairs])
+    alone = np.array([[np.hypot(f.std / f.value, _CONFIG.floor) for kind in _kinds(own) for f in kind] for own in pairs])
     # What is left, not what was granted, says how well the numbers are known.
     weight = np.concatenate([(spread / alone).ravel(), np.ones(len(inertia) + int(geared))])
     freedom = measured.size - numbers
@@ -145,13 +165,3 @@ def _starts(pairs: Sequence[Sequence[Pair]], inertia: Sequence[float], base: boo
     if base and joint:
         return [np.array(as_base(first[i]) + as_joint(first[1 - i])) for i in (0, 1)]
     return [np.array(as_base(first[0]) if base else as_joint(first[0]))]
-
-
-def _known(values: Array) -> Array:
-    """Bodies that cannot exist are as bad as can be."""
-    return np.where(np.isfinite(values), values, 1e3)
-
-
-def _share(x: float) -> float:
-    """0 … .95 of any real number."""
-    return float(0.475 * (1.0 + np.tanh(0.5 * x)))

@@ -22,19 +22,39 @@ from pipelines.log.experiment import Array, Controller, ExperimentLog
 from pipelines.log.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
 from pipelines.signal.resample import through
 
-__all__ = ["INPUT", "MOST_LOST", "POSITION", "TORQUE", "Stretch", "Turned", "V", "excitation_period", "turned_joint"]
+__all__ = ["INPUT", "POSITION", "TORQUE", "Stretch", "Turned", "TurningConfig", "V", "excitation_period", "turned_joint"]
 
 V, INPUT, POSITION, TORQUE = range(4)  # channels of a stretch; behind them the positions of the other joints
 
-_PLATEAU = 0.02  # of the largest speed: what counts as constant
-_WANDERING = 0.2  # the same, where the speed is only reconstructed
-_SMOOTH = 0.5  # [s] over which it is
-_SETTLE = 0.5  # [s] after the speed has become constant
-_SHORTEST = 1.0  # [s] a stretch is worth
-_STILL = 1e-3  # [rad/s] a slower joint does not turn
-_SAME = 1e-9  # of the largest v: two periods are equal
-MOST_LOST = 0.1  # of the samples: beyond, what is filled in weighs as much as what was recorded
-_LINE = 1e-3  # of the strongest line's amplitude: what is weaker is none
+
+@dataclass(frozen=True)
+class TurningConfig:
+    """Limits of constant speed and of a repeated excitation.
+
+    Attributes:
+        plateau: of the largest speed, within which a reference is constant: the ramps of a trapezoid are left out
+        wandering: the same of a speed that is reconstructed, which the excitation swings
+        smooth: [s] over which it is reconstructed: two periods of the lowest mode looked for (modes.BAND)
+        settle: [s] after the speed has become constant: a position loop of 1 Hz is within 5 % after three time constants
+        shortest: [s] of a stretch: four periods of the lowest mode, for a mean over segments
+        still: [rad/s] a slower joint does not turn: a turn in two hours
+        same: of the largest v, two periods are equal: rounding of a text with ten digits
+        lost: of the samples; beyond, what is filled in weighs as much as what was recorded (-20 dB)
+        line: of the strongest line's amplitude, below which a line does not count: -60 dB, above leakage and rounding
+    """
+
+    plateau: float = 0.02
+    wandering: float = 0.2
+    smooth: float = 0.5
+    settle: float = 0.5
+    shortest: float = 1.0
+    still: float = 1e-3
+    same: float = 1e-9
+    lost: float = 0.1
+    line: float = 1e-3
+
+
+_CONFIG = TurningConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +116,7 @@ class Turned:
         if self.period is None:
             return ()
         size = np.abs(np.fft.rfft(np.nan_to_num(self.whole[:self.period, V])))
-        return tuple(np.flatnonzero(size > _LINE * size.max()).tolist())
+        return tuple(np.flatnonzero(size > _CONFIG.line * size.max()).tolist())
 
     def settings(self) -> tuple[object, ...]:
         """What two logs must share to be averaged, but for their posture."""
@@ -133,24 +153,24 @@ def turned_joint(log: ExperimentLog) -> Turned:
     signals = np.column_stack([v, mended[quantity][:, j], position[:, j], mended.tau[:, j], np.delete(position, j, axis=1),
                                mended.q[:, j], mended["dq_ref"][:, j] if "dq_ref" in mended else mended.q[:, j]])
     even = _even(good, signals, log.sample_time)
-    if even.filled > MOST_LOST:
+    if even.filled > _CONFIG.lost:
         raise InputRejected("T03", f"{percent(even.filled)} of the samples were lost: between them no spectrum is known",
                             where=log.source or log.name, remedy="give the recorder more priority, or record fewer signals")
     signals, q = even.signals[:, :-2], even.signals[:, -2]
     speed = even.signals[:, -1] if "dq_ref" in mended else _speed(q, log.sample_time)
-    width = _PLATEAU if "dq_ref" in mended else _WANDERING
+    width = _CONFIG.plateau if "dq_ref" in mended else _CONFIG.wandering
     stretches = tuple(_stretches(even.inside, signals, speed, width, log.sample_time))
     if "q_ref" not in mended:
         stretches = tuple(replace(s, signals=_levelled(s.signals, q[s.start:s.stop])) for s in stretches)
     if not stretches:
-        raise InputRejected("T08", f"joint {joint} never turns at constant speed for {_SETTLE + _SHORTEST:g} s",
+        raise InputRejected("T08", f"joint {joint} never turns at constant speed for {_CONFIG.settle + _CONFIG.shortest:g} s",
                             where=log.source or log.name,
                             remedy="let it turn slowly there and back, 20 s each way or more")
     top = float(np.nanmax(np.abs(speed)))
     kept = sum(s.stop - s.start for s in stretches)
     posture = log.posture if log.posture is not None else np.asarray(np.nanmedian(mended.q, axis=0))
     return Turned(log.name, joint, posture, log.sample_time, quantity, log.controller,
-                  log.robot.joints[j].revolute, top if top > _STILL else 0.0, _swing(stretches, log.sample_time),
+                  log.robot.joints[j].revolute, top if top > _CONFIG.still else 0.0, _swing(stretches, log.sample_time),
                   excitation_period(even.recorded_v, log.period, log.sample_time), stretches, signals, 1.0 - kept / len(signals),
                   even.filled, quantity == "r" or log.torque != "measured", log.torque != "measured",
                   (_mean(stretches, 1), _mean(stretches, -1)))
@@ -227,7 +247,7 @@ def _levelled(signals: Array, q: Array) -> Array:
 
 def _speed(q: Array, sample_time: float) -> Array:
     """Central differences over half a second."""
-    half = max(1, round(0.5 * _SMOOTH / sample_time))
+    half = max(1, round(0.5 * _CONFIG.smooth / sample_time))
     index = np.arange(len(q))
     high, low = np.minimum(index + half, len(q) - 1), np.maximum(index - half, 0)
     return np.asarray((q[high] - q[low]) / ((high - low) * sample_time))
@@ -235,13 +255,13 @@ def _speed(q: Array, sample_time: float) -> Array:
 
 def _stretches(inside: npt.NDArray[np.bool_], signals: Array, speed: Array, width: float, sample_time: float) -> list[Stretch]:
     top = float(np.nanmax(np.abs(speed)))
-    if top > _STILL:
+    if top > _CONFIG.still:
         directions: npt.NDArray[np.int8] = np.where(np.abs(np.abs(speed) - top) <= width * top, np.sign(speed), 2).astype(np.int8)
     else:
         directions = np.zeros(len(speed), dtype=np.int8)
     directions[~(inside & np.isfinite(signals).all(axis=1))] = 2
     edges = np.concatenate([[0], np.flatnonzero(np.diff(directions)) + 1, [len(speed)]])
-    settle, shortest = round(_SETTLE / sample_time), round(_SHORTEST / sample_time)
+    settle, shortest = round(_CONFIG.settle / sample_time), round(_CONFIG.shortest / sample_time)
     return [Stretch(int(a) + settle, int(b), int(directions[a]), signals[a + settle:b])
             for a, b in pairwise(edges) if directions[a] != 2 and b - a >= settle + shortest]
 
@@ -267,7 +287,7 @@ def excitation_period(v: Array, declared: float | None, sample_time: float) -> i
 def _repeats(v: Array, period: int) -> bool:
     difference = np.abs(v[period:] - v[:-period])
     known = difference[np.isfinite(difference)]
-    return bool(known.size and known.max() <= _SAME * np.nanmax(np.abs(v)))
+    return bool(known.size and known.max() <= _CONFIG.same * np.nanmax(np.abs(v)))
 
 
 def _swing(stretches: tuple[Stretch, ...], sample_time: float) -> float:

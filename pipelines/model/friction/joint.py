@@ -2,7 +2,8 @@
 
     motion by the smoother → refined about a flexible law → ladder → refined about the chosen law → the fit
 
-Rows in which the joint does not slide (sliding.py) are left out, where the flexible law does not follow them as well.
+Rows in which the joint rests are left out, of all but laws that know these: torque at rest is an inequality (Karnopp 1985).
+So are other rows in which it does not slide (sliding.py), where the flexible law does not follow them as well.
 """
 
 from __future__ import annotations
@@ -28,21 +29,39 @@ from pipelines.model.friction.postures import alike
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
 from pipelines.model.friction.simulate import Simulated, simulate_joint
-from pipelines.model.friction.sliding import Sliding, SlidingConfig, free_curve, left_out, sliding_rows
+from pipelines.model.friction.sliding import Mask, Sliding, SlidingConfig, free_curve, left_out, sliding_rows
 from pipelines.model.friction.speed_map import SpeedMap, speed_map
 from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["JointFit", "JointLogs", "Seen", "fit_joint", "fractions", "with_fit"]
+__all__ = ["JointConfig", "JointFit", "JointLogs", "Seen", "fit_joint", "fractions", "with_fit"]
 
-_BENT = 1e-3  # of friction: a curve that departs less from straight lines does not show whether it lags
-_COURSES = 5  # steps of Gauss and Newton for the time constant of a drift
-_CURVE = 100  # points of a curve, each way
-_FASTEST = 9  # of them, over which its slope at the highest speeds is taken
-_MEMORY = 1.0  # [s] over which errors of a law may depend on one another
-_ROUNDS = 2  # of refining before laws are compared
 _FLEXIBLE = Law("flexible", ("three_sigmoid", "asymmetric_friction"))  # follows any curve: no law of the ladder is favoured
+
+
+@dataclass(frozen=True)
+class JointConfig:
+    """Numbers of the fit of one joint.
+
+    Attributes:
+        bent: of friction; a curve that departs less from straight lines does not show whether it lags
+        memory: [s] over which errors of a law may depend on one another: a joint moves some of its travel in it
+        courses: steps of Gauss and Newton for the time constant of a drift
+        rounds: of refining before laws are compared
+        curve: points of a curve, each way, from 1e-3 of the fastest speed on
+        fastest: of them, over which its slope at the highest speeds is taken: the upper half of the speeds
+    """
+
+    bent: float = 1e-3
+    memory: float = 1.0
+    courses: int = 5
+    rounds: int = 2
+    curve: int = 100
+    fastest: int = 9
+
+
+_CONFIG = JointConfig()
 
 Seen = tuple[ExperimentLog, Reconstructed]
 
@@ -105,8 +124,9 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     beside = _swaying(logs)
     config = config or SlidingConfig()
     rows = _usable_rows(logs, window, beside, arm, config)
-    stretches, fit = _about_a_flexible_law(rows.stretches, rows.fitted, arm, resolution)
-    if rows.sliding.doubtful and rows.any_slide and not _followed(stretches, fit, rows.sliding, config):
+    moves = ~rows.sliding.resting if rows.any_slide and (law is None or law.pointwise) else np.ones_like(rows.sliding.resting)
+    stretches, fit = _about_a_flexible_law(left_out(rows.stretches, moves), rows.fitted, arm, resolution)
+    if rows.any_slide and not _followed(stretches, fit, rows.sliding, moves, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
     course = _course(stretches, rows, arm, config, DriftConfig())
     stretches, fit, course = _with_course(stretches, rows.fitted, course, fit, arm)
@@ -118,13 +138,13 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     chosen = ladder.chosen.fit
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
-    for _ in range(_COURSES if course is not None else 1):
+    for _ in range(_CONFIG.courses if course is not None else 1):
         both = _along((*identify, *validate), course, chosen)  # the same columns in both
         identify, validate = both[:len(identify)], both[len(identify):]
         final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
         course, chosen = _next(course, final), final
     if sticks:
-        robust = with_block_covariance(final.found, blocks_of_time(identify, _MEMORY))
+        robust = with_block_covariance(final.found, blocks_of_time(identify, _CONFIG.memory))
         final = _with_errors_in_variables(replace(final, found=robust), rows.sliding.attenuation)
     ripple = ripple_of(LawEquations.of(identify, arm), final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
@@ -176,27 +196,29 @@ def _about_a_flexible_law(stretches: tuple[Stretch, ...], fitted: int, arm: OneJ
                           resolution: float) -> tuple[tuple[Stretch, ...], LawFit]:
     """The motion refined about a law that follows any curve, and that law."""
     fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE)
-    for _ in range(_ROUNDS):
+    for _ in range(_CONFIG.rounds):
         before, stretches = fit, tuple(refined(stretch, fit, resolution) for stretch in stretches)
         fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE, [before.theta])
     return stretches, fit
 
 
-def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, config: SlidingConfig) -> bool:
-    """Whether one curve follows the rows of doubt as well as those that surely slide, or these do not rule what it leaves."""
+def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, moves: Mask,
+              config: SlidingConfig) -> bool:
+    """Return whether one curve fits the other rows as well as those that slide, or these make most of its residual.
+
+    Args:
+        moves: which rows of all are those of `stretches`.
+    """
     square = np.square(LawEquations.of(stretches, fit.joint).predicted(fit).residual)
-    doubt, sure = square[~sliding.slides], square[sliding.slides]
-    return float(doubt.mean()) <= config.worse * sliding.mean_square or float(doubt.sum()) <= float(sure.sum())
+    doubt, sure = square[~sliding.slides[moves]], square[sliding.slides[moves]]
+    return not doubt.size or float(doubt.mean()) <= config.worse * float(sure.mean()) or float(doubt.sum()) <= float(sure.sum())
 
 
 def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig, drift: DriftConfig) -> Course | None:
     """How friction changes in time over the logs that are fitted; None where it does not."""
     if not rows.any_slide:
         return None
-    slides = rows.sliding.slides
-    if all(stretch.sticks is None for stretch in stretches):
-        stretches = left_out(stretches, slides)
-    fitted = stretches[:rows.fitted]
+    fitted = left_out(stretches, rows.sliding.slides)[:rows.fitted]
     equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
     return drift_of(fitted, equations.y, equations.fixed, free_curve(speed, config), drift)
 
@@ -205,9 +227,9 @@ def _with_course(stretches: tuple[Stretch, ...], fitted: int, course: Course | N
                  arm: OneJoint) -> tuple[tuple[Stretch, ...], LawFit, Course | None]:
     """The stretches along `course`, its time constant fitted, and the flexible law fitted to these very stretches."""
     stretches = _along(stretches, course, fit)
-    for k in range(_COURSES if course is not None else 0):
+    for k in range(_CONFIG.courses if course is not None else 0):
         fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, None if k == 0 else [fit.theta])
-        if k + 1 < _COURSES:
+        if k + 1 < _CONFIG.courses:
             course = _next(course, fit)
             stretches = _along(stretches, course, fit)
     return stretches, fit, course
@@ -223,12 +245,12 @@ def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -
         return stretches
     rows = np.abs(np.concatenate([stretch.middle[1] for stretch in stretches]))
     fastest = float(max(np.abs(stretch.dq).max() for stretch in stretches))
-    side = np.geomspace(max(float(rows.min()), 1e-3 * float(rows.max())), fastest, _CURVE)
+    side = np.geomspace(max(float(rows.min()), 1e-3 * float(rows.max())), fastest, _CONFIG.curve)
     speed = np.concatenate([-side[::-1], side])
     curve = fit.curve(speed)
-    ends = (curve[_FASTEST] - curve[0], curve[-1] - curve[-1 - _FASTEST])
-    bent = curve - np.where(speed < 0.0, *ends) / (side[-1] - side[-1 - _FASTEST]) * speed
-    lags = max(np.ptp(bent[:_CURVE]), np.ptp(bent[_CURVE:])) > _BENT * float(np.abs(curve).max())
+    ends = (curve[_CONFIG.fastest] - curve[0], curve[-1] - curve[-1 - _CONFIG.fastest])
+    bent = curve - np.where(speed < 0.0, *ends) / (side[-1] - side[-1 - _CONFIG.fastest]) * speed
+    lags = max(np.ptp(bent[:_CONFIG.curve]), np.ptp(bent[_CONFIG.curve:])) > _CONFIG.bent * float(np.abs(curve).max())
     lags = lags and any(stretch.sticks is not None for stretch in stretches)
     own = None if course is None else replace(course, curve=(speed, curve))
     return tuple(replace(stretch, course=own, lag=(speed, bent) if lags else None) for stretch in stretches)

@@ -19,15 +19,33 @@ from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.rigid.body import Array
 
-__all__ = ["Judge", "Ladder", "Tried", "climb", "no_worse"]
+__all__ = ["Judge", "Ladder", "LadderConfig", "Tried", "climb", "no_worse"]
 
-_SURE = 2.0  # standard errors of a difference: beyond, it is one
-_WORTH = 0.01  # of the mean square: a smaller difference is none, however sure
-_BLOCKS = 20  # of the rows that judge
-_FOLDS = 10
-_FURTHER = 2  # causes beside the first
-_MORE = 0.1  # of what is left (mean square), the least that each of them must explain
-_HOPEFUL = 3  # of them are fitted at a time, those that explain most to first order
+
+@dataclass(frozen=True)
+class LadderConfig:
+    """Limits of a measurable difference between laws.
+
+    Attributes:
+        sure: standard errors of a difference, beyond which it is one: two-sided .05
+        worth: of the mean square; a smaller difference does not count, however sure: half a per cent rms
+        blocks: of the rows that judge, whose sums give a difference its deviation: 20 know it to a sixth
+        folds: of the rows, each held out in turn (Kohavi 1995, IJCAI, p. 1137)
+        further: causes beside the first
+        more: of the residual (mean square), the least that each of these must explain
+        hopeful: of them are fitted at a time, those that explain most to first order
+    """
+
+    sure: float = 2.0
+    worth: float = 0.01
+    blocks: int = 20
+    folds: int = 10
+    further: int = 2
+    more: float = 0.1
+    hopeful: int = 3
+
+
+_CONFIG = LadderConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +119,14 @@ def climb(judge: Judge, laws: Sequence[Law] = LADDER) -> Ladder:
         if law.name == "coulomb+viscous":
             sharpness = float(np.exp(one.fit.theta[0]))
     causes = [law.name for law in laws if len(law.members) > 2 and law.name in law.members]  # a law of several causes is none
-    for _ in range(_FURTHER):
+    for _ in range(_CONFIG.further):
         best = _best(tried)
         if best.law.name in ("viscous", "coulomb", "coulomb+viscous"):
             break  # no single cause helps: two would be chance
         beside = [_beside(judge, best, cause) for cause in causes if cause not in best.law.members]
         gains = [_gain(judge, best, law, starts) for law, starts in beside]
-        hopeful = [k for k in sorted(range(len(gains)), key=lambda k: -gains[k])[:_HOPEFUL] if gains[k] > 0.5 * _WORTH]
+        order = sorted(range(len(gains)), key=lambda k: -gains[k])
+        hopeful = [k for k in order[:_CONFIG.hopeful] if gains[k] > 0.5 * _CONFIG.worth]
         more = [_worth(judge.try_law(*beside[k]), best) for k in hopeful]
         tried += more
         if not more or no_worse(best.residual, _best(tried).residual):
@@ -133,13 +152,13 @@ def _beside(judge: Judge, best: Tried, cause: str) -> tuple[Law, list[Array]]:
 
 def _worth(one: Tried, best: Tried) -> Tried:
     """A cause more has to explain a good part of what one cause leaves, or it is the model's own roughness that it explains."""
-    if one.reason or one.validate_rms**2 < (1.0 - _MORE) * best.validate_rms**2:
+    if one.reason or one.validate_rms**2 < (1.0 - _CONFIG.more) * best.validate_rms**2:
         return one
     return replace(one, reason=f"explains too little beside {best.law.name}")
 
 
 def _gain(judge: Judge, best: Tried, law: Law, starts: Sequence[Array]) -> float:
-    """Share of what `best` leaves that the new columns of `law` explain: below `_WORTH` it can never be told from `best`.
+    """Share of what `best` leaves that the new columns of `law` explain: below `worth` it can never be told from `best`.
 
     To first order: what of each column lies outside everything that the fitted law can already do, ∂ŷ/∂(β, θ).
     """
@@ -167,9 +186,9 @@ def no_worse(one: Array, best: Array) -> bool:
     does to the difference. Its deviation comes from sums over blocks, within which noise may remember itself.
     """
     apart = one - best
-    chance = np.array([part.sum() for part in np.array_split(2.0 * apart * best, min(_BLOCKS, len(best)))])
+    chance = np.array([part.sum() for part in np.array_split(2.0 * apart * best, min(_CONFIG.blocks, len(best)))])
     difference = float(one @ one - best @ best)
-    return difference <= max(_SURE * float(np.sqrt(chance @ chance)), _WORTH * float(best @ best))
+    return difference <= max(_CONFIG.sure * float(np.sqrt(chance @ chance)), _CONFIG.worth * float(best @ best))
 
 
 def _held_out(fit: LawFit) -> Array:
@@ -180,7 +199,7 @@ def _held_out(fit: LawFit) -> Array:
     found = fit.found
     free = np.append(np.ones(len(found.beta), dtype=bool), ~np.array(found.at_bound, dtype=bool))
     part = linear_part(found.jacobian[:, free], found.residual)
-    blocks = np.arange(len(found.residual)) * _FOLDS // len(found.residual)
+    blocks = np.arange(len(found.residual)) * _CONFIG.folds // len(found.residual)
     return held_out(part.columns @ part.root, found.residual, blocks)
 
 
@@ -189,12 +208,12 @@ def _fault(fit: LawFit, takes: bool) -> str:
 
     Numbers that the rows hardly show are no fault: a law that has too many of them judges no better than a simpler one.
     """
-    below = [number.name for number in fit.numbers if number.low >= 0.0 and number.value < number.low - _SURE * number.std]
+    below = [number.name for number in fit.numbers if number.low >= 0.0 and number.value < number.low - _CONFIG.sure * number.std]
     if below:
         return f"{', '.join(below)} would be negative"
     for effect in fit.law.effects[2:]:  # what the law has beyond Coulomb and viscous friction
         own = {f"{effect.name}.{q.name}" for q in effect.parameters if not q.shape}
         numbers = [number for number in fit.numbers if number.name in own]
-        if all(abs(number.value) <= _SURE * number.std for number in numbers):
+        if all(abs(number.value) <= _CONFIG.sure * number.std for number in numbers):
             return f"{', '.join(number.name for number in numbers)} may be zero"
     return "" if takes else "its curve would push at speeds that are not in these logs"

@@ -33,7 +33,7 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float, freedom: float = 1
         resolution: step of the encoder [rad].
         freedom: times the torque noise that the fit shows: above one the motion is held less to what a rough fit implies.
     """
-    if fit.inertia <= 0.0:
+    if fit.inertia <= 0.0 or not stretch.rows:
         return stretch
     q, dq = reference_motion(stretch, fit)
     deviation = (stretch.measured - q)[:, None]

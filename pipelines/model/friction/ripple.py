@@ -24,22 +24,46 @@ from pipelines.model.friction.waves import Waves
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import orders_along
 
-__all__ = ["Along", "Ripple", "refitted", "ripple_of"]
+__all__ = ["Along", "Ripple", "RippleConfig", "refitted", "ripple_of"]
 
-_ROWS = 4000  # that are looked at, or up to twice as many: more than ten for every order
 _AT_ONCE = 16  # orders: memory
-_FOLDS = 10
-_MOST = 8  # waves
-_EACH = 0.05  # of what is left (mean square), the least that a further wave explains
-# Of what is left of blocks held out (mean square), the least: as much as all else together. What sways or gives way beside a
-# joint goes with its angle too: up to .24 on a healthy arm. Cogging of 4 % of the torque came to .98, an outrunner's to .89.
-_TOLD = 0.5
-_SIDES = 0.1  # of the same, forth and back, slow and fast, each
-_WORTH = 0.01  # of the joint's torque (rms): a smaller one is not worth a word
-_FEW = 100  # rows that each side has at least: a side that was not driven says nothing
-_SURE = 3.0  # standard deviations of a size, that it has to be
-_CLASSES, _A_CLASS = 360, 8  # of angle, at most; rows of one
 _RANK = 1e-5  # singular values of unit columns below it: two columns that are one
+
+
+@dataclass(frozen=True)
+class RippleConfig:
+    """Limits beyond which a torque of the angle is reported.
+
+    Attributes:
+        rows: that are looked at, or up to twice as many: more than ten for every order
+        folds: blocks of time, each held out in turn (Efron 1979)
+        most: waves
+        each: of the residual (mean square), the least that a further wave explains
+        explained: of the residual of blocks held out (mean square), the least: as much as all else together. Compliance of
+            other joints follows the angle too: up to .24 on a healthy arm. Cogging of 4 % of the torque came to .98, an
+            outrunner's to .89
+        sides: of the same, forth and back, slow and fast, each
+        worth: of the joint's torque (rms): what friction laws are good for
+        few: rows that each side has at least: a side that was not driven says nothing
+        sure: standard deviations of a size, that it has to be: two-sided .003
+        classes: of angle, at most, a degree of a turn each
+        of_class: rows of one
+    """
+
+    rows: int = 4000
+    folds: int = 10
+    most: int = 8
+    each: float = 0.05
+    explained: float = 0.5
+    sides: float = 0.1
+    worth: float = 0.01
+    few: int = 100
+    sure: float = 3.0
+    classes: int = 360
+    of_class: int = 8
+
+
+_CONFIG = RippleConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,7 +170,7 @@ class _Rows:
     @cached_property
     def parts(self) -> tuple[npt.NDArray[np.intp], ...]:
         """Blocks of time."""
-        return tuple(np.array_split(np.arange(len(self.columns)), _FOLDS))
+        return tuple(np.array_split(np.arange(len(self.columns)), _CONFIG.folds))
 
     @cached_property
     def whole(self) -> _Normal:
@@ -175,11 +199,12 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
         equations: that `fit` was fitted to.
     """
     power = float(np.mean(np.square(equations.y)))
-    if fit.found.rms**2 <= _WORTH**2 * power:
+    if fit.found.rms**2 <= _CONFIG.worth**2 * power:
         return None
-    few, arms = equations.thinned(_ROWS), equations.arms()
+    few, arms = equations.thinned(_CONFIG.rows), equations.arms()
     every = Waves(tuple(orders_along(float(np.ptp(equations.nodes.q[:, 0])), arms[0].revolute)))
-    parts = [few.build(every.some(part), arms, fit.theta) for part in _batches(len(every.orders))]
+    size = len(every.orders)
+    parts = [few.build(every.some(range(k, min(k + _AT_ONCE, size))), arms, fit.theta) for k in range(0, size, _AT_ONCE)]
     rows = _Rows.of(fit.found.jacobian[few.rows], np.hstack(parts), fit.found.residual[few.rows])
     state = few.build(_State(), arms, fit.theta)
     chosen = _chosen(rows.whole)
@@ -189,23 +214,19 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
     high = np.hypot(*rows.amplitudes(rows.whole, chosen).reshape(-1, 2).T)
     chosen = [chosen[k] for k in np.argsort(-high)]
     rms, std = _size(rows, chosen)
-    if rms < max(_WORTH * np.sqrt(power), _SURE * std):
+    if rms < max(_CONFIG.worth * np.sqrt(power), _CONFIG.sure * std):
         return None
     waves = every.some(chosen)
     return Ripple(rms, std, share, waves.orders, _along(rows, chosen, state, waves, arms[0]))
 
 
-def _batches(count: int) -> list[range]:
-    return [range(k, min(k + _AT_ONCE, count)) for k in range(0, count, _AT_ONCE)]
-
-
 def _chosen(normal: _Normal) -> list[int]:
     """Waves one after the other, that which explains most first, as long as each explains a good part of the rest."""
     chosen: list[int] = []
-    while len(chosen) < _MOST:
+    while len(chosen) < _CONFIG.most:
         gains = normal.gains(chosen)
         best = int(np.argmax(gains))
-        if gains[best] < _EACH or best in chosen:
+        if gains[best] < _CONFIG.each or best in chosen:
             break
         chosen.append(best)
     return chosen
@@ -215,7 +236,7 @@ def _told(rows: _Rows, speed: Array) -> float | None:
     """Share that waves chosen on the other blocks explain of blocks held out; None where it is too little, in all or on a side."""
     quick = np.abs(speed) > np.median(np.abs(speed))
     sides = (speed > 0.0, speed < 0.0, quick, ~quick)
-    if min(int(side.sum()) for side in sides) < _FEW:  # of a joint that goes one way friction is a torque of its angle too
+    if min(int(side.sum()) for side in sides) < _CONFIG.few:  # of a joint that goes one way friction is a torque of its angle too
         return None
     before, after = np.empty(len(speed)), np.empty(len(speed))
     for part, rest in zip(rows.parts, rows.others, strict=True):
@@ -223,7 +244,8 @@ def _told(rows: _Rows, speed: Array) -> float | None:
         for into, chosen in ((before, []), (after, _chosen(rest))):
             into[part] = here[:, -1] - here[:, rest.places(chosen)] @ rest.solution(chosen)
     whole = _share(before, after)
-    return whole if whole >= _TOLD and min(_share(before[side], after[side]) for side in sides) >= _SIDES else None
+    least = min(_share(before[side], after[side]) for side in sides)
+    return whole if whole >= _CONFIG.explained and least >= _CONFIG.sides else None
 
 
 def _share(before: Array, after: Array) -> float:
@@ -246,7 +268,7 @@ def _size(rows: _Rows, chosen: Sequence[int]) -> tuple[float, float]:
 
     rest = rows.columns[:, -1] - rows.columns[:, rows.whole.places(chosen)] @ rows.whole.solution(chosen)
     white = rows.scale[-1] * float(np.linalg.norm(rest)) / len(rows.columns)
-    jackknife = float(np.sqrt(_FOLDS - 1.0) * np.std([size(others) for others in rows.others]))
+    jackknife = float(np.sqrt(_CONFIG.folds - 1.0) * np.std([size(others) for others in rows.others]))
     return size(rows.whole), max(jackknife, white)
 
 
@@ -258,7 +280,7 @@ def _along(rows: _Rows, chosen: Sequence[int], state: Array, waves: Waves, arm: 
     q, dq = state.T
     solution = rows.whole.solution(chosen)
     left = (rows.columns[:, -1] - rows.columns[:, :rows.numbers] @ solution[:rows.numbers]) * rows.scale[-1]
-    classes = int(np.clip(len(q) // _A_CLASS, 10, _CLASSES))
+    classes = int(np.clip(len(q) // _CONFIG.of_class, 10, _CONFIG.classes))
     edges = np.linspace(float(q.min()), float(q.max()), classes + 1)
     middle = 0.5 * (edges[1:] + edges[:-1])
     place = np.clip(np.searchsorted(edges, q, side="right") - 1, 0, classes - 1)

@@ -8,7 +8,8 @@ encoder decides. From the longest travel down, a further class of travel is take
 
     τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed, each way apart
 
-leaves no more of it than of the rows before; f may change slowly in time, or at an instant that explains a class which does
+leaves no more of it than of the first rows, or no more than a law is good for; f may change slowly in time, or at an instant
+that explains a class which does
 not follow otherwise. No law is assumed.
 """
 
@@ -36,8 +37,9 @@ class SlidingConfig:
     """Numbers that decide which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
-    worse: float = 4.0  # median square of a class over that of the rows before: 3 std of the logarithm of the median square of
+    worse: float = 4.0  # median square of a class over that of the first rows: 3 std of the logarithm of the median square of
     # 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
+    good: float = 0.03  # of friction: what a law is good for (DriftConfig.least); with `margin`, its fourth power, 1e-6, remains
     rows: int = 3  # for every column of the free curve, that the first class has at least
     margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel) (Dahl 1968), 2 %
     classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
@@ -53,55 +55,63 @@ class Sliding:
     """Rows that slide, of stretches one after the other."""
 
     slides: Mask  # (rows,)
-    resting: Mask  # (rows,) at rest or turning back within
+    resting: Mask  # (rows,) at rest throughout
     travel: Array  # (rows,) [rad] since the last rest or reversal, or until the next
     distance: float  # [rad] of travel from which rows slide
-    mean_square: float  # [N² m²] that the free curve leaves of them
     attenuation: float  # noise of the acceleration over acceleration (variance), outside all other columns
-    doubtful: bool  # whether some rows do not follow the free curve
 
 
 def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingConfig) -> Sliding:
     """Order rows by travel and take them in while friction is a function of speed."""
     equations = LawEquations.of(stretches, joint)
-    travel = np.concatenate([_travel(stretch, config)[stretch.kept] for stretch in stretches])
+    travel, rests = (np.concatenate([of(stretch, config)[stretch.kept] for stretch in stretches]) for of in (_travel, _rests))
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
-    steady = np.hstack([equations.fixed, free_curve(speed, config)])
+    rigid, steady = equations.fixed.shape[1], np.hstack([equations.fixed, free_curve(speed, config)])
     columns = np.hstack([steady, _free_course(speed, config)])
     moving = travel > 0.0
     if not moving.any():
-        return Sliding(moving, ~moving, travel, 0.0, 0.0, np.inf, True)
+        return Sliding(moving, rests, travel, 0.0, np.inf)
     reach = start = float(np.median(travel[moving]))
     slides = travel >= reach
     while slides.sum() < min(config.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()):
         reach = start = reach / config.halving
         slides = moving & (travel >= reach)
+    noise = _noise(columns[slides], equations.y[slides])
     while reach > 0.0:
         lower = reach / config.halving if (moving & (travel < reach)).any() else 0.0
         wider = moving & (travel >= lower)
         more = wider & ~slides
         if more.any():
-            if not _follows(columns, equations.y, wider, more, config):
+            if not _follows(columns[wider], rigid, equations.y[wider], more[wider], noise, config):
                 columns = np.hstack([columns, _step(columns, equations.y, speed, wider)])
-                if not _follows(columns, equations.y, wider, more, config):
+                if not _follows(columns[wider], rigid, equations.y[wider], more[wider], noise, config):
                     break
             slides = wider
         reach = lower
     reach = min(config.margin * reach, start)
     slides &= travel >= reach
-    left, count = _left(columns[slides], equations.y[slides])
-    mean_square = left / max(count, 1)
-    whole, count_whole = _left(columns, equations.y)
-    rest = int((~slides).sum())
-    doubtful = rest > 0 and (whole - left) / max(count_whole - count, 1) > config.worse * mean_square
-    return Sliding(slides, ~moving, travel, reach, mean_square,
-                   _attenuation(stretches, steady[slides], slides, len(equations.postures)), bool(doubtful))
+    return Sliding(slides, rests, travel, reach,
+                   _attenuation(stretches, steady[slides], slides, len(equations.postures)))
 
 
-def _follows(columns: Array, y: Array, wider: Mask, more: Mask, config: SlidingConfig) -> bool:
-    """Whether least squares over `wider` rows leaves no more of `more` of them than of the others."""
-    square = np.square(_residual(columns[wider], y[wider]))
-    return bool(np.median(square[more[wider]]) <= config.worse * np.median(square[~more[wider]]))
+def _noise(columns: Array, y: Array) -> float:
+    """Return the median square [N² m²] that least squares leaves, over the share of its degrees of freedom."""
+    used = np.any(columns != 0.0, axis=0).sum() / len(y)
+    return float(np.median(np.square(_least_squares(columns, y)[1])) / max(1.0 - used, 1.0 / len(y)))
+
+
+def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float, config: SlidingConfig) -> bool:
+    """Return whether least squares fits `more` of the rows to within their `noise`, or as well as any law does.
+
+    Args:
+        columns: (rows, columns) the first `rigid` of them are no friction.
+        noise: [N² m²] median square of the rows with the longest travel. It stays: rows that fit a little worse, taken in,
+            would let in what fits worse again.
+    """
+    beta, residual = _least_squares(columns, y)
+    friction = np.square(columns[:, rigid:] @ beta[rigid:])
+    most = max(config.worse * noise, config.good**2 * float(np.median(friction)))
+    return float(np.median(np.square(residual[more]))) <= most
 
 
 def _step(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
@@ -113,9 +123,9 @@ def _step(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
 
 
 def left_out(stretches: Sequence[Stretch], slides: Mask) -> tuple[Stretch, ...]:
-    """The stretches without the rows that do not slide."""
-    parts = np.split(slides, np.cumsum([stretch.rows for stretch in stretches])[:-1])
-    return tuple(stretch.without(~part) for stretch, part in zip(stretches, parts, strict=True))
+    """The stretches without those of their usable rows that do not slide."""
+    parts = np.split(slides, np.cumsum([stretch.usable.sum() for stretch in stretches])[:-1])
+    return tuple(stretch.only(part) for stretch, part in zip(stretches, parts, strict=True))
 
 
 def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
@@ -130,6 +140,12 @@ def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
     edges = stretch.edges
     within = np.minimum.reduceat(travel, edges)[:len(edges) - 1]
     return np.asarray(np.minimum(within, travel[edges[1:]]))
+
+
+def _rests(stretch: Stretch, config: SlidingConfig) -> Mask:
+    """Return a mask (windows,): the speed does not differ from zero throughout."""
+    moves = np.abs(stretch.dq) > config.rest * stretch.speed_std
+    return ~np.logical_or.reduceat(moves, stretch.edges)[:len(stretch.edges) - 1]
 
 
 def free_curve(speed: Array, config: SlidingConfig) -> Array:
@@ -152,18 +168,12 @@ def _free_course(speed: Array, config: SlidingConfig) -> Array:
     return np.hstack([hats * np.sign(speed)[:, None], hats * speed[:, None]])
 
 
-def _left(columns: Array, y: Array) -> tuple[float, int]:
-    """Sum of squares that least squares leaves, and its degrees of freedom."""
+def _least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
+    """Return coefficients (columns,) and residual (rows,)."""
     scale = np.linalg.norm(columns, axis=0)
-    residual = _residual(columns, y)
-    return float(residual @ residual), len(y) - int(np.sum(scale > 0.0))
-
-
-def _residual(columns: Array, y: Array) -> Array:
-    """Return the residual of least squares (rows,)."""
-    scale = np.linalg.norm(columns, axis=0)
-    unit = columns[:, scale > 0.0] / scale[scale > 0.0]
-    return np.asarray(y - unit @ np.linalg.lstsq(unit, y, rcond=1e-9)[0])
+    scale = np.where(scale > 0.0, scale, 1.0)
+    beta = np.asarray(np.linalg.lstsq(columns / scale, y, rcond=1e-9)[0] / scale)
+    return beta, y - columns @ beta
 
 
 def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask, postures: int) -> float:
@@ -178,6 +188,6 @@ def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask, pos
     for k in range(postures):
         own = columns[:, width * k]
         others = np.delete(columns, width * k, axis=1)
-        outside, _ = _left(others, own)
-        shares.append(float(noise[own != 0.0].sum()) / max(outside, 1e-300))
+        outside = _least_squares(others, own)[1]
+        shares.append(float(noise[own != 0.0].sum()) / max(float(outside @ outside), 1e-300))
     return max(shares)

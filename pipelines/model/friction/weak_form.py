@@ -31,7 +31,7 @@ from pipelines.signal.tuning import tune_jerk
 
 __all__ = ["Course", "Stretch", "Windows", "blocks_of_time", "moved", "stretches_of", "swaying"]
 
-_MOTIONLESS = ("edges", "kept", "impulse", "length", "torque")
+_MOTIONLESS = ("edges", "usable", "impulse", "length", "torque")
 _VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
 _SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
 _FAST = 3.0  # standard deviations of a speed: what is slower (rms) may stand still
@@ -133,11 +133,11 @@ class Stretch:
     untimed: bool = False  # the torque is measured: when within its step it acted is not known
     part: int = 0  # which of its stretches this is
 
-    def without(self, rows: npt.NDArray[np.bool_]) -> Stretch:
-        """The same without some of its rows (rows,)."""
-        sticks = np.zeros(len(self.kept), dtype=bool) if self.sticks is None else self.sticks.copy()
-        sticks[np.flatnonzero(self.kept)[rows]] = True
-        return replace(self, sticks=sticks)
+    def only(self, rows: npt.NDArray[np.bool_]) -> Stretch:
+        """The same with some of its usable rows (usable rows,); itself as first made with all."""
+        sticks = np.zeros(len(self.usable), dtype=bool)
+        sticks[self.usable] = ~rows
+        return replace(self, sticks=sticks if sticks.any() else None)
 
     def moved(self, q: Array, dq: Array) -> Stretch:
         """The same with a better motion; what does not depend on that is kept."""
@@ -155,11 +155,15 @@ class Stretch:
         return np.arange(0, len(self.t), self.window)
 
     @cached_property
-    def kept(self) -> npt.NDArray[np.bool_]:
+    def usable(self) -> npt.NDArray[np.bool_]:
         """(windows,) nothing in it is spoilt."""
         bad = np.concatenate([[0], np.cumsum(self.spoilt)])
-        usable = bad[self.edges[1:] + 1] == bad[self.edges[:-1]]
-        return np.asarray(usable if self.sticks is None else usable & ~self.sticks)
+        return np.asarray(bad[self.edges[1:] + 1] == bad[self.edges[:-1]])
+
+    @property
+    def kept(self) -> npt.NDArray[np.bool_]:
+        """(windows,) usable, and not left out as sticking."""
+        return self.usable if self.sticks is None else self.usable & ~self.sticks
 
     @cached_property
     def impulse(self) -> Array:
