@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
@@ -81,9 +82,10 @@ def event_threshold(
     from scipy.stats import chi2
 
     rows = dataset.known
-    mean = np.linalg.solve(prior.precision + sum(prior.grams), sum(prior.moments))
+    info = Arrow.of(prior.precision + np.sum(prior.grams, axis=0), prior.structure)
+    mean = info.solve(np.sum(prior.moments, axis=0))
     table = prior.table(rows.nominal, dictionary.known)
-    residual = [y - t for y, t in zip(rows.y, table.times(np.asarray(mean)), strict=True)]
+    residual = [y - t for y, t in zip(rows.y, table.times(mean), strict=True)]
     if dataset.reference is None:  # a contact in each log is no measure of what is usual
         for one in best_windows(rows, dictionary, dataset.arm, residual):
             for own in residual:

@@ -16,6 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
@@ -39,7 +40,7 @@ class Screened:
 
 
 def screen(
-    groups: Sequence[Group], info: Array, cross: Array, own: Sequence[Array], moments: Array
+    groups: Sequence[Group], info: Arrow, cross: Array, own: Sequence[Array], moments: Array
 ) -> list[Screened]:
     """Return T_c of every group.
 
@@ -49,11 +50,11 @@ def screen(
         own: C Cᵀ of each group.
         moments: g (columns,).
     """
-    solved = np.linalg.solve(info, cross)
+    half = info.half(cross)
     out = []
     for group, square in zip(groups, own, strict=True):
         part = slice(group.first, group.first + group.width)
-        left = square - cross[:, part].T @ solved[:, part]
+        left = square - half[:, part].T @ half[:, part]
         unit = np.sqrt(np.maximum(np.diag(square), 1e-300))
         values, vectors = np.linalg.eigh(left / unit / unit[:, None])
         seen = values > _VISIBLE
@@ -158,20 +159,21 @@ class _Parts:
         info, moment = self.prior.of(before)
         gram = np.sum([self.prior.grams[k] for k in after], axis=0)
         own = np.sum([self.prior.moments[k] for k in after], axis=0)
-        mean = np.linalg.solve(info + gram, moment + own)
+        known = Arrow.of(info + gram, self.prior.structure)
+        mean = known.solve(moment + own)
         cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
         squares = [
             np.sum([self.squares[k][i] for k in after], axis=0) for i in range(len(self.groups))
         ]
         found = screen(
             self.groups,
-            info + gram,
+            known,
             cross,
             squares,
             self.moments[after].sum(axis=0) - cross.T @ mean,
         )
         cost = self.powers[after].sum() - (moment + own) @ mean
-        cost += moment @ np.linalg.solve(info, moment)
+        cost += float(np.sum(Arrow.of(info, self.prior.structure).half(moment) ** 2))
         return found, float(cost) / rows, rows
 
 
