@@ -72,13 +72,13 @@ class Arrow:
             numpy.linalg.LinAlgError: it is not positive definite.
         """
         structure = structure.among(matrix)
-        shared, blocks, across = structure.shared, [], []
+        shared, blocks, across = structure.shared, list[Array](), list[Array]()
         corner = matrix[np.ix_(shared, shared)]
         for own in structure.own:
-            blocks.append(np.linalg.cholesky(matrix[np.ix_(own, own)]))
+            blocks.append(_root(matrix[np.ix_(own, own)]))
             across.append(_forward(blocks[-1], matrix[np.ix_(own, shared)]))
             corner = corner - across[-1].T @ across[-1]
-        return cls(structure, tuple(blocks), tuple(across), np.linalg.cholesky(corner))
+        return cls(structure, tuple(blocks), tuple(across), _root(corner))
 
     def half(self, b: Array) -> Array:
         """Return L⁻¹ b, in the order of `b` (k,) or (k, m): |L⁻¹ b|² is bᵀ A⁻¹ b."""
@@ -126,6 +126,10 @@ class Arrow:
         shared = np.zeros((len(structure.shared), values.shape[1]))
         shared[there] = values[place[structure.shared[there]]]
         return own, _forward(self.corner, shared - w.T @ own)
+
+
+def _root(matrix: Array) -> Array:
+    return np.asarray(np.linalg.cholesky(matrix), dtype=np.float64)
 
 
 def _forward(factor: Array, b: Array) -> Array:

@@ -11,7 +11,6 @@ from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, load
 from pipelines.diagnosis.decision import Decision, decide
-from pipelines.diagnosis.events import event_threshold
 from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.screening import Baseline, baseline
@@ -53,8 +52,7 @@ class Look:
             prior, known = before.later.prior, before.baseline
         else:
             prior = prior_of(dataset, dictionary, config)
-            event = event_threshold(dataset, dictionary, prior, config)
-            known = baseline(dataset, dictionary, prior, event, config)
+            known = baseline(dataset, dictionary, prior, config)
         later = Later.of(dataset, dictionary, prior, config)
         return cls(later, known, select(later, known, responses, config, found))
 

@@ -63,8 +63,8 @@ class Prior:
 
         (V + U Q Uᵀ)⁻¹ = A - A U (Q⁻¹ + Uᵀ A U)⁻¹ Uᵀ A (Woodbury).
         """
-        info = self.precision + sum(self.grams[k] for k in parts)
-        moment = sum(self.moments[k] for k in parts)
+        info = self.precision + np.sum([self.grams[k] for k in parts], axis=0)
+        moment = np.sum([self.moments[k] for k in parts], axis=0)
         free = np.flatnonzero(self.drift)
         side = info[:, free]
         inner = np.diag(1.0 / self.drift[free]) + side[free]

@@ -160,7 +160,15 @@ class Later:
             [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
         )
         state = State(
-            model, theta, info, moment, residual, effects, lasting, np.zeros(0), self.prior.structure
+            model,
+            theta,
+            info,
+            moment,
+            residual,
+            effects,
+            lasting,
+            np.zeros(0),
+            self.prior.structure,
         )
         return replace(state, losses=self.losses(state))
 
@@ -191,6 +199,12 @@ class Later:
             for torque in (own, whole)
         )
         return np.asarray(power / max(float(total.sum()), 1e-300))
+
+    def standing(self, state: State) -> Array:
+        """Return the power (joints,) of the standing torque, in units of the noise."""
+        theta = state.theta.copy()
+        theta[: self.prior.n_nominal] = 0.0
+        return np.array([float(t @ t) for t in self.base.times(theta)])
 
     @cached_property
     def shares(self) -> Array:
@@ -231,9 +245,7 @@ class Later:
         """
         lasting = state.effects.take(state.lasting)
         columns = Table.stacked([self.base, lasting])
-        return block_losses(
-            columns, self._factor(state.info, lasting), state.residual, self.block
-        )
+        return block_losses(columns, self._factor(state.info, lasting), state.residual, self.block)
 
     def freed(self, info: Array, moment: Array, effect: Effect) -> tuple[Array, Array]:
         """Return the prior free along base parameters that the effect moves by unknown numbers."""

@@ -47,7 +47,9 @@ def block_losses(
     for b in range(count):
         rows = [o[e[b] : e[b + 1]] for o, e in zip(order, edges, strict=True)]
         r = np.concatenate([v[own] for v, own in zip(residual, rows, strict=True)])
-        shared = np.concatenate([w[:, own] for (_, w), own in zip(whole, rows, strict=True)], axis=1)
+        shared = np.concatenate(
+            [w[:, own] for (_, w), own in zip(whole, rows, strict=True)], axis=1
+        )
         inner, first = np.eye(len(r)) - shared.T @ shared, 0
         for (w, _), own in zip(whole, rows, strict=True):
             at = slice(first, first := first + len(own))

@@ -90,7 +90,6 @@ class Baseline:
     bias: dict[str, float]  # of each family, a row: what T_c exceeds its χ² bound by
     worst_fit: float  # cost of a row, that a healthy session exceeds rarely
     usual_fit: float
-    event: float  # gain that a contact has to exceed
 
     def threshold(self, group: Group, freedom: int, rows: int) -> float:
         """Return the T_c that a healthy machine exceeds with probability `alpha` in all."""
@@ -98,7 +97,7 @@ class Baseline:
 
 
 def baseline(
-    dataset: Dataset, dictionary: Dictionary, prior: Prior, event: float, config: DiagnosisConfig
+    dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
 ) -> Baseline:
     """Return what screening and residual are between parts of the reference."""
     parts = _Parts.of(dataset, dictionary, prior)
@@ -118,7 +117,7 @@ def baseline(
         second = sorted(bias.values())[-2]
         bias = {family: min(value, second) for family, value in bias.items()}
     return Baseline(
-        config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits)), event
+        config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits))
     )
 
 

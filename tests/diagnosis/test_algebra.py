@@ -106,7 +106,7 @@ def test_models_are_dropped_where_they_predict_worse_and_kept_where_chance_decid
 
 
 def test_arrow_shaped_information_is_solved_as_a_dense_matrix(rng: np.random.Generator) -> None:
-    base, more, y, info, joint = _problem(rng)
+    base, more, y, _, joint = _problem(rng)
     columns = np.concatenate([base, more])
     table = Table.of(columns, joint, _JOINTS)
     dense = columns @ columns.T + np.eye(_KNOWN + _MORE)
