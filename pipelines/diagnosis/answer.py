@@ -146,10 +146,7 @@ def _sentence(
     what = f"{first.title}{how_much(first)}{where(first)}"
     others = _others(first, found)
     if others:
-        return (
-            f"{what}{''.join(f', or {one}' for one in others)}: these logs do not tell which. "
-            f"{first.experiment or ''}".rstrip()
-        )
+        return f"{what}{''.join(f', or {one}' for one in others)}: these logs do not tell which. {first.experiment or ''}".rstrip()
     size = f": {first.torque_rms:.2g} {unit}{taken_in(first, trained.models[0].rms)}"
     return f"{what}{size}{beside(findings[1:])}."
 

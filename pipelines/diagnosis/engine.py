@@ -11,7 +11,6 @@ from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, load
 from pipelines.diagnosis.decision import Decision, decide
-from pipelines.diagnosis.events import event_threshold
 from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.screening import Baseline, baseline
@@ -43,18 +42,19 @@ class Look:
         every: Dictionary,
         responses: Sequence[Acting],
         config: DiagnosisConfig,
-        before: Selection | None = None,
+        before: Look | None = None,
     ) -> Look:
         """Return the causes in rows that no noise is known of, beside those found before."""
-        cause = None
-        if before is not None and before.causes:
-            cause = _torque(rough, before.end.model)
+        found = None if before is None else before.selection
+        cause = None if found is None else _torque(rough, found.end.model)
         dataset, dictionary = settle(rough, every, config, cause)
-        prior = prior_of(dataset, dictionary, config)
+        if before is not None and dataset.reference is not None:  # it is what it was
+            prior, known = before.later.prior, before.baseline
+        else:
+            prior = prior_of(dataset, dictionary, config)
+            known = baseline(dataset, dictionary, prior, config)
         later = Later.of(dataset, dictionary, prior, config)
-        event = event_threshold(dataset, dictionary, prior, config)
-        known = baseline(dataset, dictionary, prior, event, config)
-        return cls(later, known, select(later, known, responses, config, before))
+        return cls(later, known, select(later, known, responses, config, found))
 
 
 def _torque(rough: Dataset, model: Exact) -> Array:
@@ -108,7 +108,7 @@ def diagnose_prepared(
     named = _new(responses, rough, prepared, exclude)
     last = found = Look.of(rough, every, named, config)
     while last.selection.causes:  # what these leave tells the noise, and what is typical
-        last = Look.of(rough, every, named, config, found.selection)
+        last = Look.of(rough, every, named, config, found)
         if len(last.selection.causes) <= len(found.selection.causes):
             break
         found = last

@@ -1,6 +1,6 @@
 """Find the window in which a push on the tip explains most of a residual.
 
-window = best_window(rows, dictionary, arm, residual, noise)
+window = standing_out(rows, dictionary, arm, residual, config)
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ import numpy as np
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.screening import upper_point
 from pipelines.diagnosis.table import Array, Indices, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
 
-__all__ = ["Window", "best_window", "event_threshold"]
+__all__ = ["Window", "standing_out"]
 
+_TOUCHED = 0.01  # numerics: of the largest effect of a push, from which a row is touched by it
 _DIRECTIONS = 3  # components of a force
 
 
@@ -35,63 +35,71 @@ class Window:
     touched: Indices  # of the rows of each joint, those within it
 
 
-def best_window(
-    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array]
+def standing_out(
+    rows: Rows,
+    dictionary: Dictionary,
+    arm: Arm,
+    residual: Sequence[Array],
+    config: DiagnosisConfig,
 ) -> Window | None:
-    """Return the best window on a residual (rows of each joint) in units of the noise."""
-    found = best_windows(rows, dictionary, arm, residual)
-    return max(found, key=lambda one: one.gain, default=None)
+    """Return the best window on a residual (rows of each joint) in units of the noise, if it is one.
 
-
-def best_windows(
-    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array]
-) -> list[Window]:
-    """Return the best window of each log."""
-    data, out = rows.data, list[Window]()
-    if dictionary.event is None:
-        return out
-    weight = by_joint(rows.weight, rows.joint, rows.n_joints)
-    first = 0
-    for place, one in enumerate(data.logs):
-        own, here = (
-            np.stack([v[first : first + one.rows] for v in part]) for part in (residual, weight)
-        )
-        first += one.rows
-        torque, found = own / here, list[Window]()
-        full = np.stack([np.interp(one.motion.t, one.t, v) for v in torque], axis=1)
-        for shape in dictionary.event.shapes[0].promising(one.motion, arm, full):
-            columns = one.lay(shape.columns(one.motion, arm)) * here
-            x = columns.reshape(len(columns), -1)
-            amplitudes = np.asarray(np.linalg.lstsq(x.T, own.ravel(), rcond=1e-6)[0], np.float64)
-            gain = float((x @ own.ravel()) @ amplitudes)
-            touched = np.flatnonzero(columns.any(axis=(0, 1))) + first - one.rows
-            found.append(Window(gain, shape, amplitudes, data.first + place, touched))
-        out += [max(found, key=lambda window: window.gain)] if found else []
-    return out
-
-
-def event_threshold(
-    dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
-) -> float:
-    """Return the gain that a window exceeds with probability alpha where nothing touched the arm.
-
-    The largest of m independent windows has a known law; what the known logs exceed it by is the
-    over-dispersion of the rows, by the largest of each half of a log (`upper_point`).
+    An event is of one moment: its window stands out of what is left at other times of the session.
+    The largest gain of m independent windows of white noise has a known law; what other times exceed
+    it by is measured, by the largest of each half of a log without its best window (`upper_point`).
+    No model of a torque is exact: a push has to be more than a share of the torque at its moment.
     """
     from scipy.stats import chi2
 
-    rows = dataset.known
-    mean = np.linalg.solve(prior.precision + sum(prior.grams), sum(prior.moments))
-    table = prior.table(rows.nominal, dictionary.known)
-    residual = [y - t for y, t in zip(rows.y, table.times(np.asarray(mean)), strict=True)]
-    if dataset.reference is None:  # a contact in each log is no measure of what is usual
-        for one in best_windows(rows, dictionary, dataset.arm, residual):
-            for own in residual:
-                own[one.touched] = 0.0
-    gains = []
-    for part in prior.parts:
-        here = [np.where(own, r, 0.0) for own, r in zip(part, residual, strict=True)]
-        found = best_window(rows, dictionary, dataset.arm, here)
-        gains.append(0.0 if found is None else found.gain)
+    best, gains = None, list[float]()
+    for log in range(len(rows.data.logs)):
+        there = best_window(rows, dictionary, arm, residual, log)
+        if there is None:
+            continue
+        best = there if best is None or there.gain > best.gain else best
+        rest = [np.where(np.isin(np.arange(len(r)), there.touched), 0.0, r) for r in residual]
+        for half in _halves(rows, log):
+            own = best_window(rows, dictionary, arm, [r * half for r in rest], log)
+            gains.append(0.0 if own is None else own.gain)
+    if best is None or best.gain < config.relevance**2 * _power(rows, best.touched):
+        return None
     bound = float(chi2.isf(config.alpha / config.event_candidates, _DIRECTIONS))
-    return max(bound, upper_point(gains, config.alpha))
+    return best if best.gain > max(bound, upper_point(gains, config.alpha)) else None
+
+
+def _power(rows: Rows, touched: Indices) -> float:
+    return sum(float(y[touched] @ y[touched]) for y in rows.y)
+
+
+def _halves(rows: Rows, log: int) -> tuple[Array, Array]:
+    """Return the first and the second half of a log, 1 or 0 on each row of a joint."""
+    place = np.concatenate(
+        [
+            np.where(k == log, np.arange(one.rows) * 2 // max(one.rows, 1), -1)
+            for k, one in enumerate(rows.data.logs)
+        ]
+    )
+    return (place == 0).astype(np.float64), (place == 1).astype(np.float64)
+
+
+def best_window(
+    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], log: int
+) -> Window | None:
+    """Return the best window of a log."""
+    if dictionary.event is None:
+        return None
+    data, one = rows.data, rows.data.logs[log]
+    first = sum(other.rows for other in data.logs[:log])
+    weight = by_joint(rows.weight, rows.joint, rows.n_joints)
+    own, here = (np.stack([v[first : first + one.rows] for v in p]) for p in (residual, weight))
+    full = np.stack([np.interp(one.motion.t, one.t, v) for v in own / here], axis=1)
+    found = list[Window]()
+    for shape in dictionary.event.shapes[0].promising(one.motion, arm, full):
+        columns = one.lay(shape.columns(one.motion, arm)) * here
+        x = columns.reshape(len(columns), -1)
+        amplitudes = np.asarray(np.linalg.lstsq(x.T, own.ravel(), rcond=1e-6)[0], np.float64)
+        gain = float((x @ own.ravel()) @ amplitudes)
+        size = np.abs(columns).max(axis=(0, 1))
+        touched = np.flatnonzero(size > _TOUCHED * size.max()) + first
+        found.append(Window(gain, shape, amplitudes, data.first + log, touched))
+    return max(found, key=lambda window: window.gain, default=None)

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import FORM, Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
@@ -41,6 +42,7 @@ class Prior:
     grams: tuple[Array, ...]  # (k, k) of each part
     moments: tuple[Array, ...]
     start: tuple[Array, Array]  # information A and A m before the later logs
+    structure: Structure  # of the numbers
 
     @property
     def n_nominal(self) -> int:
@@ -50,19 +52,25 @@ class Prior:
         """Return B = [N D], of the known or of the later rows."""
         return Table.stacked([nominal.scaled(1.0 / self.scale), dictionary.take(self.standing)])
 
+    def nominal(self, info: Array, moment: Array) -> Prior:
+        """Return a prior of the nominal numbers alone, by information (n, n) and A m (n,)."""
+        structure = Structure.all_shared(self.n_nominal, len(self.structure.own))
+        none = np.zeros(0, dtype=np.intp)
+        return replace(self, standing=none, groups=(), start=(info, moment), structure=structure)
+
     def of(self, parts: range | tuple[int, ...]) -> tuple[Array, Array]:
         """Return information A and A m of numbers of a later session, after some parts.
 
         (V + U Q Uᵀ)⁻¹ = A - A U (Q⁻¹ + Uᵀ A U)⁻¹ Uᵀ A (Woodbury).
         """
-        info = self.precision + sum(self.grams[k] for k in parts)
-        moment = sum(self.moments[k] for k in parts)
+        info = self.precision + np.sum([self.grams[k] for k in parts], axis=0)
+        moment = np.sum([self.moments[k] for k in parts], axis=0)
         free = np.flatnonzero(self.drift)
         side = info[:, free]
         inner = np.diag(1.0 / self.drift[free]) + side[free]
         new = info - side @ np.linalg.solve(inner, side.T)
         new = 0.5 * (new + new.T)
-        return new, new @ np.linalg.solve(info, moment)
+        return new, new @ Arrow.of(info, self.structure).solve(moment)
 
 
 def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) -> Prior:
@@ -76,8 +84,10 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
     parts = _halves(dataset)
     grams = np.array([table.gram(table, part) for part in parts])
     moments = np.array([table.moments(rows.y, part) for part in parts])
-    found = components(grams.sum(axis=0), moments.sum(axis=0), rows.count, of, config)
-    later = dictionary.later.take(columns).norms ** 2 / dataset.later.count
+    structure = Structure.of(table)
+    found = components(grams.sum(axis=0), moments.sum(axis=0), structure, rows.count, of, config)
+    now = Table.stacked([dataset.later.nominal, dictionary.later.take(columns)])
+    later = now.norms[first:] ** 2 / dataset.later.count
     visible = found.variance * np.maximum(1.0, later / found.mean_square)
     keep = np.flatnonzero(np.r_[np.ones(first, bool), visible > _LEAST_VARIANCE])
     at = np.ix_(keep, keep)
@@ -92,11 +102,12 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
         tuple(g[at] for g in grams),
         tuple(m[keep] for m in moments),
         (np.zeros((0, 0)), np.zeros(0)),
+        Structure.of(table.take(keep), now.take(keep)),
     )
     if dataset.reference is not None:
         return replace(out, start=out.of(range(len(parts))))
     gram, moment = np.sum(out.grams, axis=0), np.sum(out.moments, axis=0)
-    found = components(gram, moment, rows.count, kept, config)
+    found = components(gram, moment, out.structure, rows.count, kept, config)
     return replace(out, start=(np.diag(_typical(found, kept).precision), np.zeros(len(keep))))
 
 

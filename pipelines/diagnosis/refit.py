@@ -12,6 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
@@ -45,6 +46,7 @@ class State:
         Indices  # of these, numbers that hold for all time; those of an event hold for its moment
     )
     losses: Array  # (blocks,) squared error of each block, predicted from all others
+    structure: Structure
 
     @property
     def rss(self) -> float:
@@ -55,7 +57,8 @@ class State:
         """‖r‖² + (θ - m)ᵀ A (θ - m)"""
         theta, moment = self.theta, self.moment
         away = theta @ self.info @ theta - 2.0 * moment @ theta
-        return self.rss + float(away + moment @ np.linalg.solve(self.info, moment))
+        known = Arrow.of(self.info, self.structure).half(moment)
+        return self.rss + float(away + known @ known)
 
     @property
     def mean_squares(self) -> Array:
@@ -137,7 +140,7 @@ class Later:
             gradient = np.r_[
                 moment - info @ theta + self.base.moments(residual), unit.moments(residual)
             ]
-            step = np.linalg.solve(self._information(info, unit), gradient)
+            step = self._factor(info, unit).solve(gradient)
             before = now
             for share in _SHARES:
                 base, more = share * step[: len(theta)], share * step[len(theta) :] / size
@@ -156,17 +159,27 @@ class Later:
         lasting = np.flatnonzero(
             [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
         )
-        state = State(model, theta, info, moment, residual, effects, lasting, np.zeros(0))
+        state = State(
+            model,
+            theta,
+            info,
+            moment,
+            residual,
+            effects,
+            lasting,
+            np.zeros(0),
+            self.prior.structure,
+        )
         return replace(state, losses=self.losses(state))
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
         both = Table.stacked([self.base, state.effects])
         cross = np.concatenate([self.cross, state.effects.gram(self.candidates)])
-        info = self._information(state.info, state.effects)
+        info = self._factor(state.info, state.effects)
         slope = np.r_[state.moment - state.info @ state.theta, np.zeros(state.effects.width)]
         slope += both.moments(state.residual)  # zero where the fit has settled
-        moments = self.candidates.moments(state.residual) - cross.T @ np.linalg.solve(info, slope)
+        moments = self.candidates.moments(state.residual) - cross.T @ info.solve(slope)
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
     def acting(self, state: State) -> Array:
@@ -187,6 +200,12 @@ class Later:
         )
         return np.asarray(power / max(float(total.sum()), 1e-300))
 
+    def standing(self, state: State) -> Array:
+        """Return the power (joints,) of the standing torque, in units of the noise."""
+        theta = state.theta.copy()
+        theta[: self.prior.n_nominal] = 0.0
+        return np.array([float(t @ t) for t in self.base.times(theta)])
+
     @cached_property
     def shares(self) -> Array:
         """(groups, joints) share of each joint in the columns of a group."""
@@ -200,12 +219,12 @@ class Later:
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""
         more = Table.stacked([state.effects, columns.scaled(1.0 / _unit(columns.norms))])
-        info = self._information(state.info, more)
+        info = self._factor(state.info, more)
         gradient = np.r_[
             state.moment - state.info @ state.theta + self.base.moments(state.residual),
             more.moments(state.residual),
         ]
-        step = np.asarray(np.linalg.solve(info, gradient), dtype=np.float64)
+        step = info.solve(gradient)
         torque = Table.stacked([self.base, more]).times(step)
         residual = tuple(r - t for r, t in zip(state.residual, torque, strict=True))
         lasting = np.append(state.lasting, np.arange(state.effects.width, more.width))
@@ -226,9 +245,7 @@ class Later:
         """
         lasting = state.effects.take(state.lasting)
         columns = Table.stacked([self.base, lasting])
-        return block_losses(
-            columns, self._information(state.info, lasting), state.residual, self.block
-        )
+        return block_losses(columns, self._factor(state.info, lasting), state.residual, self.block)
 
     def freed(self, info: Array, moment: Array, effect: Effect) -> tuple[Array, Array]:
         """Return the prior free along base parameters that the effect moves by unknown numbers."""
@@ -245,7 +262,7 @@ class Later:
         inner = inner + _FREE * np.trace(inner) * np.eye(len(inner))
         free = info - side @ np.linalg.solve(inner, side.T)
         free = 0.5 * (free + free.T)
-        return free, free @ np.linalg.solve(info, moment)
+        return free, free @ Arrow.of(info, self.prior.structure).solve(moment)
 
     def information(self, state: State) -> Array:
         """Return P (k, k) of nominal and standing numbers and those of the effects, of unit columns."""
@@ -259,6 +276,10 @@ class Later:
         across = self.base.gram(effects)
         own = effects.gram(effects) + _RIDGE * np.eye(effects.width)
         return np.block([[info + self.gram, across], [across.T, own]])
+
+    def _factor(self, info: Array, effects: Table) -> Arrow:
+        wider = self.prior.structure.wider(effects.width)
+        return Arrow.of(self._information(info, effects), wider)
 
     def _slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
         if not model.effects:

@@ -17,6 +17,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.table import Array, Indices, Table
 
@@ -28,36 +29,32 @@ _SEED = 1
 
 
 def block_losses(
-    columns: Table, info: Array, residual: Sequence[Array], block: Sequence[Indices]
+    columns: Table, info: Arrow, residual: Sequence[Array], block: Sequence[Indices]
 ) -> Array:
     """Return the squared error (blocks,) of each block of rows, predicted from all other blocks.
 
     Args:
         columns: J, slopes by the k numbers.
-        info: P (k, k), of all rows and the prior.
+        info: factor of P (k, k), of all rows and the prior.
         residual: of each joint's rows.
         block: number of the block, of each joint's rows.
     """
-    from scipy.linalg import solve_triangular
-
-    factor = np.linalg.cholesky(info)
-    whole = [
-        solve_triangular(factor, columns.dense(j), lower=True, check_finite=False)
-        for j in range(len(residual))
-    ]
+    whole = [info.whitened(columns, j) for j in range(len(residual))]
     count = 1 + max(int(b.max()) for b in block if len(b))
     order = [np.argsort(b, kind="stable") for b in block]
     edges = [np.searchsorted(b[o], np.arange(count + 1)) for b, o in zip(block, order, strict=True)]
     out = np.zeros(count)
     for b in range(count):
-        own = [o[e[b] : e[b + 1]] for o, e in zip(order, edges, strict=True)]
-        w = np.concatenate([v[:, rows] for v, rows in zip(whole, own, strict=True)], axis=1)
-        r = np.concatenate([v[rows] for v, rows in zip(residual, own, strict=True)])
-        error = (
-            np.linalg.solve(np.eye(len(r)) - w.T @ w, r)
-            if len(r) < len(w)
-            else r + w.T @ np.linalg.solve(np.eye(len(w)) - w @ w.T, w @ r)
+        rows = [o[e[b] : e[b + 1]] for o, e in zip(order, edges, strict=True)]
+        r = np.concatenate([v[own] for v, own in zip(residual, rows, strict=True)])
+        shared = np.concatenate(
+            [w[:, own] for (_, w), own in zip(whole, rows, strict=True)], axis=1
         )
+        inner, first = np.eye(len(r)) - shared.T @ shared, 0
+        for (w, _), own in zip(whole, rows, strict=True):
+            at = slice(first, first := first + len(own))
+            inner[at, at] -= w[:, own].T @ w[:, own]
+        error = np.linalg.solve(inner, r)
         out[b] = float(error @ error)
     return out
 

@@ -16,6 +16,7 @@ from itertools import combinations
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
@@ -39,7 +40,7 @@ class Screened:
 
 
 def screen(
-    groups: Sequence[Group], info: Array, cross: Array, own: Sequence[Array], moments: Array
+    groups: Sequence[Group], info: Arrow, cross: Array, own: Sequence[Array], moments: Array
 ) -> list[Screened]:
     """Return T_c of every group.
 
@@ -49,11 +50,11 @@ def screen(
         own: C Cᵀ of each group.
         moments: g (columns,).
     """
-    solved = np.linalg.solve(info, cross)
+    half = info.half(cross)
     out = []
     for group, square in zip(groups, own, strict=True):
         part = slice(group.first, group.first + group.width)
-        left = square - cross[:, part].T @ solved[:, part]
+        left = square - half[:, part].T @ half[:, part]
         unit = np.sqrt(np.maximum(np.diag(square), 1e-300))
         values, vectors = np.linalg.eigh(left / unit / unit[:, None])
         seen = values > _VISIBLE
@@ -89,7 +90,6 @@ class Baseline:
     bias: dict[str, float]  # of each family, a row: what T_c exceeds its χ² bound by
     worst_fit: float  # cost of a row, that a healthy session exceeds rarely
     usual_fit: float
-    event: float  # gain that a contact has to exceed
 
     def threshold(self, group: Group, freedom: int, rows: int) -> float:
         """Return the T_c that a healthy machine exceeds with probability `alpha` in all."""
@@ -97,7 +97,7 @@ class Baseline:
 
 
 def baseline(
-    dataset: Dataset, dictionary: Dictionary, prior: Prior, event: float, config: DiagnosisConfig
+    dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
 ) -> Baseline:
     """Return what screening and residual are between parts of the reference."""
     parts = _Parts.of(dataset, dictionary, prior)
@@ -117,7 +117,7 @@ def baseline(
         second = sorted(bias.values())[-2]
         bias = {family: min(value, second) for family, value in bias.items()}
     return Baseline(
-        config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits)), event
+        config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits))
     )
 
 
@@ -158,20 +158,21 @@ class _Parts:
         info, moment = self.prior.of(before)
         gram = np.sum([self.prior.grams[k] for k in after], axis=0)
         own = np.sum([self.prior.moments[k] for k in after], axis=0)
-        mean = np.linalg.solve(info + gram, moment + own)
+        known = Arrow.of(info + gram, self.prior.structure)
+        mean = known.solve(moment + own)
         cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
         squares = [
             np.sum([self.squares[k][i] for k in after], axis=0) for i in range(len(self.groups))
         ]
         found = screen(
             self.groups,
-            info + gram,
+            known,
             cross,
             squares,
             self.moments[after].sum(axis=0) - cross.T @ mean,
         )
         cost = self.powers[after].sum() - (moment + own) @ mean
-        cost += moment @ np.linalg.solve(info, moment)
+        cost += float(np.sum(Arrow.of(info, self.prior.structure).half(moment) ** 2))
         return found, float(cost) / rows, rows
 
 

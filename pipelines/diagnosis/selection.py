@@ -14,7 +14,7 @@ import numpy as np
 
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.events import best_window
+from pipelines.diagnosis.events import standing_out
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.screening import Baseline, Screened, best_of
@@ -134,7 +134,7 @@ def _round(
     )
     tried = [
         one
-        for one in _refitted(later, state, significant, baseline, responses, config)
+        for one in _refitted(later, state, significant, responses, config)
         if one.state.losses.sum() < state.losses.sum()
         and not (one.event and one.gain < config.relevance * explained)
     ]
@@ -162,15 +162,13 @@ def _significant(
 ) -> dict[Key, Screened]:
     """Return the candidates above the family-wise threshold, the best shape of each.
 
-    No law is exact: at the joints of the causes found so far, what remains of these is larger than
-    the noise, and a further cause has to gain more than a share of what they explain there.
+    No law is exact: at the joints of the causes found so far, and of what stands since the reference,
+    what remains of these is larger than the noise, and a further cause has to gain more than a share
+    of what they explain there.
     """
     rows = later.rows.count
-    overlap = later.shares @ later.acting(state)
-    inexact = {
-        group: config.relevance * explained * float(share)
-        for group, share in zip(later.dictionary.groups, overlap, strict=True)
-    }
+    known = later.shares @ (explained * later.acting(state) + later.standing(state))
+    inexact = dict(zip(later.dictionary.groups, config.relevance * known, strict=True))
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
@@ -230,7 +228,6 @@ def _refitted(
     later: Later,
     state: State,
     significant: dict[Key, Screened],
-    baseline: Baseline,
     responses: Sequence[Acting],
     config: DiagnosisConfig,
 ) -> list[Candidate]:
@@ -240,8 +237,8 @@ def _refitted(
         key=lambda one: -one.gain,
     )[: config.refits]
     out = []
-    touch = best_window(later.rows, later.dictionary, later.dataset.arm, state.residual)
-    if touch is not None and touch.gain > baseline.event:
+    touch = standing_out(later.rows, later.dictionary, later.dataset.arm, state.residual, config)
+    if touch is not None:
         out.append(
             _candidate(
                 later,

@@ -18,7 +18,6 @@ import numpy as np
 from pipelines.diagnosis.candidates import FORM, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
-from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.screening import Screened, best_of
@@ -67,6 +66,7 @@ def standing_of(prepared: Data | None, later: Later, config: DiagnosisConfig) ->
 def _reference(later: Later, config: DiagnosisConfig) -> Later:
     """Return the rows of the reference with a flat prior on nominal numbers, and what may stand."""
     dataset, dictionary, prior = later.dataset, later.dictionary, later.prior
+    n = prior.n_nominal
     groups = tuple(
         group
         for group in dictionary.groups
@@ -81,15 +81,9 @@ def _reference(later: Later, config: DiagnosisConfig) -> Later:
     return Later.of(
         replace(dataset, later=dataset.known, reference=None),
         replace(dictionary, groups=groups, later=dictionary.reference, reference=None),
-        _flat(prior),
+        prior.nominal(prior.precision[:n, :n], np.zeros(n)),
         config,
     )
-
-
-def _flat(prior: Prior) -> Prior:
-    n = prior.n_nominal
-    none = np.zeros(0, dtype=np.intp)
-    return replace(prior, standing=none, groups=(), start=(prior.precision[:n, :n], np.zeros(n)))
 
 
 def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Candidate | None:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
@@ -174,13 +175,10 @@ def _beside(later: Later, rows: Rows, standing: Standing) -> Later:
 def _nominal(prior: Prior) -> Prior:
     """Return the marginal prior of the nominal numbers."""
     info, moment = prior.start
-    n = prior.n_nominal
-    mean = np.linalg.solve(info, moment)[:n]
-    side = info[:n, n:]
-    own = info[:n, :n] - side @ np.linalg.solve(info[n:, n:], side.T)
+    known, n = Arrow.of(info, prior.structure), prior.n_nominal
+    own = np.linalg.inv(known.solve(np.eye(len(info), n))[:n])
     own = 0.5 * (own + own.T)
-    none = np.zeros(0, dtype=np.intp)
-    return replace(prior, standing=none, groups=(), start=(own, own @ mean))
+    return prior.nominal(own, own @ known.solve(moment)[:n])
 
 
 def _refined(later: Later, state: State, data: Data, weight: Array) -> Refined:

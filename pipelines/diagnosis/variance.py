@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
@@ -44,6 +45,7 @@ class Components:
 def components(
     gram: Array,
     moment: Array,
+    structure: Structure,
     rows: int,
     of: Sequence[Group],
     config: DiagnosisConfig,
@@ -54,6 +56,7 @@ def components(
     Args:
         gram: B Bᵀ (k, k), B the nominal columns and, behind them, the standing ones.
         moment: B y (k,).
+        structure: of the columns.
         of: group of each standing column.
         power: yᵀ y, where the variance of the noise is not 1 and has to be found.
     """
@@ -70,9 +73,8 @@ def components(
     per_group, per_family = np.bincount(own), np.bincount(family)
     for _ in range(config.em_rounds):
         precision = np.r_[flat, mean_square / tau]
-        covariance = np.linalg.inv(gram / noise + np.diag(precision))
-        mean = covariance @ moment / noise
-        spread = np.diag(covariance)
+        info = Arrow.of(gram / noise + np.diag(precision), structure)
+        mean, spread = info.solve(moment / noise), info.inverse_diagonal
         energy = (mean[n_nominal:] ** 2 + spread[n_nominal:]) * mean_square
         of_family = np.bincount(family, energy) / per_family
         pooled = np.bincount(own, energy)[own] + config.variance_prior * of_family[family]
@@ -130,5 +132,6 @@ def _left(
     unit = 1.0 / np.where(scale > 0.0, scale, 1.0)
     table = Table.stacked([rows.nominal.scaled(unit), dictionary])
     power = sum(float(y @ y) for y in rows.y)
-    found = components(table.gram(table), table.moments(rows.y), rows.count, of, config, power)
+    gram, moment, structure = table.gram(table), table.moments(rows.y), Structure.of(table)
+    found = components(gram, moment, structure, rows.count, of, config, power)
     return tuple(y - t for y, t in zip(rows.y, table.times(found.mean), strict=True))

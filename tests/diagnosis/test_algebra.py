@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.score import block_losses, confidence_set
@@ -50,7 +51,7 @@ def test_screening_is_what_an_exact_refit_with_the_candidate_gains(
     residual = by_joint(y - base.T @ theta, joint, _JOINTS)
     (found,) = screen(
         [Group(("spring", 3), 0, 0, _MORE, True, "named")],
-        info + b.gram(b),
+        Arrow.of(info + b.gram(b), Structure.of(b)),
         b.gram(c),
         [c.gram(c)],
         c.moments(residual),
@@ -67,7 +68,7 @@ def test_a_block_is_predicted_as_by_a_fit_without_it(rng: np.random.Generator) -
     table = Table.of(base, joint, _JOINTS)
     losses = block_losses(
         table,
-        info + table.gram(table),
+        Arrow.of(info + table.gram(table), Structure.of(table)),
         by_joint(y - base.T @ theta, joint, _JOINTS),
         [block[joint == j] for j in range(_JOINTS)],
     )
@@ -102,3 +103,26 @@ def test_models_are_dropped_where_they_predict_worse_and_kept_where_chance_decid
         "worse": common + 1.0 + rng.normal(0.0, 0.1, 40),
     }
     assert set(confidence_set(scores, DiagnosisConfig())) == {"best", "like it"}
+
+
+def test_arrow_shaped_information_is_solved_as_a_dense_matrix(rng: np.random.Generator) -> None:
+    base, more, y, _, joint = _problem(rng)
+    columns = np.concatenate([base, more])
+    table = Table.of(columns, joint, _JOINTS)
+    dense = columns @ columns.T + np.eye(_KNOWN + _MORE)
+    arrow = Arrow.of(dense, Structure.of(table))
+    assert [len(own) for own in arrow.structure.own] == [0, 1, 2]
+    assert arrow.solve(columns @ y) == pytest.approx(np.linalg.solve(dense, columns @ y))
+    assert arrow.inverse_diagonal == pytest.approx(np.diag(np.linalg.inv(dense)))
+    own, shared = arrow.whitened(table, 2)
+    there = columns[:, joint == 2]
+    gram = there.T @ np.linalg.solve(dense, there)
+    assert own.T @ own + shared.T @ shared == pytest.approx(gram)
+
+
+def test_a_matrix_without_the_structure_is_solved_as_well(rng: np.random.Generator) -> None:
+    base, more, _, _, joint = _problem(rng)
+    table = Table.of(np.concatenate([base, more]), joint, _JOINTS)
+    root = rng.normal(size=(_KNOWN + _MORE,) * 2)
+    arrow = Arrow.of(root @ root.T, Structure.of(table))
+    assert arrow.inverse_diagonal == pytest.approx(np.diag(np.linalg.inv(root @ root.T)))
