@@ -34,6 +34,7 @@ class DiagnosisConfig:
     share: float = (
         0.5  # of the excess residual, that causes have to explain where the rest does not fit
     )
+    deviations: float = 2.0  # by which a number may lie outside its range and be taken for possible
     excess: float = (
         2.0  # mean square residual of a joint over the baseline's, from which it is too large
     )

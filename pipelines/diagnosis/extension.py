@@ -60,7 +60,7 @@ def extend(
     refused: list[Rejected] = []
     left = list(wanted)
     while True:
-        state, taken, impossible = _fitted(later, left, named)
+        state, taken, impossible = _fitted(later, left, named, config)
         refused += impossible
         left = taken
         trained = train(prepared, later, state.model.effects, blocks, standing)
@@ -77,14 +77,17 @@ def extend(
 
 
 def _fitted(
-    later: Later, wanted: Sequence[Wanted], responses: dict[str, Acting]
+    later: Later,
+    wanted: Sequence[Wanted],
+    responses: dict[str, Acting],
+    config: DiagnosisConfig,
 ) -> tuple[State, list[Wanted], list[Rejected]]:
     """Return the model with the causes fitted, the greatest first, those in order, and the rest."""
     state, left = later.start(), list(wanted)
     taken: list[Wanted] = []
     impossible: list[Rejected] = []
     while left:
-        tried = [(one, _tried(later, state, one, responses.get(one.place))) for one in left]
+        tried = [(one, _tried(later, state, one, responses.get(one.place), config)) for one in left]
         good = [(one, done) for one, done in tried if done is not None and done.possible]
         for one, done in tried:
             if done is None or not done.possible:
@@ -98,16 +101,18 @@ def _fitted(
     return state, taken, impossible
 
 
-def _tried(later: Later, state: State, one: Wanted, known: Acting | None) -> Candidate | None:
+def _tried(
+    later: Later, state: State, one: Wanted, known: Acting | None, config: DiagnosisConfig
+) -> Candidate | None:
     """Return a cause fitted from its best shape, or from the numbers that responses give it."""
     key = (one.effect.name, one.effect.joint)
     if known is not None:
         effect = known.effect.at(known.values)
-        return refit(later, state, key, effect, effect.amplitudes(known.values))
+        return refit(later, state, key, effect, effect.amplitudes(known.values), config)
     best = best_of(later.screened(state))[key]
     start: dict[str, Any] = dict(one.start)
     effect = later.dictionary.families[key].shapes[best.group.shape].full()
-    return refit(later, state, key, replace(effect, **start), best.amplitudes)
+    return refit(later, state, key, replace(effect, **start), best.amplitudes, config)
 
 
 def _doubt(worth: Worth, place: int) -> str:

@@ -182,6 +182,23 @@ class Later:
         moments = self.candidates.moments(state.residual) - cross.T @ info.solve(slope)
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
+    def possible(self, state: State, config: DiagnosisConfig) -> bool:
+        """Return whether the last effect can have its numbers, each as uncertain as it is."""
+        last = state.model.effects[-1]
+        if last.possible:
+            return True
+        slopes, names = self._slopes(state.model)
+        variance = self._factor(state.info, state.effects).inverse_diagonal[-len(names) :]
+        spread = config.deviations * np.sqrt(variance) / _unit(slopes.norms)
+        for (of_effect, place, name), reach in zip(names, spread, strict=True):
+            if of_effect and place == len(state.model.effects) - 1 and name.isdigit():
+                for way in (-reach, reach):
+                    amplitudes = np.array(last.amplitudes)
+                    amplitudes[int(name)] += way
+                    if last.effect.possible(last.effect.values(amplitudes)):
+                        return True
+        return False
+
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.
 
@@ -200,11 +217,13 @@ class Later:
         )
         return np.asarray(power / max(float(total.sum()), 1e-300))
 
-    def standing(self, state: State) -> Array:
-        """Return the power (joints,) of the standing torque, in units of the noise."""
-        theta = state.theta.copy()
-        theta[: self.prior.n_nominal] = 0.0
-        return np.array([float(t @ t) for t in self.base.times(theta)])
+    @cached_property
+    def standing(self) -> Array:
+        """(joints,) power of the torque that stands since the reference, in units of the noise."""
+        info, moment = self.prior.start
+        mean = Arrow.of(info, self.prior.structure).solve(moment)
+        mean[: self.prior.n_nominal] = 0.0
+        return np.array([float(t @ t) for t in self.base.times(mean)])
 
     @cached_property
     def shares(self) -> Array:

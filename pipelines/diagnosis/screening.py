@@ -21,7 +21,7 @@ from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
-from pipelines.diagnosis.table import Array
+from pipelines.diagnosis.table import Array, Parts, Table
 
 __all__ = ["Baseline", "Screened", "baseline", "best_of", "screen", "upper_point"]
 
@@ -129,7 +129,7 @@ class _Parts:
     groups: tuple[Group, ...]
     cross: Array  # (parts, k, columns) B Cᵀ
     moments: Array  # (parts, columns) C y
-    squares: list[list[Array]]  # of each part and group, C Cᵀ
+    squares: tuple[Array, ...]  # of each group (parts, width, width), C Cᵀ
     powers: Array  # (parts,) yᵀy
     counts: Array  # (parts,) rows
 
@@ -138,13 +138,12 @@ class _Parts:
         rows, y, parts = dataset.known, dataset.known.y, prior.parts
         candidates = dictionary.known
         base = prior.table(rows.nominal, candidates)
-        own = [candidates.take(group.columns) for group in dictionary.groups]
         return cls(
             prior,
             dictionary.groups,
             np.array([base.gram(candidates, part) for part in parts]),
             np.array([candidates.moments(y, part) for part in parts]),
-            [[table.gram(table, part) for table in own] for part in parts],
+            tuple(_squares(candidates.take(g.columns), parts) for g in dictionary.groups),
             np.array(
                 [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
             ),
@@ -161,9 +160,7 @@ class _Parts:
         known = Arrow.of(info + gram, self.prior.structure)
         mean = known.solve(moment + own)
         cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
-        squares = [
-            np.sum([self.squares[k][i] for k in after], axis=0) for i in range(len(self.groups))
-        ]
+        squares = [own[after].sum(axis=0) for own in self.squares]
         found = screen(
             self.groups,
             known,
@@ -174,6 +171,10 @@ class _Parts:
         cost = self.powers[after].sum() - (moment + own) @ mean
         cost += float(np.sum(Arrow.of(info, self.prior.structure).half(moment) ** 2))
         return found, float(cost) / rows, rows
+
+
+def _squares(table: Table, parts: Sequence[Parts]) -> Array:
+    return np.array([table.gram(table, part) for part in parts])
 
 
 def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:

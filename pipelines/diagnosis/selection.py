@@ -32,6 +32,7 @@ class Candidate:
     key: Key
     gain: float  # of screening
     state: State
+    possible: bool  # its numbers are such as it can have
 
     @property
     def numbers(self) -> int:
@@ -42,12 +43,6 @@ class Candidate:
     def event(self) -> bool:
         """True for a cause of one moment in one log."""
         return self.state.model.effects[-1].log is not None
-
-    @property
-    def possible(self) -> bool:
-        return bool(self.state.model.effects[-1].possible) and bool(
-            np.isfinite(self.state.losses).all()
-        )
 
 
 @dataclass(frozen=True)
@@ -135,7 +130,7 @@ def _round(
     tried = [
         one
         for one in _refitted(later, state, significant, responses, config)
-        if one.state.losses.sum() < state.losses.sum()
+        if _loss(later, one.state) < _loss(later, state)
         and not (one.event and one.gain < config.relevance * explained)
     ]
     others = _unnamed(later, state, significant, bool(responses))
@@ -144,11 +139,11 @@ def _round(
         return replace(seen, follows=_place(next(iter(others))) if others else "")
     pick, alternatives, stopped = _contest(later, state, tried, others, config)
     if pick is None:  # perhaps by another law of the same cause
-        tried = [_other_form(later, state, one) for one in tried]
+        tried = [_other_form(later, state, one, config) for one in tried]
         pick, alternatives, stopped = _contest(later, state, tried, others, config)
     if pick is None:
         return replace(seen, stopped=stopped)
-    chosen = _other_form(later, state, pick).state
+    chosen = _other_form(later, state, pick, config).state
     return replace(seen, cause=Cause(pick.key, alternatives), state=chosen)
 
 
@@ -167,7 +162,7 @@ def _significant(
     of what they explain there.
     """
     rows = later.rows.count
-    known = later.shares @ (explained * later.acting(state) + later.standing(state))
+    known = later.shares @ (explained * later.acting(state) + later.standing)
     inexact = dict(zip(later.dictionary.groups, config.relevance * known, strict=True))
     return {
         key: one
@@ -247,6 +242,7 @@ def _refitted(
                 touch.gain,
                 touch.effect,
                 touch.amplitudes,
+                config,
                 log=touch.log,
             )
         )
@@ -254,7 +250,9 @@ def _refitted(
     for one in named:
         if one.gain > config.promising * top:
             effect = later.dictionary.families[one.group.key].shapes[one.group.shape].full()
-            out.append(_candidate(later, state, one.group.key, one.gain, effect, one.amplitudes))
+            out.append(
+                _candidate(later, state, one.group.key, one.gain, effect, one.amplitudes, config)
+            )
     for acting in responses:
         effect = acting.effect.at(acting.values)
         out.append(
@@ -265,6 +263,7 @@ def _refitted(
                 max(top, 1.0),
                 effect,
                 effect.amplitudes(acting.values),
+                config,
             )
         )
     return [one for one in out if one is not None and one.possible]
@@ -277,6 +276,7 @@ def _candidate(
     gain: float,
     effect: Effect,
     amplitudes: Array,
+    config: DiagnosisConfig,
     log: int | None = None,
 ) -> Candidate | None:
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
@@ -289,7 +289,8 @@ def _candidate(
         )
     except np.linalg.LinAlgError:
         return None
-    return Candidate(key, gain, fitted)
+    possible = later.possible(fitted, config) and bool(np.isfinite(fitted.losses).all())
+    return Candidate(key, gain, fitted, possible)
 
 
 def _width(later: Later, effect: Effect) -> int:
@@ -320,13 +321,17 @@ def _unnamed(
     return out
 
 
-def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
+def _other_form(
+    later: Later, state: State, chosen: Candidate, config: DiagnosisConfig
+) -> Candidate:
     """Return the chosen cause by the law of it that predicts best."""
     best, one = chosen, chosen.state.model.effects[-1]
     if one.log is not None:
         return best
     for form in one.effect.forms():
-        other = _candidate(later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes))
+        other = _candidate(
+            later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes), config
+        )
         if (
             other is not None
             and other.possible
@@ -372,8 +377,13 @@ def _place(key: Key) -> str:
 
 
 def refit(
-    later: Later, state: State, key: Key, effect: Effect, amplitudes: Array
+    later: Later,
+    state: State,
+    key: Key,
+    effect: Effect,
+    amplitudes: Array,
+    config: DiagnosisConfig,
 ) -> Candidate | None:
     """Return a cause that somebody names, refitted, by the law of it that predicts best."""
-    one = _candidate(later, state, key, 0.0, effect, amplitudes)
-    return None if one is None else _other_form(later, state, one)
+    one = _candidate(later, state, key, 0.0, effect, amplitudes, config)
+    return None if one is None else _other_form(later, state, one, config)

@@ -114,7 +114,7 @@ def _tried(
     tried = []
     for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
         effect = own.dictionary.families[one.group.key].shapes[one.group.shape].full()
-        done = refit(own, state, one.group.key, effect, one.amplitudes)
+        done = refit(own, state, one.group.key, effect, one.amplitudes, config)
         if done is None or not done.possible:
             continue
         without = state.mean_squares / done.state.mean_squares

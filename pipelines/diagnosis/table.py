@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "Indices", "Table", "by_joint"]
+__all__ = ["Array", "Indices", "Parts", "Table", "by_joint"]
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
