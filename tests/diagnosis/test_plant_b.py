@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 
 from pipelines.diagnosis.engine import Diagnosis, diagnose
 from pipelines.errors import InputRejected
+from pipelines.log.experiment import ExperimentLog
 from pipelines.log.hdf5 import read_parts
 from tests.healthy import with_signal
 
@@ -62,6 +64,37 @@ def test_indistinguishable_causes_are_reported_together(shared: Path) -> None:
     assert found.decision.verdict == "unknown"
     (cause,) = found.decision.causes
     assert ("stribeck", 1) in (cause.key, *cause.alternatives)
+
+
+def _healthy_with(shared: Path, more: Callable[[ExperimentLog], np.ndarray]) -> Diagnosis:
+    """Diagnose a healthy arm whose logs have more torque [N m] (samples, joints)."""
+    logs = [read_parts(path)[0] for path in sorted((shared / "plant-b/arm-14").glob("*.h5"))]
+    return diagnose([with_signal(log, tau=log.tau + more(log)) for log in logs])
+
+
+@pytest.mark.slow
+def test_friction_that_stood_before_may_drift_as_friction_does(shared: Path) -> None:
+    def asymmetric(log: ExperimentLog) -> np.ndarray:
+        out = np.zeros_like(log.tau)
+        drift = 1.0 if log.role == "reference" else 1.06
+        speed = np.gradient(log.q[:, 1], log.t)
+        out[:, 1] = 0.8 * drift * (speed > 0.02) * (1.0 - np.exp(-np.abs(speed) / 0.05))
+        return out
+
+    assert _healthy_with(shared, asymmetric).decision.verdict == "no-fault-found"
+
+
+@pytest.mark.slow
+def test_bursts_at_all_times_are_no_push(shared: Path) -> None:
+    def bursts(log: ExperimentLog) -> np.ndarray:
+        out = np.zeros_like(log.tau)
+        if log.role != "reference":
+            for middle in np.arange(log.t[0] + 0.7, log.t[-1], 0.7):
+                out[:, 1] += np.exp(-(((log.t - middle) / 0.05) ** 2)) * np.sin(7.0 * middle)
+        return out
+
+    found = _healthy_with(shared, bursts).decision
+    assert "contact" not in {cause.key[0] for cause in found.causes}
 
 
 @pytest.mark.slow
