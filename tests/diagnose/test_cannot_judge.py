@@ -73,7 +73,6 @@ def test_a_model_that_leaves_next_to_nothing_needs_no_floor() -> None:
     assert asked(undescribed(session())).verdict == "nothing-wrong"
 
 
-@pytest.mark.xfail(strict=True, reason="two contacts: one reference motion does not bound a friction that no law describes")
 def test_reference_logs_are_a_noise_floor() -> None:
     """The same friction before and after: nothing has changed, however much of it no model has."""
     logs = rubbing(undescribed(session()), 1.0)
