@@ -349,9 +349,15 @@ def _loss(later: Later, state: State) -> float:
 def _backward(
     later: Later, causes: list[Cause], end: State, config: DiagnosisConfig
 ) -> tuple[list[Cause], State]:
-    """Take out every cause without which the rest predicts as well."""
+    """Take out every cause without which the rest predicts as well.
+
+    What happened at one moment is not told by predictions of other times: it stood out of these.
+    """
     place = 0
     while len(causes) > 1 and place < len(causes):
+        if end.model.effects[place].log is not None:
+            place += 1
+            continue
         model = end.model.without(place)
         without = later.fit(model, end.theta, end.info, end.moment)
         scores = {"with": _scores(later, end), "without": _scores(later, without)}
