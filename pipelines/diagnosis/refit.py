@@ -219,11 +219,22 @@ class Later:
 
     @cached_property
     def standing(self) -> Array:
-        """(joints,) power of the torque that stands since the reference, in units of the noise."""
+        """(joints,) power of the causes that stand since the reference, in units of the noise.
+
+        Of each joint, what nominal numbers and shapes without a name cannot imitate of its causes:
+        m_cᵀ ((P⁻¹)_cc)⁻¹ m_c, P the information of the later rows.
+        """
         info, moment = self.prior.start
         mean = Arrow.of(info, self.prior.structure).solve(moment)
-        mean[: self.prior.n_nominal] = 0.0
-        return np.array([float(t @ t) for t in self.base.times(mean)])
+        rows = Arrow.of(self.gram + self.prior.precision, self.prior.structure)
+        first, out = self.prior.n_nominal, np.zeros(self.rows.n_joints)
+        for j in range(len(out)):
+            own = [g.kind != "unnamed" and g.key[1] == j + 1 for g in self.prior.groups]
+            at = first + np.flatnonzero(own)
+            unit = np.zeros((len(mean), len(at)))
+            unit[at, np.arange(len(at))] = 1.0
+            out[j] = mean[at] @ np.linalg.solve(rows.solve(unit)[at], mean[at])
+        return out
 
     @cached_property
     def shares(self) -> Array:
