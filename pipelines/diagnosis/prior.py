@@ -23,6 +23,7 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.diagnosis.variance import Components, components
+from pipelines.model.effects import find_effect
 
 __all__ = ["Prior", "prior_of"]
 
@@ -140,12 +141,20 @@ def _drift(
     of: Sequence[Group],
     config: DiagnosisConfig,
 ) -> Array:
-    """Return the variance between sessions of each scaled number: friction drifts."""
+    """Return the variance between sessions of each scaled number.
+
+    Friction drifts: the nominal laws, their form, and what changes sign with them.
+    """
     beta, rigid = dataset.model.beta, len(dataset.model.columns.kept)
     usual = (beta[rigid:] * scale[rigid:]) ** 2
-    form = np.array([float(g.key[0] == FORM) for g in of])
-    every = np.r_[np.zeros(rigid), usual, form * found.variance / found.mean_square]
+    rubs = np.array([g.key[0] == FORM or (g.kind == "named" and _rubs(g)) for g in of], float)
+    every = np.r_[np.zeros(rigid), usual, rubs * found.variance / found.mean_square]
     return np.asarray(config.friction_drift**2 * every)
+
+
+def _rubs(group: Group) -> bool:
+    effect = find_effect(group.key[0])
+    return effect.friction or "sharpness" in effect.shared
 
 
 def _halves(dataset: Dataset) -> tuple[tuple[np.ndarray, ...], ...]:
