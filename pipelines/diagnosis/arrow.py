@@ -1,7 +1,7 @@
-"""Information matrices of which each joint's own numbers meet those of other joints only through shared ones.
+"""Factor information matrices whose joints are coupled by shared numbers alone.
 
-    structure = Structure.of(table, more)   which numbers are a joint's own
-    factor = Arrow.of(matrix, structure)
+    structure = Structure.of(table)   which numbers are a joint's own
+    factor = Arrow.of(matrix, structure)   the Cholesky factor
     factor.solve(b), factor.inverse_diagonal, factor.whitened(columns, joint)
 
 With the own numbers of each joint first and the shared ones last such a matrix has the shape of an
@@ -47,7 +47,7 @@ class Structure:
         return Structure(self.own, np.r_[self.shared, np.arange(k, k + more)])
 
     def among(self, matrix: Array) -> Structure:
-        """Return the structure itself, or one of shared numbers only where the matrix has not got it."""
+        """Return the structure; where the matrix couples joints directly, all numbers are shared."""
         for j, one in enumerate(self.own):
             for other in self.own[:j]:
                 if matrix[np.ix_(one, other)].any():
@@ -57,7 +57,7 @@ class Structure:
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """The Cholesky factor of such a matrix."""
+    """The Cholesky factor of a matrix with a structure."""
 
     structure: Structure
     blocks: tuple[Array, ...]  # L_j of each joint

@@ -42,7 +42,7 @@ def standing_out(
     residual: Sequence[Array],
     config: DiagnosisConfig,
 ) -> Window | None:
-    """Return the best window on a residual (rows of each joint) in units of the noise, if it is one.
+    """Return the best window on a residual (rows of each joint), None where it may be noise.
 
     An event is of one moment: its window stands out of what is left at other times of the session.
     The largest gain of m independent windows of white noise has a known law; what other times exceed

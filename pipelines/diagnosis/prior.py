@@ -153,6 +153,7 @@ def _drift(
 
 
 def _rubs(group: Group) -> bool:
+    """Return whether a cause is a friction law or changes sign with the one at its joint."""
     effect = find_effect(group.key[0])
     return effect.friction or "sharpness" in effect.shared
 
