@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.screening import Baseline
+from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.selection import Cause, Selection
 
 __all__ = ["Decision", "decide"]

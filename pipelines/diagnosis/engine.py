@@ -13,7 +13,7 @@ from pipelines.diagnosis.dataset import Dataset, load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.screening import Baseline, baseline
+from pipelines.diagnosis.baseline import Baseline, baseline
 from pipelines.diagnosis.selection import Selection, select
 from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.variance import settle
@@ -22,6 +22,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.model.diagnosis.given.change_of_sign import loosened
 from pipelines.model.diagnosis.given.compliance import Compliance, compared, compliance
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
@@ -102,6 +103,8 @@ def diagnose_prepared(
     prepared: Prepared, config: DiagnosisConfig, exclude: Sequence[str] = ()
 ) -> Diagnosis:
     """Return the same of rows that were prepared."""
+    if prepared.reference is None:
+        prepared = loosened(prepared)
     rough = load(prepared, prepared.logs.frf)
     every = Dictionary.of(rough, config, exclude)
     responses = compliance(rough.frf, rough.model.nominal, exclude)

@@ -21,7 +21,7 @@ import numpy as np
 
 from pipelines.diagnosis.candidates import Group, Key
 from pipelines.diagnosis.refit import Later, State
-from pipelines.diagnosis.screening import Baseline
+from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.table import Array, Table
 from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
 from pipelines.model.effects.base import Effect, Quantity

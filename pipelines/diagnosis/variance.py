@@ -19,6 +19,7 @@ from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
+from pipelines.diagnosis.screening import best_of, screen
 from pipelines.diagnosis.table import Array, Indices, Table
 
 __all__ = ["Components", "components", "settle"]
@@ -104,12 +105,9 @@ def settle(
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
     """
-    groups = [g for g in dictionary.groups if g.shape == 0]
-    columns = np.concatenate([g.columns for g in groups])
-    of = [g for g in groups for _ in range(g.width)]
 
     def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
-        left = _left(rows, table.take(columns), of, config)
+        left = _left(rows, table, dictionary.groups, config)
         there, through = rows.whitened(left, config.noise_bins)
         return there, through(table)
 
@@ -125,12 +123,21 @@ def settle(
 
 
 def _left(
-    rows: Rows, dictionary: Table, of: Sequence[Group], config: DiagnosisConfig
+    rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
 ) -> tuple[Array, ...]:
-    """Return what the nominal columns and the dictionary together leave, of each joint."""
+    """Return what the nominal columns and the dictionary together leave, of each joint.
+
+    Of each cause at each joint the shape counts that explains most beside the nominal columns.
+    """
     scale = rows.nominal.norms
-    unit = 1.0 / np.where(scale > 0.0, scale, 1.0)
-    table = Table.stacked([rows.nominal.scaled(unit), dictionary])
+    nominal = rows.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0))
+    known = Arrow.of(nominal.gram(nominal) + _FLAT * np.eye(nominal.width), Structure.of(nominal))
+    cross = nominal.gram(candidates)
+    moments = candidates.moments(rows.y) - cross.T @ known.solve(nominal.moments(rows.y))
+    squares = [own.gram(own) for own in (candidates.take(g.columns) for g in groups)]
+    best = [one.group for one in best_of(screen(groups, known, cross, squares, moments)).values()]
+    of = [g for g in best for _ in range(g.width)]
+    table = Table.stacked([nominal, candidates.take(np.concatenate([g.columns for g in best]))])
     power = sum(float(y @ y) for y in rows.y)
     gram, moment, structure = table.gram(table), table.moments(rows.y), Structure.of(table)
     found = components(gram, moment, structure, rows.count, of, config, power)

@@ -1,0 +1,145 @@
+"""What screening and residual are where nothing has changed: between parts of the known logs.
+
+One family-wise error for all candidates. Where nothing has changed T_c exceeds the χ² bound by what
+models leave everywhere; that grows with the number of rows as the noise does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from pipelines.diagnosis.arrow import Arrow
+from pipelines.diagnosis.candidates import Dictionary, Group
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.dataset import Dataset
+from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.screening import Screened, best_of, screen
+from pipelines.diagnosis.table import Array, Parts, Table
+
+__all__ = ["Baseline", "baseline", "upper_point"]
+
+_SPLITS = 6  # of the reference into two
+
+
+def chi2_bound(alpha: float, freedom: int) -> float:
+    """Return the value that χ² of as many degrees of freedom exceeds with probability `alpha`."""
+    from scipy.stats import chi2
+
+    return float(chi2.isf(alpha, max(freedom, 1)))
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Screening and residual of what is usual on a machine, from splits of its known logs."""
+
+    alpha: float
+    families: int  # causes at joints, that are compared at once
+    bias: dict[str, float]  # of each family, a row: what T_c exceeds its χ² bound by
+    worst_fit: float  # cost of a row, that a healthy session exceeds rarely
+    usual_fit: float
+
+    def threshold(self, group: Group, freedom: int, rows: int) -> float:
+        """Return the T_c that a healthy machine exceeds with probability `alpha` in all."""
+        return chi2_bound(self.alpha / self.families, freedom) + rows * self.bias[group.family]
+
+
+def baseline(
+    dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
+) -> Baseline:
+    """Return what screening and residual are between parts of the reference."""
+    parts = _Parts.of(dataset, dictionary, prior)
+    families = len({group.key for group in dictionary.groups})
+    excess: dict[str, list[float]] = {}
+    fits: list[float] = []
+    for before, after in _splits(len(prior.parts)):
+        found, fit, rows = parts.compared(before, list(after))
+        fits.append(fit)
+        for one in best_of(found).values():
+            bound = chi2_bound(config.alpha / families, one.freedom)
+            excess.setdefault(one.group.family, []).append((one.gain - bound) / rows)
+    bias = {
+        family: max(0.0, upper_point(values, config.alpha)) for family, values in excess.items()
+    }
+    if dataset.reference is None:  # a fault is part of what its own family leaves
+        second = sorted(bias.values())[-2]
+        bias = {family: min(value, second) for family, value in bias.items()}
+    return Baseline(
+        config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits))
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """Products of the columns over each part of the reference, in units of the noise."""
+
+    prior: Prior
+    groups: tuple[Group, ...]
+    cross: Array  # (parts, k, columns) B Cᵀ
+    moments: Array  # (parts, columns) C y
+    squares: tuple[Array, ...]  # of each group (parts, width, width), C Cᵀ
+    powers: Array  # (parts,) yᵀy
+    counts: Array  # (parts,) rows
+
+    @classmethod
+    def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior) -> _Parts:
+        rows, y, parts = dataset.known, dataset.known.y, prior.parts
+        candidates = dictionary.known
+        base = prior.table(rows.nominal, candidates)
+        return cls(
+            prior,
+            dictionary.groups,
+            np.array([base.gram(candidates, part) for part in parts]),
+            np.array([candidates.moments(y, part) for part in parts]),
+            tuple(_squares(candidates.take(g.columns), parts) for g in dictionary.groups),
+            np.array(
+                [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
+            ),
+            np.array([sum(int(m.sum()) for m in part) for part in parts], dtype=np.float64),
+        )
+
+    def compared(
+        self, before: tuple[int, ...], after: list[int]
+    ) -> tuple[list[Screened], float, float]:
+        """Return candidates, cost a row (`State.cost`) and rows of some parts after others."""
+        info, moment = self.prior.of(before)
+        gram = np.sum([self.prior.grams[k] for k in after], axis=0)
+        own = np.sum([self.prior.moments[k] for k in after], axis=0)
+        known = Arrow.of(info + gram, self.prior.structure)
+        mean = known.solve(moment + own)
+        cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
+        squares = [own[after].sum(axis=0) for own in self.squares]
+        found = screen(
+            self.groups,
+            known,
+            cross,
+            squares,
+            self.moments[after].sum(axis=0) - cross.T @ mean,
+        )
+        cost = self.powers[after].sum() - (moment + own) @ mean
+        cost += float(np.sum(Arrow.of(info, self.prior.structure).half(moment) ** 2))
+        return found, float(cost) / rows, rows
+
+
+def _squares(table: Table, parts: Sequence[Parts]) -> Array:
+    return np.array([table.gram(table, part) for part in parts])
+
+
+def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
+    """Return splits of the parts into two, half of them each."""
+    every = range(parts)
+    out = [
+        (half, tuple(k for k in every if k not in half)) for half in combinations(every, parts // 2)
+    ]
+    step = max(1, len(out) // _SPLITS)
+    return out[::step][:_SPLITS]
+
+
+def upper_point(values: Sequence[float], alpha: float) -> float:
+    """Return the upper `alpha` point of a Gumbel law fitted to maxima by its moments."""
+    x = np.asarray(values)
+    scale = max(float(x.std(ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12) if len(x) > 1 else 1e-12
+    return float(x.mean() - np.euler_gamma * scale - scale * np.log(-np.log1p(-alpha)))
