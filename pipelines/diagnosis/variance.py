@@ -25,6 +25,7 @@ from pipelines.diagnosis.table import Array, Indices, Table
 __all__ = ["Components", "components", "settle"]
 
 _FLAT = 1e-10  # numerics: of a column's information
+_ROUNDS = 2
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
 
 
@@ -107,9 +108,12 @@ def settle(
     """
 
     def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
-        left = _left(rows, table, dictionary.groups, config)
-        there, through = rows.whitened(left, config.noise_bins)
-        return there, through(table)
+        white, columns = rows, table
+        for _ in range(_ROUNDS):
+            left = _left(rows, table, white, columns, dictionary.groups, config)
+            white, through = rows.whitened(left, config.noise_bins)
+            columns = through(table)
+        return white, columns
 
     cleared, table = settled(dataset.later.less(cause), dictionary.later)
     dataset = replace(dataset, later=cleared.less(None), cleared=cleared)
@@ -123,7 +127,7 @@ def settle(
 
 
 def _left(
-    rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
+    plain: Rows, plain_candidates: Table, rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
 ) -> tuple[Array, ...]:
     """Return what the nominal columns and the dictionary together leave, of each joint.
 
@@ -141,4 +145,5 @@ def _left(
     power = sum(float(y @ y) for y in rows.y)
     gram, moment, structure = table.gram(table), table.moments(rows.y), Structure.of(table)
     found = components(gram, moment, structure, rows.count, of, config, power)
-    return tuple(y - t for y, t in zip(rows.y, table.times(found.mean), strict=True))
+    plain_table = Table.stacked([plain.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0)), plain_candidates.take(np.concatenate([g.columns for g in best]))])
+    return tuple(y - t for y, t in zip(plain.y, plain_table.times(found.mean), strict=True))
