@@ -232,11 +232,24 @@ def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:
     later = Data(tuple(replace(one, place=k, kept=kept) for k, one in every), first=own.first)
     if before is not None:
         _refuse_held(before)
-    columns, fit = fit_nominal(before or later, prepared.columns)
+    columns, fit = fit_nominal(before or later, _columns(prepared))
     model = Exact.start(columns, fit)
     start = min(float(one.motion.t[0]) for one in later.logs)
     reference = None if before is None else Rows.of(before, model)
     return Dataset(model, reference, Rows.of(later, model), tuple(frf), start)
+
+
+def _columns(prepared: Prepared) -> Columns:
+    """Return the nominal columns; without reference logs the curve of the sign change is fitted too.
+
+    By which curve friction changes its sign nobody knows, and none is a fault. With reference logs
+    the form of friction (`prior`) holds what they show of it.
+    """
+    own = prepared.columns
+    if prepared.reference is not None or any(speed > 0.0 for speed in prepared.recipe.min_speed):
+        return own
+    laws = (next(iter(law.forms()), law) if law.evidence == "none" else law for law in own.laws)
+    return replace(own, laws=tuple(laws))
 
 
 def _refuse_held(reference: Data) -> None:

@@ -22,7 +22,6 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
-from pipelines.model.diagnosis.given.change_of_sign import loosened
 from pipelines.model.diagnosis.given.compliance import Compliance, compared, compliance
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
@@ -103,8 +102,6 @@ def diagnose_prepared(
     prepared: Prepared, config: DiagnosisConfig, exclude: Sequence[str] = ()
 ) -> Diagnosis:
     """Return the same of rows that were prepared."""
-    if prepared.reference is None:
-        prepared = loosened(prepared)
     rough = load(prepared, prepared.logs.frf)
     every = Dictionary.of(rough, config, exclude)
     responses = compliance(rough.frf, rough.model.nominal, exclude)

@@ -132,6 +132,7 @@ def _round(
         one
         for one in _refitted(later, state, significant, responses, config)
         if _loss(later, one.state) < _loss(later, state)
+        and one.state.losses.sum() < state.losses.sum()
         and not (one.event and one.gain < config.relevance * explained)
     ]
     others = _unnamed(later, state, significant, bool(responses))

@@ -5,7 +5,8 @@
 
 Standing numbers s_g ~ N(0, τ_g), with τ_g by empirical Bayes: expectation maximisation, each group
 shrunk to its family (Dempster, Laird & Rubin 1977; Efron & Morris 1973). The noise Σ of each session
-is an autoregressive process for each joint: what the nominal model and the dictionary together leave.
+is an autoregressive process for each joint: what the nominal model and every candidate together leave,
+fitted by generalised least squares (Cochrane & Orcutt 1949).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from pipelines.diagnosis.table import Array, Indices, Table
 __all__ = ["Components", "components", "settle"]
 
 _FLAT = 1e-10  # numerics: of a column's information
-_ROUNDS = 2
+_ROUNDS = 2  # numerics: of generalised least squares; a third changes the noise by a fiftieth
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
 
 
@@ -110,7 +111,9 @@ def settle(
     def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
         white, columns = rows, table
         for _ in range(_ROUNDS):
-            left = _left(rows, table, white, columns, dictionary.groups, config)
+            numbers = _imitated(white, columns, dictionary.groups, config)
+            both = Table.stacked([rows.nominal, table])
+            left = [y - t for y, t in zip(rows.y, both.times(numbers), strict=True)]
             white, through = rows.whitened(left, config.noise_bins)
             columns = through(table)
         return white, columns
@@ -126,24 +129,28 @@ def settle(
     )
 
 
-def _left(
-    plain: Rows, plain_candidates: Table, rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
-) -> tuple[Array, ...]:
-    """Return what the nominal columns and the dictionary together leave, of each joint.
+def _imitated(
+    rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
+) -> Array:
+    """Return the numbers (nominal + candidates,) that fit the rows best; of shapes without use 0.
 
-    Of each cause at each joint the shape counts that explains most beside the nominal columns.
+    Of each cause at each joint the shape is used that explains most beside the nominal columns.
     """
     scale = rows.nominal.norms
-    nominal = rows.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0))
+    unit = 1.0 / np.where(scale > 0.0, scale, 1.0)
+    nominal = rows.nominal.scaled(unit)
     known = Arrow.of(nominal.gram(nominal) + _FLAT * np.eye(nominal.width), Structure.of(nominal))
     cross = nominal.gram(candidates)
     moments = candidates.moments(rows.y) - cross.T @ known.solve(nominal.moments(rows.y))
     squares = [own.gram(own) for own in (candidates.take(g.columns) for g in groups)]
     best = [one.group for one in best_of(screen(groups, known, cross, squares, moments)).values()]
     of = [g for g in best for _ in range(g.width)]
-    table = Table.stacked([nominal, candidates.take(np.concatenate([g.columns for g in best]))])
+    columns = np.concatenate([g.columns for g in best])
+    table = Table.stacked([nominal, candidates.take(columns)])
     power = sum(float(y @ y) for y in rows.y)
     gram, moment, structure = table.gram(table), table.moments(rows.y), Structure.of(table)
     found = components(gram, moment, structure, rows.count, of, config, power)
-    plain_table = Table.stacked([plain.nominal.scaled(1.0 / np.where(scale > 0.0, scale, 1.0)), plain_candidates.take(np.concatenate([g.columns for g in best]))])
-    return tuple(y - t for y, t in zip(plain.y, plain_table.times(found.mean), strict=True))
+    out = np.zeros(nominal.width + candidates.width)
+    out[: nominal.width] = found.mean[: nominal.width] * unit
+    out[nominal.width + columns] = found.mean[nominal.width :]
+    return out
