@@ -112,7 +112,9 @@ def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
     motion = whole_motion(dataset.later.data)
     found = {}
     for family in families(dataset.model.columns.laws, motion, dataset.arm, exclude):
-        shapes = tuple(shape.in_session(dataset.session_start) for shape in family.shapes)
+        shapes = family.shapes
+        if dataset.session_start is not None:
+            shapes = tuple(shape.in_session(dataset.session_start) for shape in shapes)
         found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
     changeable = () if dataset.reference is None else all_effects()
     for kind in changeable:  # what base parameters absorb without a reference

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -190,7 +191,7 @@ class Dataset:
     reference: Rows | None
     later: Rows
     frf: tuple[ExperimentLog, ...]
-    session_start: float  # [s] clock time at which the later logs begin
+    session_start: float | None  # [s] when the later logs begin; None: on no common clock
     cleared: Rows | None = None  # the later rows less the causes found before
 
     @property
@@ -234,9 +235,15 @@ def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:
         _refuse_held(before)
     columns, fit = fit_nominal(before or later, _columns(prepared))
     model = Exact.start(columns, fit)
-    start = min(float(one.motion.t[0]) for one in later.logs)
     reference = None if before is None else Rows.of(before, model)
-    return Dataset(model, reference, Rows.of(later, model), tuple(frf), start)
+    return Dataset(model, reference, Rows.of(later, model), tuple(frf), _session_start(later))
+
+
+def _session_start(data: Data) -> float | None:
+    """Return when the logs begin, None where two overlap: then each has a clock of its own."""
+    spans = sorted((float(one.motion.t[0]), float(one.motion.t[-1])) for one in data.logs)
+    apart = all(before[1] < after[0] for before, after in pairwise(spans))
+    return spans[0][0] if apart else None
 
 
 def _columns(prepared: Prepared) -> Columns:

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.diagnosis.arrow import Arrow, Structure
-from pipelines.diagnosis.candidates import Dictionary
+from pipelines.diagnosis.candidates import Dictionary, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior
@@ -29,7 +29,7 @@ _RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
 _STEPS = 7  # numerics: of Gauss-Newton
 _SHARES = (1.0, 0.4, 0.1)  # numerics: of a step that is tried
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
-_FREE = 1e-6  # numerics: of the information along a direction that is freed
+_FREE = 1e-6  # numerics: of the information along a direction that is freed, or not held
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,6 +276,19 @@ class Later:
         lasting = state.effects.take(state.lasting)
         columns = Table.stacked([self.base, lasting])
         return block_losses(columns, self._factor(state.info, lasting), state.residual, self.block)
+
+    def unchanged(self, state: State, key: Key) -> State:
+        """Return the state refitted with the standing numbers of a cause held at their prior mean."""
+        own = [group.key == key for group in self.prior.groups]
+        at = self.prior.n_nominal + np.flatnonzero(own)
+        if not len(at):
+            return state
+        mean = Arrow.of(state.info, self.prior.structure).solve(state.moment)
+        info, moment = state.info.copy(), state.moment.copy()
+        tight = np.diag(self.gram)[at] / _FREE
+        info[at, at] += tight
+        moment[at] += tight * mean[at]
+        return self.fit(state.model, state.theta, info, moment)
 
     def freed(self, info: Array, moment: Array, effect: Effect) -> tuple[Array, Array]:
         """Return the prior free along base parameters that the effect moves by unknown numbers."""

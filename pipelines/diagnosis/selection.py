@@ -132,7 +132,6 @@ def _round(
         one
         for one in _refitted(later, state, significant, responses, config)
         if _loss(later, one.state) < _loss(later, state)
-        and one.state.losses.sum() < state.losses.sum()
         and not (one.event and one.gain < config.relevance * explained)
     ]
     others = _unnamed(later, state, significant, bool(responses))
@@ -201,7 +200,8 @@ def _contest(
     if not named:
         return None, (), f"{_place(kept[0])} predicts better than {best}"
     pick = min(named, key=lambda one: scores[one.key].sum())
-    pays = confidence_set({"with": scores[pick.key], "without": without}, config)
+    unchanged = _scores(later, later.unchanged(state, pick.key))
+    pays = confidence_set({"with": scores[pick.key], "without": unchanged}, config)
     if "without" in pays and not pick.event:
         return None, (), fails
     return pick, tuple(one.key for one in named if one is not pick), ""
