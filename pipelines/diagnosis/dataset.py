@@ -32,6 +32,7 @@ from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.kept import Kept
 from pipelines.model.diagnosis.rows.whitening import Whitening
 from pipelines.model.estimation.regression import Columns
+from pipelines.model.rigid.body import Motion
 
 __all__ = ["Dataset", "Rows", "load"]
 
@@ -114,6 +115,22 @@ class Rows:
     def torque(self, model: Exact) -> tuple[Array, ...]:
         """Return the torque of an exact model, joint by joint, in units of the noise."""
         return self.signal(model.torque(self.data))
+
+    def mixed(self, model: Exact) -> Table | None:
+        """Return the nominal columns as drives pass them on; None where no drive mixes or scales."""
+        every = [one.effect.mixing(one.values, self.n_joints) for one in model.effects]
+        found = [one for one in every if one is not None]
+        if not found:
+            return None
+        columns, kept = model.columns, list(model.columns.kept)
+        matrix = np.linalg.multi_dot([*reversed(found), np.eye(self.n_joints)])
+
+        def linear(motion: Motion) -> Array:
+            rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
+            laws = [law.columns(motion, columns.arm) for law in columns.laws]
+            return np.asarray(matrix @ np.concatenate([rigid, *laws], axis=2))
+
+        return self.table(self.data.lay(linear))
 
     def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
         """Return the slopes of the torque by the numbers of the effects, and their names.

@@ -133,26 +133,25 @@ class Later:
         """Return the model with all its numbers fitted; those of effects have no prior."""
         residual = self._residual(model, theta)
         now = self._cost(residual, theta, info, moment)
-        for _ in range(steps):
-            slopes, names = self._slopes(model)
+        for k in range(1 + steps):
+            slopes, names = self._slopes(model) if k else self._none  # linear numbers first
             size = _unit(slopes.norms)
             unit = slopes.scaled(1.0 / size)
-            gradient = np.r_[
-                moment - info @ theta + self.base.moments(residual), unit.moments(residual)
-            ]
-            step = self._factor(info, unit).solve(gradient)
+            base, gram = self._exact(model)
+            gradient = np.r_[moment - info @ theta + base.moments(residual), unit.moments(residual)]
+            step = self._factor(info, unit, base, gram).solve(gradient)
             before = now
             for share in _SHARES:
-                base, more = share * step[: len(theta)], share * step[len(theta) :] / size
-                own = base[: self.prior.n_nominal] / self.prior.scale
+                way, more = share * step[: len(theta)], share * step[len(theta) :] / size
+                own = way[: self.prior.n_nominal] / self.prior.scale
                 tried = model.moved(np.r_[own, more], names)
-                left = self._residual(tried, theta + base)
-                cost = self._cost(left, theta + base, info, moment)
+                left = self._residual(tried, theta + way)
+                cost = self._cost(left, theta + way, info, moment)
                 if np.isfinite(cost) and cost <= now:
-                    model, theta, residual, now = tried, theta + base, left, cost
+                    model, theta, residual, now = tried, theta + way, left, cost
                     break
             gained = before - now
-            if gained < 2.0 + _SETTLED * now:
+            if k and gained < 2.0 + _SETTLED * now:
                 break
         slopes, names = self._slopes(model)
         effects = slopes.scaled(1.0 / _unit(slopes.norms))
@@ -315,18 +314,39 @@ class Later:
         """Return the slopes by the numbers of the effects in their own units, and their names."""
         return self._slopes(state.model)
 
-    def _information(self, info: Array, effects: Table) -> Array:
-        across = self.base.gram(effects)
-        own = effects.gram(effects) + _RIDGE * np.eye(effects.width)
-        return np.block([[info + self.gram, across], [across.T, own]])
+    def _exact(self, model: Exact) -> tuple[Table, Array]:
+        """Return B and B Bᵀ where a drive passes on more, or less, than the torque of its joint."""
+        nominal = self.rows.mixed(model)
+        if nominal is None:
+            return self.base, self.gram
+        first = self.prior.n_nominal
+        standing = self.base.take(np.arange(first, self.base.width))
+        base = Table.stacked([nominal.scaled(1.0 / self.prior.scale), standing])
+        gram = self.gram.copy()
+        gram[:first] = base.take(np.arange(first)).gram(base)
+        gram[:, :first] = gram[:first].T
+        return base, gram
 
-    def _factor(self, info: Array, effects: Table) -> Arrow:
+    def _information(
+        self, info: Array, effects: Table, base: Table | None = None, gram: Array | None = None
+    ) -> Array:
+        across = (self.base if base is None else base).gram(effects)
+        own = effects.gram(effects) + _RIDGE * np.eye(effects.width)
+        return np.block([[info + (self.gram if gram is None else gram), across], [across.T, own]])
+
+    def _factor(
+        self, info: Array, effects: Table, base: Table | None = None, gram: Array | None = None
+    ) -> Arrow:
         wider = self.prior.structure.wider(effects.width)
-        return Arrow.of(self._information(info, effects), wider)
+        return Arrow.of(self._information(info, effects, base, gram), wider)
+
+    @property
+    def _none(self) -> tuple[Table, list[tuple[int, int, str]]]:
+        return self.base.take(np.zeros(0, dtype=np.intp)), []
 
     def _slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
         if not model.effects:
-            return self.base.take(np.zeros(0, dtype=np.intp)), []
+            return self._none
         return self.rows.slopes(model)
 
     def _residual(self, model: Exact, theta: Array) -> tuple[Array, ...]:
