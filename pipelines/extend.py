@@ -19,9 +19,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pipelines.diagnosis.answer import WITHOUT_REFERENCE
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.extension import extend as extend_by_one_model
+from pipelines.diagnosis.extension import extend
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.log.canonical import digest_of
 from pipelines.log.derive import derive, recording
@@ -31,10 +30,10 @@ from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.answered.outcome import Extension
 from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.asked.gates import logs_of_roles
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.memory import Memory
+from pipelines.model.diagnosis.asked.gates import examined, logs_of_roles
+from pipelines.model.diagnosis.asked.inputs import prepare
+from pipelines.model.diagnosis.asked.settings import BLOCKS, DiagnosisSettings
+from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
 from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
@@ -61,7 +60,7 @@ class Settings:
     validate: tuple[str, ...] = ()  # that judge
     reference: tuple[str, ...] = ()  # of the arm as it was before
     model: str | None = None  # a model file: its friction laws and its effects are fitted anew
-    blocks: int = DiagnosisSettings.blocks  # held out in turn where no log is
+    blocks: int = BLOCKS  # held out in turn where no log is
     filter: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
     decimate: int | None = None  # every so-manieth sample; None: from the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
@@ -120,21 +119,16 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     if not wanted:
         raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was not done", where=inputs.label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
-    memory = (inputs.material.memory if isinstance(inputs.material, Diagnosed) else None) or Memory()  # none of one taken back
-    said, _ = memory.examined(chosen, settings.allow_mismatch)
-    engine = DiagnosisSettings(blocks=settings.blocks, cutoff_hz=settings.filter, decimation=settings.decimate,
-                               min_speed=settings.min_speed)
-    done = inputs.material.extension if isinstance(inputs.material, Diagnosed) and not settings.causes else None
-    if done is not None:
-        found = done
-    elif chosen.reference or WITHOUT_REFERENCE:
+    before = inputs.material if isinstance(inputs.material, Diagnosed) else None
+    said = examined(chosen.every, settings.allow_mismatch)[0] if before is None else before.doctor
+    found = before.extension if before is not None and not settings.causes else None
+    if found is None:
         usual = DiagnosisConfig()
         config = replace(usual, cutoff_hz=settings.filter or usual.cutoff_hz)
-        prepared = memory.prepared(chosen, replace(engine, cutoff_hz=config.cutoff_hz), given.arm)
+        rows = DiagnosisSettings(config.cutoff_hz, settings.decimate, settings.min_speed)
+        prepared = with_terms_told_apart(prepare(chosen, rows, given.arm), settings.blocks)
         given.tell(f"fitting {', '.join(dict.fromkeys(one.place for one in wanted))}")
-        found = extend_by_one_model(prepared, _each(wanted), config, settings.blocks)
-    else:
-        found = extend(chosen, _each(wanted), engine, given.arm, given.tell, memory)
+        found = extend(prepared, _each(wanted), config, settings.blocks)
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),

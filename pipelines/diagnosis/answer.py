@@ -26,6 +26,7 @@ from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import Trained, train
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.answered.judgeable import limited_by_estimate
+from pipelines.model.diagnosis.answered.without_limit import without_limit
 from pipelines.model.diagnosis.answered.words import beside, how_much, taken_in, where
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.given.compliance import gaps_untold, untold
@@ -38,16 +39,13 @@ from pipelines.model.diagnosis.result import (
     Value,
     Verdict,
 )
-from pipelines.model.diagnosis.unseen.without_limit import without_limit
 from pipelines.model.diagnosis.worth.evidence import evidence
 from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.diagnosis.worth.numbers import told
 from pipelines.model.diagnosis.worth.simulated import as_simulated, with_simulation
 from pipelines.model.words import within
 
-__all__ = ["WITHOUT_REFERENCE", "answer"]
-
-WITHOUT_REFERENCE = False  # whether logs without reference logs are diagnosed so as well
+__all__ = ["WEAKER", "answer"]
 
 _VERDICTS: dict[str, Verdict] = {
     "cause": "cause",
@@ -64,7 +62,7 @@ _UNNAMED = {
 _ACCEPTED = "accepted"
 _ALIKE = "these logs do not tell it from the cause that is named"
 _WORSE = "others predict blocks of time better"
-_WEAKER = "weaker than others"
+WEAKER = "weaker than others"
 
 
 def answer(
@@ -113,10 +111,7 @@ def answer(
         worth.rms(last),
         _ledger(found),
         _thresholds(found, f"parts of {'the reference' if reference else 'these'} logs"),
-        (evidence(trained.models[0], floor, ()),) if whole else (),
-        0,
-        np.full(len(floor), np.nan),
-        None,
+        (evidence(trained.models[0], floor),) if whole else (),
         trained.arm(0),
         trained.arm(last),
         fewer_terms=prepared.fewer,
@@ -209,7 +204,7 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
                 if accepted
                 else _ALIKE
                 if key in alike
-                else _WEAKER
+                else WEAKER
                 if key not in exact
                 else _plain(one.stopped) or _WORSE
             )

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.selection import Cause, Selection
 
 __all__ = ["Decision", "decide"]

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.diagnosis.baseline import Baseline, baseline
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.baseline import Baseline, baseline
 from pipelines.diagnosis.selection import Selection, select
 from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.variance import settle

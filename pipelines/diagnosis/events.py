@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.diagnosis.baseline import upper_point
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
-from pipelines.diagnosis.baseline import upper_point
 from pipelines.diagnosis.table import Array, Indices, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group, Key
 from pipelines.diagnosis.refit import Later, State
-from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.table import Array, Table
 from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
 from pipelines.model.effects.base import Effect, Quantity

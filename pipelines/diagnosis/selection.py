@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.events import standing_out
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores
-from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Acting

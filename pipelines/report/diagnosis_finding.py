@@ -9,7 +9,6 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.answered.words import of_any_size, taken_in, where
-from pipelines.model.diagnosis.given.responding import BELOW
 from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
 from pipelines.model.effects import find_effect
 from pipelines.model.parameter_names import numbered
@@ -61,9 +60,8 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
                     "over other motion it may be more or less")
     text += _larger(one, units, left)
     if one.origin == "frequency responses":
-        text.append("Frequency responses name it; its numbers are theirs, or a refit to all logs that agrees with them. What it is "
-                    f"worth is judged below {format_number(BELOW * _frequency(one), 2)} Hz: near the frequency of the spring a "
-                    "torque worked out from the encoder is mostly noise")
+        text.append("Frequency responses name it, and it explains these logs as well; its numbers are "
+                    "fitted to both")
     if one.doubt:
         text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
     if offer and not one.doubt and not _happens_once(one):

@@ -80,8 +80,7 @@ def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:
                         ("frequency", "Spectrum of the residual.")):
         spectra = [s for s in one.spectra if s.over == over]
         if spectra:
-            floor = " Grey: the floor." if any(s.floor is not None for s in spectra) else ""
-            found.append(Figure(f"residual-{over}{suffix}", words + floor, _spectra(spectra, torque),
+            found.append(Figure(f"residual-{over}{suffix}", words, _spectra(spectra, torque),
                                 (6.0, 0.8 + 1.2 * len(spectra))))
     for joint in range(1, joints + 1):
         curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:_SHOWN]
@@ -125,15 +124,11 @@ def _over_time(axes: Sequence[Axes], quantity: str) -> None:
 def _spectra(spectra: Sequence[Spectrum], unit: str) -> Callable[[Drawing], None]:
     def draw(drawing: Drawing) -> None:
         for axis, one in zip(joint_axes(drawing, len(spectra)), spectra, strict=True):
-            if one.floor is not None:
-                axis.fill_between(one.x, 0.0, one.floor, color=style.GREY, alpha=0.3, linewidth=0.0, label="floor")
-            axis.plot(one.x, one.amplitude, color=style.BLUE, linewidth=1.0, label="residual")
+            axis.plot(one.x, one.amplitude, color=style.BLUE, linewidth=1.0)
             axis.set_title(f"joint {one.joint}", pad=3.0)
             axis.margins(x=0.01)
             axis.set_ylim(bottom=0.0)
             axis.locator_params(axis="y", nbins=4)
-        first = drawing.axes[0]
-        first.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=2)
         drawing.axes[-1].set_xlabel(f"{'order' if spectra[0].over == 'order' else 'frequency'} [{format_unit(spectra[0].unit)}]")
         drawing.supylabel(f"amplitude [{unit}]", fontsize="medium")
 

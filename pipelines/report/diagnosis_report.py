@@ -4,30 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
+from pipelines.diagnosis.answer import WEAKER
 from pipelines.model.diagnosis.answered.outcome import Result
 from pipelines.model.diagnosis.answered.words import how_much, of_any_size, taken_in, where
 from pipelines.model.diagnosis.result import Finding, Rejected, Trial
-from pipelines.model.diagnosis.searched.ledger import WEAKER
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
 from pipelines.report.boundary_card import boundary_card
 from pipelines.report.diagnosis_finding import finding_section, numbers_section
 from pipelines.report.diagnosis_floor import (
-    above_in_order,
+    floor_name,
     floor_words,
-    held_out_floor,
     held_out_words,
     judge_words,
-    loud_drives,
     what_stays,
 )
 from pipelines.report.diagnosis_floor import torque_errors as errors_table
 from pipelines.report.diagnosis_limits import limits_sections
-from pipelines.report.diagnosis_moved import of_moved, unmoved_words
 from pipelines.report.diagnosis_picture import picture_sections
 from pipelines.report.diagnosis_words import (
     as_sentence,
@@ -35,7 +31,6 @@ from pipelines.report.diagnosis_words import (
     in_order,
     is_cause,
     named,
-    per_joint,
     title_of,
     together,
     told_values,
@@ -59,8 +54,7 @@ _TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    units, (floor, name, floor_from) = units_in(result), held_out_floor(result)
-    nominal, now = replace(result.residual_rms, floor=floor), result.unmoved_rms or result.residual_rms
+    units, nominal = units_in(result), result.residual_rms
     found = [section for number, one in enumerate(result.findings, 1)
              for section in (finding_section(number, one, nominal, units=units, beside=result.findings,
                                              left=result.after_rms.validate),
@@ -69,16 +63,14 @@ def diagnosis_report(result: Result) -> Report:
                 *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),
-                  errors_table(now, result.after_rms, result.rated, floor, name,
-                               f"{unmoved_words(result, units)}{floor_from}", units),
+                  errors_table(nominal, result.after_rms, result.rated, nominal.floor, floor_name(result),
+                               floor_words(result), units),
                   tuple(sections), _advice(result),
                   (laws_words(result.laws_of, _IN_RUN, result.fewer_terms), threshold_words(result)))
 
 
 def _tone(result: Result) -> Tone:
     """What machines in order have as well is no fault of this one, unless it has changed, or may be something else."""
-    if result.verdict == "nothing-wrong" and loud_drives(result.noise, result.rated):
-        return "attention"
     causes = [cause for one in result.findings for cause in (one.cause, *(rival.cause for rival in one.rivals))]
     ordinary = result.question != "what has changed" and all(find_effect(cause).ordinary for cause in causes)
     return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
@@ -97,8 +89,7 @@ def _said(result: Result) -> str:
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         beyond = f"{_untold(result)}; what they would have shown, the report lists"
-        doubt = loud_drives(result.noise, result.rated, units_in(result)) or above_in_order(result)
-        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}{doubt}"
+        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}"
     if result.verdict == "unknown":
         return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
     if result.verdict == "cannot-judge":
@@ -181,8 +172,6 @@ def _nearest(ledger: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
     """What each cause takes off the residual at most; to first order where it was not fitted, for it stayed below its threshold."""
     found: dict[tuple[str, int | None], float] = {}
     for t in ledger:
-        if t.of != "residual":
-            continue
         gain = t.exact_gain if math.isfinite(t.exact_gain) else t.gain
         if gain > found.get((t.cause, t.joint), 0.0):
             found[t.cause, t.joint] = gain
@@ -219,7 +208,7 @@ def _others(result: Result) -> list[Section]:
             "Gain in square: share of the squared residual of the fitted logs that each takes away; what does not exceed its "
             f"threshold is not believed, nor what time held out does not bear out. {_OUT_OF_REACH} "
             "So is that of a cause that takes next to nothing: none was worked out."
-            f"{_alike(len(result.residual_rms.identify))}{of_moved(shown)}", tones),)))
+            f"{_alike(len(result.residual_rms.identify))}", tones),)))
     return sections
 
 
@@ -262,9 +251,6 @@ def _basis(result: Result) -> Section:
     """Where floor and thresholds come from, and what judged."""
     text = [laws_words(result.laws_of, _IN_RUN, result.fewer_terms), floor_words(result), held_out_words(result.held_out),
             threshold_words(result)]
-    if result.replicas:
-        text.append(f"The twin is the fitted model run {result.replicas} times through the same controllers, references, encoders "
-                    f"and noise of {per_joint(result.noise)} N m; what it shows as well is no fault.")
     best: dict[tuple[str, int | None], float] = {(one.cause, one.joint): one.gain for one in result.thresholds
                                                     if math.isfinite(one.gain)}
     rows = tuple((title_of(cause), joint, _reachable(gain)) for (cause, joint), gain in sorted(

@@ -9,8 +9,6 @@ from collections.abc import Sequence
 
 from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
-from pipelines.model.diagnosis.floor.thresholds import OF_THE_RESIDUAL, SHARE
-from pipelines.model.diagnosis.floor.wide import TIMES
 from pipelines.model.effects import find_effect
 from pipelines.model.estimation.result import Result as Estimated
 
@@ -37,7 +35,6 @@ def laws_words(laws_of: str, in_run: str = "", fewer: Sequence[FewerTerms] = ())
     return ("Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run: no earlier fit of friction is "
             f"taken. --model FILE takes the laws of a model{other}.")
 
-_PARTS = "parts of "  # how the origin of thresholds begins that come from parts of the logs themselves
 
 
 def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
@@ -52,24 +49,12 @@ def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
 
 
 def threshold_words(result: Diagnosed) -> str:
-    """Of diagnose: what says how much of a cause an arm in order shows, and whether an earlier diagnosis had found it."""
+    """Return what a cause has to exceed."""
     origins = sorted({one.origin for one in result.thresholds})
-    told = "; ".join(map(_by, origins)) or "none, for no cause was looked for"
-    if result.calibrated_with:
-        return f"Thresholds: {told}. An earlier diagnosis has stored them, of {', '.join(result.calibrated_with)}."
-    if origins and all(origin.startswith(_PARTS) for origin in origins):
-        return f"Thresholds: {told}. They were made here."
-    return f"Thresholds: {told}. They were made here; --calibration DIR takes those of an earlier diagnosis."
-
-
-def _by(origin: str) -> str:
-    """What a cause has to take off, by where that comes from."""
-    if origin == OF_THE_RESIDUAL:
-        return (f"a cause has to take {100.0 * SHARE:g} % off the mean square of the residual, all joints together, each in units "
-                "of its own rms: a fixed number, for nothing here tells what an arm in order would show; and time that it was not "
-                "chosen by has to bear it out")
-    if origin.startswith(_PARTS):
-        return (f"a cause has to exceed what chance gives any cause with a probability of 1 %, and what {origin} differ by; and "
-                "blocks of time that it was not fitted to have to bear it out")
-    return (f"a cause has to take off {TIMES:g} times what it, or its like, takes off by chance where nothing is wrong, by "
-            f"{origin}")
+    if not origins:
+        return "Thresholds: none, no cause was looked for."
+    return (
+        "Thresholds: a cause has to exceed what noise gives any cause with a probability of 1 %, and the "
+        f"difference between {'; '.join(origins)}; and it has to predict blocks of time that it was not "
+        "fitted to."
+    )

@@ -20,27 +20,24 @@ def diagnose(
     without: Annotated[list[str] | None, typer.Option(help="Cause that it is not, you know: cogging; all causes stand below. "
                                                       "Repeatable.")] = None,
     model: Annotated[str | None, typer.Option(help="model.json whose friction laws are taken. [Coulomb and viscous]")] = None,
-    replicas: Annotated[int | None, typer.Option(help="Simulated twins that say what is normal; 0: none. [10]")] = None,
     most: Annotated[int | None, typer.Option(help="Causes to look for, at most. [4]")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
     filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
     decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of the twins' noise. [1]")] = None,
-    calibration: Annotated[str | None, typer.Option(help="Folder of an earlier diagnosis, for its thresholds. [none]")] = None,
     allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Diagnose torque that looks misplaced.")] = None,
 ) -> None:
     """Say what the simulation gets wrong, why, what to check, and how much better the model becomes.
 
-    Takes some 20 s for three joints and two minutes of motion where logs of role reference say what is normal, two to four minutes
-    where simulated twins do (two cores), and longer with more of either. --calibration takes stored thresholds, with no twin.
+    Takes some 20 to 30 s for three joints and two minutes of motion. Logs of role reference, recorded while the arm was
+    healthy, turn the question into what has changed since.
     """
     from pipelines.diagnose import STAGE
 
     go(STAGE, tuple(logs or ()), common, {
         **roles.named, "without": tuple(without or ()) or None, "model": model,
-        "replicas": replicas, "most": most, "blocks": blocks, "filter": filter, "decimate": decimate,
-        "min_speed": numbers(min_speed, "--min-speed"), "seed": seed, "calibration": calibration, "allow_mismatch": allow_mismatch})
+        "most": most, "blocks": blocks, "filter": filter, "decimate": decimate,
+        "min_speed": numbers(min_speed, "--min-speed"), "allow_mismatch": allow_mismatch})
 
 
 @app.command(cls=CauseCommand)
@@ -61,7 +58,7 @@ def extend(
 ) -> None:
     """Extend the model by named causes, refit everything, and judge it on held-out logs.
 
-    Takes some 10 s for three joints and two minutes of motion; no twin is simulated. Without --out an earlier model that this one
+    Takes some 10 s for three joints and two minutes of motion. Without --out an earlier model that this one
     does not make anew, refused or with another cause, is kept beside the output folder, and that is said; an earlier
     extension in --out DIR is replaced.
     """

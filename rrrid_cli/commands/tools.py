@@ -92,9 +92,9 @@ def doctor(
 
 @app.command()
 def schema(
-    what: Annotated[str, typer.Argument(help="A command, for its result.json; model; calibration; log.")] = "model",
+    what: Annotated[str, typer.Argument(help="A command, for its result.json; model; log.")] = "model",
 ) -> None:
-    """Print the JSON schema of what rrrid writes: of a command's result.json, of model.json or calibration.json, or of a log."""
+    """Print the JSON schema of what rrrid writes: of a command's result.json, of model.json, or of a log."""
     from pipelines.log.results import json_text
 
     sys.stdout.write(json_text(_schema(what)))
@@ -109,16 +109,12 @@ def _schema(what: str) -> dict[str, Any]:
 
     if what in ("model", "log"):
         return model_schema() if what == "model" else log_schema()
-    if what == "calibration":
-        from pipelines.model.diagnosis.floor.calibration_file import calibration_schema
-
-        return calibration_schema()
     if what == "batch":
         from pipelines.batch.result import Result
 
         return result_schema(Result, what)
     if what not in STAGES:
-        known = ("model", "calibration", "log", "batch", *STAGES)
+        known = ("model", "log", "batch", *STAGES)
         raise UsageError("C02", f"no schema of '{what}'{did_you_mean(what, known)}", where="schema",
                          remedy=f"one of: {', '.join(known)}")
     return result_schema(result_type(stage_of(what)), what)

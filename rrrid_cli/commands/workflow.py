@@ -23,17 +23,14 @@ def run(
     skip: Annotated[list[str] | None, typer.Option(help="Stage to leave out, such as diagnose. Repeatable.")] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be computed, and why; compute nothing.")] = False,
     fresh: Annotated[bool, typer.Option("--fresh", help="Compute everything, also what has not changed.")] = False,
-    calibration: Annotated[str | None, typer.Option(
-        help="Folder of an earlier diagnosis or run, whose thresholds diagnose takes. [none]")] = None,
 ) -> None:
     """Do the whole workflow on a folder of logs; one report. What has not changed is not computed again.
 
-    Takes half a minute for three joints and two minutes of motion where logs of role reference say what is normal, three to six
-    minutes where simulated twins do (--skip diagnose leaves most of it out), and some seconds where nothing has changed.
+    Takes about a minute for three joints and two minutes of motion, and some seconds where nothing has changed.
     """
     from pipelines.run import STAGE, plan
 
-    given = {"skip": tuple(skip or ()) or None, "fresh": fresh or None, "diagnose.calibration": calibration}
+    given = {"skip": tuple(skip or ()) or None, "fresh": fresh or None}
     if not dry_run:
         go(STAGE, tuple(logs or ()), common, given, roles=roles)
     request, settings, teller = asked(STAGE, tuple(logs or ()), common, given, roles=roles)

@@ -16,7 +16,6 @@ from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms, WithoutLimit
-from pipelines.model.diagnosis.floor.calibration import Calibration
 
 __all__ = ["RIVALS", "Answer", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable",
            "Proof", "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",
@@ -211,7 +210,6 @@ class Trial:
     exact_gain: float  # the same after the exact refit; NaN where it was not refitted
     accepted: bool
     reason: str
-    of: Literal["residual", "base parameters"] = "residual"  # what its gain is a share of
 
 
 @dataclass(frozen=True)
@@ -221,7 +219,7 @@ class Threshold:
     cause: str
     joint: int | None
     gain: float  # share of the squared weighted residual
-    origin: str  # "10 replicas of the twin" | "reference logs" | "blocks"
+    origin: str  # the logs between whose parts nothing has changed
 
 
 @dataclass(frozen=True)
@@ -246,7 +244,6 @@ class Spectrum:
     unit: str  # "Hz" | "1/rev"
     x: Array  # (bins,)
     amplitude: Array  # [N m] of each line or bin
-    floor: Array | None  # the same of the twin or the reference logs
 
 
 @dataclass(frozen=True)
@@ -284,21 +281,15 @@ class Diagnosis:
     residual_rms: ResidualRms
     question: Literal["what is wrong", "what has changed"]
     held_out: JudgedBy
-    floor_origin: str  # "twin" | "reference logs" | "repetition" | "blocks"
+    floor_origin: str  # "reference logs" | "blocks"
     reason: str  # why "unknown" or "cannot-judge"; what "nothing wrong" cannot vouch for; what stands beside causes; else empty
     after_rms: ResidualRms  # the same with all findings and standing effects
     ledger: tuple[Trial, ...]
     thresholds: tuple[Threshold, ...]
     evidence: tuple[Evidence, ...]
-    replicas: int  # of the twin; 0 without
-    noise: Array  # [N m] of the drives, as the twin has it; NaN without
-    held_out_floor: Array | None  # [N m] what the arm in order would leave of the held-out logs; None: it cannot be simulated
     nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding, with what stands
     extended: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # refitted with findings and standing effects
-    calibration: Calibration | None = field(default=None, metadata=NOT_STORED, repr=False)  # thresholds
-    unmoved_rms: ResidualRms | None = None  # as residual_rms, less what a finding put into base parameters; None: none did
     without_limit: tuple[WithoutLimit, ...] = ()  # causes of the library that no other list has
     fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart
     boundary: Boundary | None = None  # what the logged torque is; null where no log moves the arm enough to tell
-    no_twin: str = ""  # why a floor "blocks" is that of no twin, although the logs describe their controller; else empty
     checks: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False)  # of the nominal model

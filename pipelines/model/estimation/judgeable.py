@@ -3,10 +3,9 @@
     why = cannot_judge(facts)      in words, with what to record; empty where they can
 
 "Nothing is wrong" says that a model leaves no more torque than that of a healthy arm would. That
-takes a noise floor (from a simulated arm under the controller that the logs describe, from
-reference logs, from a stored calibration), or a model that leaves next to nothing on held-out
-motion but what differs between repeated periods; and a model that the logs determine. One that
-they do not determine predicts held-out torque with a large standard deviation:
+takes a noise floor, from reference logs, or a model that leaves next to nothing on held-out motion
+but what differs between repeated periods; and a model that the logs determine. One that they do
+not determine predicts held-out torque with a large standard deviation:
 
     std τ̂_j(t) = sqrt(a_j(t)ᵀ C a_j(t)),  a_j the regressor of joint j, C the covariance of β
 
@@ -28,8 +27,7 @@ from pipelines.model.excited import REMEDY
 
 __all__ = ["Facts", "JudgeableConfig", "cannot_judge", "predicted_std", "unresolved"]
 
-_RECORD = ("record reference logs while the arm is known to be healthy, or describe the controller "
-           "in the logs, so that the fitted arm can be simulated under it")
+_RECORD = "record reference logs while the arm is known to be healthy, or a motion that repeats itself"
 
 
 @dataclass(frozen=True)
@@ -54,7 +52,6 @@ class Facts:
     std: Array  # of the predicted torque, by the covariance of the parameters
     unresolved: str  # parameters that the logs do not separate, in words; empty: none
     floor_known: Flags  # (joints,) whether the residual can be held against a noise floor
-    no_floor: str = ""  # why it is not, although the logs describe their controller
 
 
 def unresolved(found: Estimate) -> str:
@@ -88,8 +85,7 @@ def cannot_judge(facts: Facts, config: JudgeableConfig | None = None) -> str:
     why = []
     misfit = _large(np.where(facts.floor_known, 0.0, facts.left), facts.torque, limit)
     if misfit:
-        no_floor = f" ({facts.no_floor})" if facts.no_floor else ""
-        why.append(f"no noise floor is known{no_floor}, and on held-out motion the model leaves "
+        why.append("no noise floor is known, and on held-out motion the model leaves "
                    f"{misfit}, as a fault may and a healthy arm may; {_RECORD}")
     unsure = _large(facts.std, facts.torque, limit)
     if facts.unresolved or unsure:

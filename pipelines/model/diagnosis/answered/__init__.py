@@ -1,10 +1,7 @@
-"""What is answered: findings, doubts and limits put together.
+"""The result of a diagnosis and its words.
 
-    told        findings and what they gain, what the logs cannot show, and the sentence for a technician
-    words       words that this sentence and the report share
-    loud        "nothing is wrong" that holds of loud drives alone
-    judgeable   the verdict "cannot-judge", and checks of the nominal model
-    impossible  numbers that a cause cannot have
-    unbiased    numbers less what sampling and smoothing did to them
-    outcome     what the stages `diagnose` and `extend` leave
+words           words that the summary and the report share
+judgeable       the verdict "cannot-judge", and checks of the nominal model
+without_limit   causes that have neither a finding nor a detection limit
+outcome         what the stages `diagnose` and `extend` return
 """

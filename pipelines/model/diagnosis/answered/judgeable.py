@@ -14,9 +14,9 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
-from pipelines.model.diagnosis.floor.repeated import unrepeated
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.diagnosis.rows.repeated import unrepeated
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.judgeable import Facts, cannot_judge, predicted_std, unresolved
 from pipelines.model.estimation.negative_viscous import negative_viscous
@@ -58,7 +58,7 @@ def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
     if not known.all():
         known = left <= _ABOVE * _noise(prepared)
     return Facts(left, judge.rms(judge.y), predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns))),
-                 unresolved(estimated), known, found.no_twin)
+                 unresolved(estimated), known)
 
 
 def _noise(prepared: Prepared) -> Array:

@@ -10,7 +10,6 @@ from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
-from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
 from pipelines.model.diagnosis.worth.extended import Extended
 
@@ -26,9 +25,7 @@ class Result(Diagnosis):
     rated: tuple[float, ...] = ()  # [N m] rated torque of each; infinite where nobody knows it
     without: tuple[str, ...] = ()  # causes that were left out
     doctor: tuple[Check, ...] = ()
-    calibrated_with: tuple[str, ...] = ()  # logs of an earlier diagnosis, whose thresholds were taken; none: its own
     laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
-    memory: Memory | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)
     extension: Extended | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)  # by all that was named
 
 

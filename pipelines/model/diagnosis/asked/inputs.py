@@ -55,6 +55,11 @@ class Logs:
     frf: tuple[ExperimentLog, ...] = ()
     frf_before: tuple[ExperimentLog, ...] = ()  # of role "reference"
 
+    @property
+    def every(self) -> tuple[ExperimentLog, ...]:
+        """All logs that a diagnosis looks at."""
+        return (*self.identify, *self.validate, *self.reference, *self.frf, *self.frf_before)
+
     @classmethod
     def by_role(cls, logs: Sequence[ExperimentLog]) -> Logs:
         """Chosen by what they say of themselves."""

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,11 +16,11 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.fitted.dissipation import dissipating, driving
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.linear import covariance, left_out, solved, superfluous
-from pipelines.model.diagnosis.fitted.nominal import Fit, law_shapes, rigid_rows
+from pipelines.model.diagnosis.fitted.nominal import Fit, rigid_rows
 from pipelines.model.diagnosis.fitted.slopes import Which, slopes_of
 from pipelines.model.diagnosis.rows.data import Data
 
-__all__ = ["Refined", "moved_by", "refine"]
+__all__ = ["Refined", "refine"]
 
 _STEPS = 8
 _SHARES = (1.0, 0.4, 0.1)  # of a step, until one leaves less
@@ -58,12 +58,8 @@ class Refined:
 
     @cached_property
     def rss(self) -> float:
-        """Squared weighted residual, of rows as they are, steady or not: as thresholds are."""
+        """Squared weighted residual."""
         return float(self.residual @ self.residual)
-
-    def steadied(self, table: Array) -> Array:
-        """Weighted rows (..., rows) as the numbers are fitted to them."""
-        return _steadied(self.data, table, self.weight)
 
     @property
     def rms(self) -> Array:
@@ -97,7 +93,7 @@ class Refined:
         if self.known is not None:  # where they were fitted they were held
             return [k for k in range(len(self.model.beta), len(self.slopes)) if self.names[k - len(self.model.beta)][0] == 1
                     and self.known[k, k] == 0.0]
-        return _superfluous(self.steadied(self.slopes * self.weights), len(self.model.beta), self.names)
+        return _superfluous(self.slopes * self.weights, len(self.model.beta), self.names)
 
     def covariance(self) -> Array:
         """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held.
@@ -111,8 +107,8 @@ class Refined:
     def _own_covariance(self) -> Array:
         seen = np.ones(len(self.slopes), dtype=bool)
         seen[self.unseen] = False
-        table, whole = self.steadied((self.slopes * self.weights)[seen]), np.zeros((len(seen), len(seen)))
-        residual = self.steadied(self.residual)
+        table, whole = (self.slopes * self.weights)[seen], np.zeros((len(seen), len(seen)))
+        residual = self.residual
         noise = covariance(table, residual)
         std = np.sqrt(np.maximum(np.diag(noise), 1e-300))
         wider = np.maximum(left_out(table, residual, self.data.blocks(_PARTS)) / std, 1.0)
@@ -127,34 +123,20 @@ def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target:
         return _refined(model, data, weight, steps, data.y if target is None else target)
 
 
-def moved_by(done: Refined, left: Array) -> Refined:
-    """The model with every number moved as far as `left` (rows,) [N m], if it was left beside what is, would move it."""
-    table, y = (_steadied(done.data, x * done.weights, done.weight) for x in (done.slopes, left))
-    shift = _within(done.model, list(done.names), table, y, 0.0, done.data.rubbing)
-    model = done.model.moved(shift, done.names)
-    shapes = [(place, name) for kind, place, name in done.names if kind == 0]
-    if law_shapes(model.columns, model.beta) != shapes:  # a law that takes no torque now, or did not before
-        return _refined(model, done.data, done.weight, 0, done.data.y)
-    return replace(done, model=model, left=done.data.y - model.torque(done.data))
-
-
 def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
     weights = weight[data.joint]
 
-    def steadied(table: Array) -> Array:
-        return _steadied(data, table * weights, weight)
-
     rigid = rigid_rows(data, model.columns)
-    model = replace(model, beta=dissipating(model.beta, model.columns.laws, data.rubbing))
+    model = replace(model, beta=dissipating(model.beta, model.columns.laws))
     laid = model.laid(data)
     left = y - model.torque(data, laid)
     now = _power(data, left, weight)
     slopes, names = slopes_of(model, data, rigid, laid)
     for _ in range(steps):
-        better, table, y_left = False, steadied(slopes), steadied(left)
+        better, table, y_left = False, slopes * weights, left * weights
         for ridge in _RIDGES:
             try:
-                shift = _within(model, names, table, y_left, ridge, data.rubbing)
+                shift = _within(model, names, table, y_left, ridge)
             except np.linalg.LinAlgError:  # of numbers at which nothing can be solved: they stay, and gain nothing
                 break
             for share in _SHARES:
@@ -177,26 +159,22 @@ def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> R
 
 
 def _power(data: Data, left: Array, weight: Array) -> float:
-    residual = _steadied(data, left * weight[data.joint], weight)
+    residual = left * weight[data.joint]
     return float(residual @ residual)
 
 
-def _steadied(data: Data, table: Array, weight: Array) -> Array:
-    return table if data.ripple is None else data.ripple.out_of(table, weight)
-
-
-def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float, known: Collection[int]) -> Array:
+def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float) -> Array:
     """The step for every number. The others do without one that would leave its range, and stays at its end; without friction that
     would drive its joint; and without one of an effect that the rest of the model does as well: rounding would move it anywhere."""
     first = len(model.beta)
     stuck = _superfluous(table, first, names)
     shift = _without(table, y, ridge, stuck)
     beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
-    held = driving(model.beta, shift, model.columns.laws, known)
+    held = driving(model.beta, shift, model.columns.laws)
     while beyond or held:
         shift = _without(table, y + model.beta[held] @ table[held], ridge, [*stuck, *beyond, *held])
         shift[held] = -model.beta[held]
-        more = driving(model.beta, shift, model.columns.laws, known)  # of those that were free until then
+        more = driving(model.beta, shift, model.columns.laws)  # of those that were free until then
         if not more:
             break
         held = sorted({*held, *more})

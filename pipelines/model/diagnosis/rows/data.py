@@ -23,7 +23,6 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.diagnosis.rows.kept import Kept
-from pipelines.model.diagnosis.rows.ripple import Ripple
 from pipelines.model.diagnosis.rows.stretch import PAD, Run, run_of
 from pipelines.model.diagnosis.rows.whitening import Whitening
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
@@ -122,10 +121,6 @@ class Data:
     logs: tuple[LogData, ...]
     first: int = 0  # number of the first log among all that are diagnosed: of what happens in one log only
     known: Array | None = None  # (rows,) [N m] torque that is subtracted: of standing effects
-    rubbing: frozenset[int] = frozenset()  # joints, from 1, whose friction is partly in `known`
-    steady: bool = False  # models are fitted with the ripple of drives in order among the noise
-    taken: Array | None = None  # (rows,) [N m] as `known`, of rows that are cleared
-    cleared: tuple[Ripple, Array] | None = None  # the ripple that torque and columns are without, and the weights (joints,) of rows
 
     @property
     def n_joints(self) -> int:
@@ -153,8 +148,7 @@ class Data:
     @cached_property
     def y(self) -> Array:
         measured = np.concatenate([one.y.ravel() for one in self.logs])
-        clear = self.clear(measured if self.known is None else measured - self.known)
-        return clear if self.taken is None else clear - self.taken
+        return self.clear(measured if self.known is None else measured - self.known)
 
     def largest_torque(self, joint: int | None) -> float:
         """[N m] the largest that the logs show of the joints that turn, or slide, as `joint`, from 1, does; of all for None."""
@@ -162,22 +156,15 @@ class Data:
         alike = np.full(len(revolute), True) if joint is None else revolute == revolute[joint - 1]
         return float(max(np.abs(one.plain * one.weighed)[alike].max(initial=0.0) for one in self.logs))
 
-    @cached_property
-    def ripple(self) -> Ripple | None:
-        """That of drives in order, where models are to be fitted beside it."""
-        return Ripple.of(self) if self.steady else None
-
     @property
     def rows(self) -> int:
         return len(self.joint)
 
-    def whitened(self, whitening: Whitening, weight: Array | None = None) -> Data:
-        """The same rows through `whitening`, and, where `weight` (joints,) [1/(N m)] says how large their noise is then, without
-        what the ripple of drives in order has in common."""
+    def whitened(self, whitening: Whitening) -> Data:
+        """Return the same rows through `whitening`."""
         kept = Kept()
         known = None if self.known is None else self.through(whitening, self.known)
-        there = replace(self, logs=tuple(one.whitened(whitening, kept) for one in self.logs), known=known, steady=False)
-        return there if weight is None else replace(there, cleared=(Ripple.of(there), weight))
+        return replace(self, logs=tuple(one.whitened(whitening, kept) for one in self.logs), known=known)
 
     def through(self, whitening: Whitening, x: Array) -> Array:
         """What `x` (…, rows) is in whitened rows."""
@@ -232,10 +219,9 @@ class Data:
         return np.asarray(square, dtype=np.float64), np.bincount(self.joint[self.counts], minlength=self.n_joints)
 
     def clear(self, x: Array, rows: Indices | None = None) -> Array:
-        """Rows (…, rows) that count, less the ripple; `rows`: which these are, of some of the joints all."""
+        """Return `x` (…, rows), zero in rows that do not count; `rows`: which these are, of some of the joints all."""
         counts = self.counts if rows is None else self.counts[rows]
-        counted = x if counts.all() else np.where(counts, x, 0.0)
-        return counted if self.cleared is None else self.cleared[0].out_of(counted, self.cleared[1], rows)
+        return x if counts.all() else np.where(counts, x, 0.0)
 
 
 def _kept(one: LogData, key: Hashable, torque: Callable[[Motion], Array]) -> Array:

@@ -18,7 +18,7 @@ __all__ = ["mixable", "mixed"]
 
 def mixable(data: Data) -> bool:
     """Not where rows of some joints do not count, or each joint's pass a whitening of its own."""
-    return data.cleared is None and bool(data.counts.all()) and all(one.whitening is None for one in data.logs)
+    return bool(data.counts.all()) and all(one.whitening is None for one in data.logs)
 
 
 def mixed(data: Data, matrix: Array, rows: Array) -> Array:

@@ -5,7 +5,6 @@
     orders          amplitudes over the orders of a joint's angle, as far as its range tells them apart
     proof           the figure that proves a finding
     held_out        what a model leaves of rows that it was not fitted to
-    extrapolated    what it may leave of other motion because its numbers are not known better
     gains           what a finding is worth: torque, simulated position, tip
     extended        the model extended by causes, with the deviations of all its numbers
     closed_loop     arms moved by the controllers of logs
