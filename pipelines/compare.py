@@ -148,9 +148,9 @@ def _answers(a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Answer]:
 def _said(result: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str]]:
     if isinstance(result.get("verdict"), str):
         yield f"{place}verdict", result["verdict"]
-    for kind in ("findings", "standing"):
+    for kind in ("findings", "baseline_effects"):
         if isinstance(result.get(kind), list):  # what stands is named already where `extend` says it
-            places = (one if kind == "standing" and isinstance(one, str) else _place(one) for one in result[kind])
+            places = (one if kind == "baseline_effects" and isinstance(one, str) else _place(one) for one in result[kind])
             yield f"{place}{kind}", ", ".join(sorted(places)) or "none"
     for one in result.get("stages") or ():
         yield f"{place}{one['name']} ends in", str(one["exit"])

@@ -17,7 +17,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.results import NOT_STORED
-from pipelines.model.diagnosis.result import Diagnosis, NotTestable
+from pipelines.model.diagnosis.result import Diagnosis, NotIdentifiable
 from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
 from pipelines.report.diagnosis_words import in_order, named, spoken, told_values, without_keys
@@ -128,13 +128,13 @@ def ending(result: Result, found: Diagnosis | None) -> tuple[str, ...]:
             *(f"To see it:  {without_keys(record)}" for record in dict.fromkeys(one.record for _, one in beyond)))
 
 
-def _beyond(result: Result, found: Diagnosis) -> Iterator[tuple[str, NotTestable]]:
+def _beyond(result: Result, found: Diagnosis) -> Iterator[tuple[str, NotIdentifiable]]:
     """Each fault that is not found, for the logs cannot tell it."""
     told = {(one.cause, one.joint) for one in found.findings}
     for fault in result.fault:
         cause, joint = _place(fault)
         at = {joint} if find_effect(cause).evidence == "residual" else {joint, None}  # of the former None is: at all joints alike
-        blind = (one for one in found.not_testable if one.cause == cause and one.joint in at)
+        blind = (one for one in found.not_identifiable if one.cause == cause and one.joint in at)
         if (cause, joint) not in told and (one := next(blind, None)) is not None:
             yield fault, one
 
@@ -142,7 +142,7 @@ def _beyond(result: Result, found: Diagnosis) -> Iterator[tuple[str, NotTestable
 def _found(result: Result, found: Diagnosis | None) -> str:
     if found is None:
         return "nobody has looked, for diagnose was not done"
-    if found.verdict == "nothing-wrong":
+    if found.verdict == "no-fault-found":
         return "nothing"
     if found.verdict == "cannot-judge":
         return "nothing, for these logs cannot be judged"

@@ -122,7 +122,7 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
-                  without=settings.without, doctor=(*said, *found.checks), extension=extension,
+                  without=settings.without, data_quality=(*said, *found.checks), extension=extension,
                   laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name)
 
 
@@ -140,7 +140,7 @@ def _diagnosed(logs: Logs, settings: Settings, given: Material, whole: bool) -> 
 def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
     """Logs whose torque is late alike, before and after, show nothing that has changed: that they are late has to be said."""
     late = next((check for check in said if check.code == "RRID-T06"), None)
-    if found.verdict not in ("nothing-wrong", "cannot-judge") or late is None:
+    if found.verdict not in ("no-fault-found", "cannot-judge") or late is None:
         return found
     words = f"in {Path(late.where.partition(',')[0]).name} {late.message}"
     return replace(found, reason=f"{found.reason}; {words}" if found.reason else words,
@@ -160,14 +160,14 @@ def _refuse_strange(settings: Settings) -> None:
 
 
 def _exit_code(result: Result, check: bool) -> int:
-    return int(check and result.verdict != "nothing-wrong")
+    return int(check and result.verdict != "no-fault-found")
 
 
 def report(result: Result) -> Report:
-    """The verdict and what to check, the proof of every finding, the picture of what is wrong, rivals, ledger and limits."""
+    """The verdict and what to check, the proof of every finding, the picture of what is wrong, alternatives, ledger and limits."""
     return diagnosis_report(result)
 
 
 STAGE = Stage("diagnose", "Diagnose what the simulation gets wrong", Settings, compute, report, read, None, _exit_code,
-              lambda result: result.doctor, lambda result, inputs: replace(inputs, material=result), hands_on="material",
+              lambda result: result.data_quality, lambda result, inputs: replace(inputs, material=result), hands_on="material",
               beside=beside, sessions="one")

@@ -120,7 +120,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was not done", where=inputs.label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     before = inputs.material if isinstance(inputs.material, Diagnosed) else None
-    said = examined(chosen.every, settings.allow_mismatch)[0] if before is None else before.doctor
+    said = examined(chosen.every, settings.allow_mismatch)[0] if before is None else before.data_quality
     found = before.extension if before is not None and not settings.causes else None
     if found is None:
         usual = DiagnosisConfig()
@@ -138,8 +138,8 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         accepted=not found.rejected, causes=tuple(dict.fromkeys(one.place for one in wanted)), findings=found.findings,
         rejected=found.rejected,
         gain=found.gain, residual_rms=found.before, after_rms=found.after, held_out=found.held_out,
-        standing=tuple(one.place for one in found.standing), robot=name, joints=tuple(joint.name for joint in robot.joints),
-        rated=tuple(joint.torque for joint in robot.joints), doctor=said, model=model, derived=_derived(found, settings),
+        baseline_effects=tuple(one.place for one in found.standing), robot=name, joints=tuple(joint.name for joint in robot.joints),
+        rated=tuple(joint.torque for joint in robot.joints), data_quality=said, model=model, derived=_derived(found, settings),
         laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name, fewer_terms=found.fewer,
         revolute=tuple(robot.revolute))
 
@@ -234,5 +234,5 @@ def _other_model(result: Extension, folder: Path) -> tuple[str, ...]:
 
 
 STAGE = Stage("extend", "Extend the model by named causes", Settings, compute, report, read, write,
-              lambda result, check: int(check and not result.accepted), lambda result: result.doctor, uses=Uses(before=True),
+              lambda result, check: int(check and not result.accepted), lambda result: result.data_quality, uses=Uses(before=True),
               spare=_other_model, sessions="one")

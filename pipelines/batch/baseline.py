@@ -257,10 +257,10 @@ def _gone(part: Part, baseline: ModelFile) -> tuple[list[str], list[str]]:
     """
     gone, unsure = list[str](), list[str]()
     untold = {"unknown": "something is wrong that has no name", "cannot-judge": "these logs cannot be judged"}.get(part.verdict)
-    there = {*map(place_of, part.findings), *part.standing}
+    there = {*map(place_of, part.findings), *part.baseline_effects}
     for one in baseline.effects if part.diagnosed else ():
         place = place_of({"cause": one.effect, "joint": one.joint})
-        parameter, least = part.detectable.get(place, ("", math.inf))
+        parameter, least = part.detection_limits.get(place, ("", math.inf))
         stored = one.parameters.get(parameter)
         if place in there or not any(map(_is_there, one.parameters.values() if stored is None else (stored,))):
             continue

@@ -28,9 +28,9 @@ class Part:
     residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     findings: tuple[Mapping[str, Any], ...] = ()  # of a diagnosis: cause, joint, parameters
     diagnosed: bool = False  # its result names causes, be it none
-    verdict: str = ""  # of a diagnosis: "cause", "nothing-wrong", "unknown", "cannot-judge"
-    standing: tuple[str, ...] = ()  # what the reference logs show as well: "stribeck:2"
-    detectable: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, the least that is found
+    verdict: str = ""  # of a diagnosis: "cause", "no-fault-found", "unknown", "cannot-judge"
+    baseline_effects: tuple[str, ...] = ()  # what the reference logs show as well: "stribeck:2"
+    detection_limits: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, the least that is found
 
 
 def parts_of(result: Mapping[str, Any], robot: str, recorded: str, turning: Sequence[bool] = ()) -> tuple[Part, ...]:
@@ -49,10 +49,10 @@ def _day(name: str) -> str:
 
 def _part(result: Mapping[str, Any], name: str, robot: str, recorded: str, turning: Sequence[bool] = ()) -> Part:
     findings = tuple({key: one.get(key) for key in ("cause", "joint", "parameters")} for one in result.get("findings") or ())
-    least = {place_of(one): (str(one["parameter"]), float(one["smallest"]["value"])) for one in result.get("detectable") or ()
-             if (one.get("smallest") or {}).get("value") is not None and not one.get("or_less")}
+    least = {place_of(one): (str(one["parameter"]), float(one["minimum"]["value"])) for one in result.get("detection_limits") or ()
+             if (one.get("minimum") or {}).get("value") is not None and not one.get("or_less")}
     return Part(name, robot, recorded, fitted(result), residuals(result, turning), findings, result.get("findings") is not None,
-                str(result.get("verdict") or ""), tuple(map(place_of, result.get("standing") or ())), least)
+                str(result.get("verdict") or ""), tuple(map(place_of, result.get("baseline_effects") or ())), least)
 
 
 def place_of(one: Mapping[str, Any]) -> str:
@@ -65,6 +65,6 @@ def read_part(about: Mapping[str, Any]) -> Part:
     told: dict[str, Any] = {
         "figures": {name: (float(v), float(s), str(u)) for name, (v, s, u) in about["figures"].items()},
         "residuals": {name: (float(v), str(u)) for name, (v, u) in about["residuals"].items()},
-        "detectable": {name: (str(parameter), float(least)) for name, (parameter, least) in about["detectable"].items()},
-        "findings": tuple(about["findings"]), "standing": tuple(about["standing"])}
+        "detection_limits": {name: (str(parameter), float(least)) for name, (parameter, least) in about["detection_limits"].items()},
+        "findings": tuple(about["findings"]), "baseline_effects": tuple(about["baseline_effects"])}
     return Part(**{**about, **told})

@@ -126,8 +126,8 @@ def _only_causes(result: Mapping[str, Any]) -> bool:
     runs = result.get("runs") or (result,)
     others = any(stage["exit"] not in (0, 5) for run in runs for stage in run.get("stages", ())
                  if stage["name"] not in ("diagnose", "extend"))
-    said = {run.get("verdict", "nothing-wrong") for run in runs}
-    return "cause" in said and said <= {"cause", "nothing-wrong"} and not others
+    said = {run.get("verdict", "no-fault-found") for run in runs}
+    return "cause" in said and said <= {"cause", "no-fault-found"} and not others
 
 
 def undone(item: Item, problem: BaseException, plan: Plan, key: str) -> Record:

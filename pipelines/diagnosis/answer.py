@@ -16,7 +16,7 @@ from pipelines.diagnosis.engine import Diagnosis as Found
 from pipelines.diagnosis.findings import (
     extension_of,
     findings_of,
-    rivals_of,
+    alternatives_of,
     weigh,
 )
 from pipelines.diagnosis.limits import Limits, limits_of
@@ -49,7 +49,7 @@ __all__ = ["WEAKER", "answer"]
 
 _VERDICTS: dict[str, Verdict] = {
     "cause": "cause",
-    "no-fault-found": "nothing-wrong",
+    "no-fault-found": "no-fault-found",
     "unknown": "unknown",
 }
 _UNNAMED = {
@@ -88,8 +88,8 @@ def answer(
     worth = weigh(prepared, trained, standing.floor, whole)
     last, floor = len(causes), worth.floor
     rounds = {one.cause.key: one for one in found.look.selection.rounds if one.cause is not None}
-    rivals = [rivals_of(rounds[one.key]) for one in causes]
-    findings = findings_of(worth, found.look.later, end, rivals, found.responses)
+    named_causes = [(one.probability[one.key], alternatives_of(rounds[one.key])) for one in causes]
+    findings = findings_of(worth, found.look.later, end, named_causes, found.responses)
     limits = limits_of(found.look.later, end, found.look.baseline) if whole else Limits((), ())
     open_to = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
     named = {one.cause for one in findings}
@@ -101,8 +101,8 @@ def answer(
         findings,
         standing.told,
         _rejected(found),
-        limits.detectable,
-        (*limits.not_testable, *(one for one in open_to if whole and one.cause not in named)),
+        limits.detection_limits,
+        (*limits.not_identifiable, *(one for one in open_to if whole and one.cause not in named)),
         worth.rms(0),
         "what has changed" if reference else "what is wrong",
         "blocks" if prepared.judge is None else "logs",
@@ -128,7 +128,7 @@ def _sentence(
     verdict: Verdict, reason: str, findings: Sequence[Finding], trained: Trained, found: Found
 ) -> str:
     """Return the summary, one sentence for a technician."""
-    if verdict == "nothing-wrong":
+    if verdict == "no-fault-found":
         return "Nothing is wrong with this arm, as far as these logs can tell."
     if not findings:
         return f"Something is wrong, and no cause is named: {reason}."
@@ -148,7 +148,7 @@ def _sentence(
 
 def _others(first: Finding, found: Found) -> list[str]:
     """Return the alternatives of a finding, each with its number."""
-    keys = {(one.cause, one.joint) for one in first.rivals}
+    keys = {(one.cause, one.joint) for one in first.alternatives}
     own = [one for one in found.look.selection.rounds if one.cause is not None]
     same = [one for one in own if one.cause and one.cause.key == (first.cause, first.joint)]
     return [

@@ -71,7 +71,7 @@ def extend(
         place = max(k for k, doubt in enumerate(doubts) if doubt)  # the last gains least
         cause = left.pop(place)
         refused.append(Rejected(cause.effect.name, cause.effect.joint, doubts[place]))
-    findings = findings_of(worth, later, state, [()] * len(left), responses)
+    findings = findings_of(worth, later, state, [(None, ())] * len(left), responses)
     found = replace(extension_of(prepared, worth, findings), rejected=tuple(refused))
     return found if left else replace(found, arm=None, gain=None)
 

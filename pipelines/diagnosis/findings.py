@@ -1,7 +1,7 @@
 """Build findings: parameters with deviations, gain on held-out rows, proof.
 
 worth = weigh(prepared, trained, floor, whole=True)
-findings = findings_of(worth, later, end, rivals)
+findings = findings_of(worth, later, end, causes)
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.given.compliance import Compliance
-from pipelines.model.diagnosis.result import Answer, Finding, Gain, Proof, ResidualRms, Rival
+from pipelines.model.diagnosis.result import Alternative, Answer, Finding, Gain, Proof, ResidualRms
 from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.diagnosis.worth.gains import (
     Simulation,
@@ -31,7 +31,7 @@ from pipelines.model.diagnosis.worth.gains import (
 from pipelines.model.diagnosis.worth.numbers import parameters
 from pipelines.model.diagnosis.worth.proof import proof
 
-__all__ = ["Worth", "extension_of", "findings_of", "rivals_of", "weigh"]
+__all__ = ["Worth", "extension_of", "findings_of", "alternatives_of", "weigh"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,15 +77,15 @@ def findings_of(
     worth: Worth,
     later: Later,
     end: State,
-    rivals: Sequence[tuple[Rival, ...]],
+    causes: Sequence[tuple[float | None, tuple[Alternative, ...]]],
     responses: Compliance | None,
 ) -> tuple[Finding, ...]:
     """Return the causes of a model, strongest first, their numbers by all rows.
 
     Args:
-        rivals: of each cause.
+        causes: probability and alternatives of each.
     """
-    if not rivals:
+    if not causes:
         return ()
     _, names = later.slopes(end)
     every = Refined(
@@ -98,7 +98,7 @@ def findings_of(
         covariance(later, end),
     )
     out = []
-    for place, others in enumerate(rivals):
+    for place, (probability, others) in enumerate(causes):
         one = end.model.effects[place]
         effect, data = one.effect, later.rows.data
         size, joint, of_rated = _size(worth, place)
@@ -121,6 +121,7 @@ def findings_of(
                 of_rated,
                 _proof(worth, place, joint),
                 answers=answers,
+                probability=probability,
                 log=None if one.log is None else data.logs[one.log - data.first].log.name,
             )
         )
@@ -183,7 +184,7 @@ def _visibility(later: Later, end: State, place: int) -> float:
     return float(np.sqrt(np.clip(1.0 - imitated / max(power, 1e-300), 0.0, 1.0)))
 
 
-def rivals_of(own: Round) -> tuple[Rival, ...]:
+def alternatives_of(own: Round) -> tuple[Alternative, ...]:
     """Return the causes that the data do not tell from the one selected in a round."""
     if own.cause is None or own.state is None:
         return ()
@@ -192,13 +193,14 @@ def rivals_of(own: Round) -> tuple[Rival, ...]:
         parts = zip(own.before.residual, state.residual, strict=True)
         return np.concatenate([a - b for a, b in parts])
 
-    mine, out = taken(own.state), []
+    mine, out, probability = taken(own.state), list[Alternative](), own.cause.probability
     for one in own.tried:
         if one.key in own.cause.alternatives:
             theirs = taken(one.state)
             size = float(np.linalg.norm(mine) * np.linalg.norm(theirs))
-            out.append(Rival(*one.key, float(mine @ theirs) / max(size, 1e-300)))
-    return tuple(sorted(out, key=lambda one: -one.similarity))
+            similarity = float(mine @ theirs) / max(size, 1e-300)
+            out.append(Alternative(*one.key, similarity, probability[one.key]))
+    return tuple(sorted(out, key=lambda one: -one.probability))
 
 
 def extension_of(prepared: Prepared, worth: Worth, findings: Sequence[Finding]) -> Extended:

@@ -23,7 +23,7 @@ from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group, Key
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.table import Array, Table
-from pipelines.model.diagnosis.result import Detectable, NotTestable, Value
+from pipelines.model.diagnosis.result import DetectionLimit, NotIdentifiable, Value
 from pipelines.model.effects.base import Effect, Quantity
 
 __all__ = ["Limits", "limits_of"]
@@ -39,8 +39,8 @@ _TOO_MUCH = "these logs cannot show it: no arm has so much of it that they would
 class Limits:
     """Detection limits, and causes that these logs cannot show."""
 
-    detectable: tuple[Detectable, ...]
-    not_testable: tuple[NotTestable, ...]
+    detection_limits: tuple[DetectionLimit, ...]
+    not_identifiable: tuple[NotIdentifiable, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +62,7 @@ class _Shape:
         return float(amplitudes @ self.hidden @ amplitudes)
 
     @property
-    def visibility(self) -> float:
+    def identifiability(self) -> float:
         """Share of its first column that the model cannot imitate."""
         return float(np.sqrt(max(self.hidden[0, 0], 0.0)) / max(self.length[0], 1e-300))
 
@@ -86,18 +86,18 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
     there = {(one.effect.name, one.effect.joint) for one in state.model.effects}
     told = [_limit(later, own, baseline) for key, own in shapes.items() if key not in there]
     return Limits(
-        tuple(one for one in told if isinstance(one, Detectable)),
-        tuple(one for one in told if isinstance(one, NotTestable)),
+        tuple(one for one in told if isinstance(one, DetectionLimit)),
+        tuple(one for one in told if isinstance(one, NotIdentifiable)),
     )
 
 
-def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> Detectable | NotTestable:
+def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> DetectionLimit | NotIdentifiable:
     """Return the smallest of a cause that would have been found, or why none would."""
-    visible = max(one.visibility for one in shapes)
+    visible = max(one.identifiability for one in shapes)
     first = shapes[0].effect
     if visible < _VISIBLE:
         reason = f"absorbed by {_hiding(later, shapes[0])}; needs other motion"
-        return NotTestable(first.name, first.joint, reason, first.experiment)
+        return NotIdentifiable(first.name, first.joint, reason, first.experiment)
     needed = {
         one.freedom: np.sqrt(baseline.threshold(one.group, one.freedom, later.rows.count)) + _SIDE
         for one in shapes
@@ -110,22 +110,22 @@ def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> Detect
     amplitudes = np.array(first.fixed_amplitudes)
     seen = [s for s in shapes if s.power(amplitudes) > needed[s.freedom] ** 2]
     if not seen:
-        return NotTestable(first.name, first.joint, _TOO_MUCH, first.experiment)
+        return NotIdentifiable(first.name, first.joint, _TOO_MUCH, first.experiment)
     return _told(later, min(seen, key=lambda s: s.effect.strength), amplitudes, visible)
 
 
-def _told(later: Later, one: _Shape, amplitudes: Array, visible: float) -> Detectable | NotTestable:
+def _told(later: Later, one: _Shape, amplitudes: Array, visible: float) -> DetectionLimit | NotIdentifiable:
     """Return the parameter that goes with the amplitudes, where an arm can have as much of it."""
     effect = one.effect
     values = effect.values(amplitudes)
     joint = effect.joint
     turning = joint is None or later.dataset.arm.robot.revolute[joint - 1]
-    beyond = NotTestable(effect.name, joint, _TOO_MUCH, effect.experiment)
+    beyond = NotIdentifiable(effect.name, joint, _TOO_MUCH, effect.experiment)
     if effect.fixed_amplitudes is not None:
         q = next(q for q in effect.parameters if q.name == effect.grows_with)
         size = Value(values[q.name], None, q.unit_at(turning))
         less = effect.strength < 0.0
-        return Detectable(effect.name, joint, q.name, size, {}, "analytic", visible, less)
+        return DetectionLimit(effect.name, joint, q.name, size, {}, "analytic", visible, less)
     main = _main(effect, values)
     if main is None:
         return beyond
@@ -141,7 +141,7 @@ def _told(later: Later, one: _Shape, amplitudes: Array, visible: float) -> Detec
         for q in effect.parameters
         if q.shape and q.name in shown and np.isfinite(values.get(q.name, np.nan))
     }
-    return Detectable(effect.name, joint, main.name, size, at, "analytic", visible)
+    return DetectionLimit(effect.name, joint, main.name, size, at, "analytic", visible)
 
 
 def _main(effect: Effect, values: dict[str, float]) -> Quantity | None:

@@ -3,6 +3,7 @@
     block_losses(columns, info, residual, block)   of each block, predicted from all others
     log_scores(losses, rows)            of each block, its noise level unknown
     confidence_set({key: scores})       the models that the data do not tell from the best
+    probabilities({key: scores})        how probable each is
 
 A block predicted from all others leaves e_b = (I - J_bᵀ P⁻¹ J_b)⁻¹ r_b, exact for a linear model:
 J are the slopes by all numbers, P their information with the prior, r the residual of the fit to
@@ -21,7 +22,7 @@ from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.table import Array, Indices, Table
 
-__all__ = ["block_losses", "confidence_set", "log_scores"]
+__all__ = ["block_losses", "confidence_set", "log_scores", "probabilities"]
 
 K = TypeVar("K", bound=Hashable)
 
@@ -64,17 +65,31 @@ def log_scores(losses: Array, rows: Array) -> Array:
     return np.asarray(rows * np.log(np.maximum(losses, 1e-9) / rows))
 
 
+def probabilities(scores: Mapping[K, Array], config: DiagnosisConfig) -> dict[K, float]:
+    """Return how probable each model is: the mean of exp(-score / 2), normalised, over the bootstrap.
+
+    Yao, Vehtari, Simpson & Gelman 2018, pseudo-BMA+.
+    """
+    table = np.array(list(scores.values()))
+    total = table[:, _drawn(table.shape[1], config)].sum(axis=2)
+    weight = np.exp(-0.5 * (total - total.min(axis=0)))
+    mean = (weight / weight.sum(axis=0)).mean(axis=1)
+    return {key: float(p) for key, p in zip(scores, mean, strict=True)}
+
+
+def _drawn(blocks: int, config: DiagnosisConfig) -> Indices:
+    """Return the blocks (resamples, blocks) of each resample of the moving-block bootstrap."""
+    length, rng = min(config.blocks_together, blocks), np.random.default_rng(_SEED)
+    starts = rng.integers(0, blocks, (config.resamples, -(-blocks // length)))
+    runs = starts[:, :, None] + np.arange(length)
+    return np.asarray(runs.reshape(config.resamples, -1)[:, :blocks] % blocks)
+
+
 def confidence_set(scores: Mapping[K, Array], config: DiagnosisConfig) -> list[K]:
     """Return the models whose scores (blocks,), smaller is better, may be those of the best."""
     keys = list(scores)
     table = np.array([scores[key] for key in keys])
-    blocks, length = table.shape[1], min(config.blocks_together, table.shape[1])
-    rng = np.random.default_rng(_SEED)
-    starts = rng.integers(0, blocks, (config.resamples, -(-blocks // length)))
-    drawn = (starts[:, :, None] + np.arange(length)).reshape(config.resamples, -1)[
-        :, :blocks
-    ] % blocks
-    resampled, mean = table[:, drawn].mean(axis=2), table.mean(axis=1)
+    resampled, mean = table[:, _drawn(table.shape[1], config)].mean(axis=2), table.mean(axis=1)
     alive = list(range(len(keys)))
     while len(alive) > 1:
         distance = mean[alive] - mean[alive].mean()

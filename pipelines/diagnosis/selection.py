@@ -17,7 +17,7 @@ from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.events import standing_out
 from pipelines.diagnosis.refit import Later, State
-from pipelines.diagnosis.score import confidence_set, log_scores
+from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Acting
@@ -52,6 +52,7 @@ class Cause:
 
     key: Key
     alternatives: tuple[Key, ...]
+    probability: Mapping[Key, float]  # of it, of each alternative and of shapes without a name
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,14 +139,14 @@ def _round(
     seen = Round(state, None, None, significant=tuple(significant.values()), tried=tuple(tried))
     if not tried:
         return replace(seen, follows=_place(next(iter(others))) if others else "")
-    pick, alternatives, stopped = _contest(later, state, tried, others, config)
+    pick, cause, stopped = _contest(later, state, tried, others, config)
     if pick is None:  # perhaps by another law of the same cause
         tried = [_other_form(later, state, one, config) for one in tried]
-        pick, alternatives, stopped = _contest(later, state, tried, others, config)
+        pick, cause, stopped = _contest(later, state, tried, others, config)
     if pick is None:
         return replace(seen, stopped=stopped)
     chosen = _other_form(later, state, pick, config).state
-    return replace(seen, cause=Cause(pick.key, alternatives), state=chosen)
+    return replace(seen, cause=cause, state=chosen)
 
 
 def _significant(
@@ -180,8 +181,8 @@ def _contest(
     tried: Sequence[Candidate],
     others: Mapping[Key, State],
     config: DiagnosisConfig,
-) -> tuple[Candidate | None, tuple[Key, ...], str]:
-    """Return the winner of the predictive scores and its alternatives, or why nothing wins."""
+) -> tuple[Candidate | None, Cause | None, str]:
+    """Return the winner of the predictive scores with its alternatives, or why nothing wins."""
     scores = {one.key: _scores(later, one.state, one.numbers) for one in tried}
     free = {
         key: _scores(later, other, other.effects.width - state.effects.width)
@@ -192,19 +193,20 @@ def _contest(
     fails = f"{best} does not pay on blocks that it was not fitted to"
     better = {k: v for k, v in (scores | free).items() if v.sum() < without.sum()}
     if not any(one.key in better for one in tried):
-        return None, (), fails
+        return None, None, fails
     kept = confidence_set(better, config)
     named = [one for one in tried if one.key in kept] or _nearly(
         later, state, tried, others, config
     )
     if not named:
-        return None, (), f"{_place(kept[0])} predicts better than {best}"
+        return None, None, f"{_place(kept[0])} predicts better than {best}"
     pick = min(named, key=lambda one: scores[one.key].sum())
     unchanged = _scores(later, later.unchanged(state, pick.key))
     pays = confidence_set({"with": scores[pick.key], "without": unchanged}, config)
     if "without" in pays and not pick.event:
-        return None, (), fails
-    return pick, tuple(one.key for one in named if one is not pick), ""
+        return None, None, fails
+    alike = tuple(one.key for one in named if one is not pick)
+    return pick, Cause(pick.key, alike, probabilities(scores | free, config)), ""
 
 
 def _nearly(

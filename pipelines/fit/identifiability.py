@@ -6,7 +6,7 @@
     not_separated(solution, std, names)  groups of parameters that are determined only together
     hard_to_see(solution, names)         the weakest directions, strongest columns first
     visible(value, std, typical)         parameters worth printing as a number
-    visibility(statistics, ...)          how much of a further column the model cannot absorb
+    identifiability(statistics, ...)          how much of a further column the model cannot absorb
 
 Directions are those of columns scaled to unit length: what one of them weighs is its torque, not its unit.
 """
@@ -25,7 +25,7 @@ from pipelines.fit.statistics import Statistics
 
 __all__ = ["Direction", "Separation", "Unresolved", "condition_number", "hard_to_see", "not_separated",
            "resolved_rank", "typical_size", "unresolved",
-           "visibility", "visible"]
+           "identifiability", "visible"]
 
 _WHOLE = 3.0  # a direction is lost if three standard deviations of it are as large as all that was measured
 _SURE = 3.0  # standard deviations that a value must stand from zero
@@ -198,7 +198,7 @@ def visible(value: Array, std: Array, typical: Array | None = None) -> npt.NDArr
     return known
 
 
-def visibility(statistics: Statistics, weights: Array, nominal: Sequence[int], extra: Sequence[int]) -> Array:
+def identifiability(statistics: Statistics, weights: Array, nominal: Sequence[int], extra: Sequence[int]) -> Array:
     """η = ‖c⊥‖/‖c‖ of each extra column c, c⊥ being what the nominal columns cannot absorb; 0 where c is zero.
 
     From the triangular factor: with the nominal columns first, what stands below their triangle is c⊥.

@@ -24,7 +24,7 @@ _SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
 # Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
 _NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
 _SILENT: Final = ("parameters", "result", "torque")
-_PASSED_OVER: Final = ("balance", "comparison", "ladder", "rejected", "detectable", "courses")
+_PASSED_OVER: Final = ("balance", "comparison", "ladder", "rejected", "detection_limits", "courses")
 _PICTURES: Final = "previews"  # whose units are of position and torque, not of joints
 _A_MODEL: Final = "model"  # whose "robot" is a whole description
 _MOST = 400  # figures of one item

@@ -121,17 +121,17 @@ def encoder_scale(e: Evidence) -> list[Check]:
     return [_angle(e, *found, f"; so does its tau divided by {torque.factor:.3g}")] if found[1] < _EITHER * torque.after else []
 
 
-def _angle(e: Evidence, before: float, after: float, joint: int | None, factor: str, rival: str = "") -> Check:
+def _angle(e: Evidence, before: float, after: float, joint: int | None, factor: str, alternative: str = "") -> Check:
     if joint is None:
         return e.subject.say("S15", "warn",
                              f"q fits if every angle is multiplied by {factor}, residual {before:.2g} -> {after:.2g}",
                              signal="q", gate=True,
                              remedy="correct the unit of the angles on import, rad or deg or turns: it is declared for all of them")
     return e.subject.say("S15", "warn",
-                         f"q of joint {joint + 1} fits if multiplied by {factor}, residual {before:.2g} -> {after:.2g}{rival}",
+                         f"q of joint {joint + 1} fits if multiplied by {factor}, residual {before:.2g} -> {after:.2g}{alternative}",
                          signal="q", joint=joint, gate=True,
                          remedy="correct the gear ratio, the direction or the counts per turn of this encoder"
-                                + (", or the gear ratio or torque constant of this torque" if rival else ""))
+                                + (", or the gear ratio or torque constant of this torque" if alternative else ""))
 
 
 def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Array], bad: float,

@@ -16,7 +16,7 @@ Origin = Literal["fitted", "known", "assumed"]
 
 @dataclass(frozen=True)
 class Parameter:
-    """A named number with its uncertainty and its visibility.
+    """A named number with its uncertainty and its identifiability.
 
     Args:
         std: one standard deviation, or None where nobody knows it (an assumed or a known value).

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["Answer", "Comparison", "Figure", "Residual", "comparison_report"]
 
 _SHOWN = 40  # lines of a table or a figure
-_VERDICTS = {"nothing-wrong": "nothing wrong", "cause": "a cause is named", "unknown": "something wrong without a name",
+_VERDICTS = {"no-fault-found": "nothing wrong", "cause": "a cause is named", "unknown": "something wrong without a name",
              "cannot-judge": "cannot be judged"}
 _CIRCLE = "A phase or a direction is the same again after a whole turn: it is away by the shorter way around."
 _MODELS = "The nominal model is the one before any extension; the extended model has what was found, and what stands, as well."

@@ -51,7 +51,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
             f"{_share(one, nominal, floor)}; the refitted model could hide "
-            f"{format_number(100.0 * (1.0 - one.visibility), 2)} % of it.{tip_worth(one.gain)}"]
+            f"{format_number(100.0 * (1.0 - one.identifiability), 2)} % of it.{tip_worth(one.gain)}"]
     if of_any_size(one):
         text.append("How large its torque is these logs do not tell: rigid body and friction can take in any amount of it, and the "
                     "size given below is one of many: fed forward, it holds on motion like that of these logs alone")
@@ -66,10 +66,10 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
     if offer and not one.doubt and not _happens_once(one):
         text.append(_offer(one, [other for other in beside if not other.doubt and not _happens_once(other)]))
-    if one.rivals:
-        names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.rivals)
+    if one.alternatives:
+        names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.alternatives)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
-        pair = " ".join(cause_at(some.cause, some.joint) for some in (one, one.rivals[0]))
+        pair = " ".join(cause_at(some.cause, some.joint) for some in (one, one.alternatives[0]))
         text.append(f"Or let \"rrrid design-excitation LOG --tell-apart {pair}\" design the motion")
     return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
                    figures=(*answer_figures(number, one), *proof_figures(number, one, units)))
@@ -139,7 +139,7 @@ def _own_share(one: Finding, nominal: ResidualRms) -> float:
     if one.joint is None or one.origin == "base parameters":
         return math.nan
     torque, j = one.gain.validate_torque_rms, one.joint - 1
-    before, after, whole, floor = (float(x[j]) ** 2 for x in (torque.before, torque.after, nominal.validate, nominal.floor))
+    before, after, whole, floor = (float(x[j]) ** 2 for x in (torque.before, torque.after, nominal.validate, nominal.noise_floor))
     return float(np.clip((before - after) / (whole - floor), 0.0, 1.0)) if whole > floor else math.nan
 
 

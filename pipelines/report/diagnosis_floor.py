@@ -24,7 +24,7 @@ _MENTIONED, _MENTIONED_ABOVE_NOISE = 1.3, 10.0
 def what_stays(found: Diagnosis) -> str:
     """Return the joints whose residual is still above the noise floor, in a sentence; or nothing."""
     noise = found.floor_origin == "blocks"
-    ratio = found.after_rms.validate / np.maximum(found.residual_rms.floor, 1e-300)
+    ratio = found.after_rms.validate / np.maximum(found.residual_rms.noise_floor, 1e-300)
     high = np.flatnonzero(ratio > (_MENTIONED_ABOVE_NOISE if noise else _MENTIONED)).tolist()
     if not high:
         return ""

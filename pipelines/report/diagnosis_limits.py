@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pipelines.model.diagnosis.result import Detectable, Diagnosis, Value
+from pipelines.model.diagnosis.result import DetectionLimit, Diagnosis, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_words import spoken, title_of, told_value, unit_or_dash, without_keys
 from pipelines.report.report import Section, Table
@@ -25,13 +25,13 @@ _FOUND = ("With 95 %, had it been there; nothing smaller can be excluded. Hidden
 def limits_sections(result: Diagnosis) -> list[Section]:
     """What these logs can and cannot tell."""
     sections = []
-    if result.detectable:
-        rows = tuple((title_of(one.cause), one.joint, spoken(one.parameter), *_smallest(one)) for one in result.detectable)
+    if result.detection_limits:
+        rows = tuple((title_of(one.cause), one.joint, spoken(one.parameter), *_smallest(one)) for one in result.detection_limits)
         sections.append(Section("What would have been found", (_FOUND,),
                                 (Table(("cause", "joint", "parameter", "smallest", "unit", "at", "by"), rows),)))
-    if result.not_testable:
+    if result.not_identifiable:
         hidden = tuple((title_of(one.cause), one.joint, without_keys(one.reason), without_keys(one.record))
-                       for one in result.not_testable)
+                       for one in result.not_identifiable)
         sections.append(Section("What these logs cannot tell", ("Neither found nor excluded.",),
                                 (Table(("cause", "joint", "why", "what to record"), hidden),)))
     if result.without_limit:
@@ -48,12 +48,12 @@ def _shape(at: Mapping[str, Value]) -> str:
                      for name, value in at.items() if name in _AT and isinstance(value.value, int | float))
 
 
-def _smallest(one: Detectable) -> tuple[str, ...]:
+def _smallest(one: DetectionLimit) -> tuple[str, ...]:
     """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
-    value = one.smallest.value
+    value = one.minimum.value
     ends = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
     expected = [] if one.or_less else ends
     if isinstance(value, float) and expected and value >= min(expected):
         return "cannot be seen", "", "", ""
-    told = format_number(value, 2) if isinstance(value, float) else told_value(one.smallest)
-    return told, unit_or_dash(one.smallest.unit), "this or less" if one.or_less else _shape(one.at), _WAY[one.way]
+    told = format_number(value, 2) if isinstance(value, float) else told_value(one.minimum)
+    return told, unit_or_dash(one.minimum.unit), "this or less" if one.or_less else _shape(one.at), _WAY[one.way]

@@ -40,7 +40,7 @@ def _section(found: Diagnosis, one: Evidence, rated: Sequence[float], number: in
 
 def _above(found: Diagnosis, one: Evidence, rated: Sequence[float], units: Units) -> Table:
     joints, rows = len(one.above_floor), []
-    torques = to_one_place([float(x) for one_rms in (found.residual_rms.identify, found.residual_rms.floor) for x in one_rms])
+    torques = to_one_place([float(x) for one_rms in (found.residual_rms.identify, found.residual_rms.noise_floor) for x in one_rms])
     for j in range(joints):
         residual = float(found.residual_rms.identify[j])
         share = 100.0 * residual / rated[j] if j < len(rated) and math.isfinite(rated[j]) else None

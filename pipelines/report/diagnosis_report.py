@@ -1,4 +1,4 @@
-"""The report of a diagnosis: the verdict and what to check, the proof, the picture of what is wrong, rivals, ledger, limits."""
+"""The report of a diagnosis: the verdict and what to check, the proof, the picture of what is wrong, alternatives, ledger, limits."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ __all__ = ["diagnosis_report"]
 _LEDGER = 40  # lines
 _IN_RUN = "--set diagnose.model=FILE"
 _OUT_OF_REACH = "A threshold above 100 % is told as a dash: an arm in order leaves so much of it that such logs cannot show it."
-_TONES: dict[str, Tone] = {"nothing-wrong": "good", "cause": "bad", "unknown": "attention", "cannot-judge": "attention"}
+_TONES: dict[str, Tone] = {"no-fault-found": "good", "cause": "bad", "unknown": "attention", "cannot-judge": "attention"}
 
 
 def diagnosis_report(result: Result) -> Report:
@@ -63,7 +63,7 @@ def diagnosis_report(result: Result) -> Report:
                 *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
                 *limits_sections(result), _basis(result), *_doctor(result)]
     return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),
-                  errors_table(nominal, result.after_rms, result.rated, nominal.floor, floor_name(result),
+                  errors_table(nominal, result.after_rms, result.rated, nominal.noise_floor, floor_name(result),
                                floor_words(result), units),
                   tuple(sections), _advice(result),
                   (laws_words(result.laws_of, _IN_RUN, result.fewer_terms), threshold_words(result)))
@@ -71,7 +71,7 @@ def diagnosis_report(result: Result) -> Report:
 
 def _tone(result: Result) -> Tone:
     """What machines in order have as well is no fault of this one, unless it has changed, or may be something else."""
-    causes = [cause for one in result.findings for cause in (one.cause, *(rival.cause for rival in one.rivals))]
+    causes = [cause for one in result.findings for cause in (one.cause, *(alternative.cause for alternative in one.alternatives))]
     ordinary = result.question != "what has changed" and all(find_effect(cause).ordinary for cause in causes)
     return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
 
@@ -85,7 +85,7 @@ def _verdict(result: Result) -> str:
 
 
 def _said(result: Result) -> str:
-    if result.verdict == "nothing-wrong":
+    if result.verdict == "no-fault-found":
         since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
         caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
         beyond = f"{_untold(result)}; what they would have shown, the report lists"
@@ -110,7 +110,7 @@ def _said(result: Result) -> str:
 
 def _untold(result: Result) -> str:
     """What nobody should take for looked at: of it these logs say nothing."""
-    places = [words for _, words in at_places((one.cause, str(one.joint or "")) for one in result.not_testable)]
+    places = [words for _, words in at_places((one.cause, str(one.joint or "")) for one in result.not_identifiable)]
     if not places:
         return ""
     return f", and they say nothing of {' and '.join(filter(None, (', '.join(places[:-1]), places[-1])))}"
@@ -179,10 +179,10 @@ def _nearest(ledger: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
 
 
 def _standing(result: Result) -> list[Section]:
-    if not result.standing:
+    if not result.baseline_effects:
         return []
     rows = tuple((title_of(one.cause), one.joint, told_values(in_order(one.cause, one.parameters)),
-                  three_digits(100.0 * one.explained)) for one in result.standing)
+                  three_digits(100.0 * one.explained)) for one in result.baseline_effects)
     return [Section("What the reference logs show as well", ("It is part of this robot and no news; the extended model has it.",),
                     (Table(("effect", "joint", "parameters", "explains [%]"), rows),))]
 
@@ -196,14 +196,14 @@ def _others(result: Result) -> list[Section]:
     shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
         rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _reachable(t.threshold),
-                      _hundredths(100.0 * t.exact_gain), _hundredths(t.visibility),
+                      _hundredths(100.0 * t.exact_gain), _hundredths(t.identifiability),
                       _outcome(t, result))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
         more = len(result.ledger) - len(rows)
         text = (f"{more} more, all weaker, stand in result.json.",) if more > 0 else ()
         sections.append(Section("Ledger of hypotheses", text, (Table(
-            ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]", "visibility",
+            ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]", "identifiability",
              "outcome"), rows,
             "Gain in square: share of the squared residual of the fitted logs that each takes away; what does not exceed its "
             f"threshold is not believed, nor what time held out does not bear out. {_OUT_OF_REACH} "
@@ -261,5 +261,5 @@ def _basis(result: Result) -> Section:
 
 
 def _doctor(result: Result) -> Iterable[Section]:
-    if result.doctor:
-        yield Section("What the log doctor remarks", (), (checks_table(result.doctor),))
+    if result.data_quality:
+        yield Section("What the log doctor remarks", (), (checks_table(result.data_quality),))

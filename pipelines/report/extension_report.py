@@ -37,10 +37,10 @@ def extension_report(result: Extension) -> Report:
         sections.insert(0, Section("Not accepted", ("The held-out logs do not bear it out. There is no way around that.",),
                                    (Table(("cause", "joint", "why"), rows),)))
     sections.append(_basis(result, units))
-    if result.doctor:
-        sections.append(Section("What the log doctor remarks", (), (checks_table(result.doctor),)))
+    if result.data_quality:
+        sections.append(Section("What the log doctor remarks", (), (checks_table(result.data_quality),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
-                  torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.floor, _NOISE[0],
+                  torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.noise_floor, _NOISE[0],
                                 f"{_now(result)}{_NOISE[1]}", units),
                   tuple(sections), basis=(laws_words(result.laws_of, fewer=result.fewer_terms),))
 
@@ -74,8 +74,8 @@ def _basis(result: Extension, units: Units) -> Section:
             "A cause is accepted where its gain on held-out torque is beyond its bootstrap interval, where the logs agree on its "
             "size, where no held-out log gets worse by more than a tenth, and where the simulated arm comes nearer to the measured "
             "one."]
-    if result.standing:
-        text.append(f"The reference logs show as well, and the model has: {', '.join(map(without_keys, result.standing))}.")
+    if result.baseline_effects:
+        text.append(f"The reference logs show as well, and the model has: {', '.join(map(without_keys, result.baseline_effects))}.")
     if result.model is not None:
         text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --like LOG\" "
                     "simulates it.")

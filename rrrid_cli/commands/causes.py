@@ -29,7 +29,7 @@ def diagnose(
 ) -> None:
     """Say what the simulation gets wrong, why, what to check, and how much better the model becomes.
 
-    Takes some 20 to 30 s for three joints and two minutes of motion. Logs of role reference, recorded while the arm was
+    Takes some 30 s for three joints and two minutes of motion. Logs of role reference, recorded while the arm was
     healthy, turn the question into what has changed since.
     """
     from pipelines.diagnose import STAGE

@@ -26,7 +26,7 @@ def run(
 ) -> None:
     """Do the whole workflow on a folder of logs; one report. What has not changed is not computed again.
 
-    Takes about a minute for three joints and two minutes of motion, and some seconds where nothing has changed.
+    Takes some 60 s for three joints and two minutes of motion, and some seconds where nothing has changed.
     """
     from pipelines.run import STAGE, plan
 

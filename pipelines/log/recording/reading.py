@@ -160,8 +160,8 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     if q.group and dq.group:
         t, speed = clock.values if clock else None, matrix(table, dq.group.columns)
         slope = slope_of(matrix(table, q.group.columns), speed, t)
-        rivals = [g for g in q.others if g.origin != "commanded" and len(g.columns) == speed.shape[1]]
-        if slope is None and any(slope_of(matrix(table, g.columns), speed, t) for g in rivals):
+        alternatives = [g for g in q.others if g.origin != "commanded" and len(g.columns) == speed.shape[1]]
+        if slope is None and any(slope_of(matrix(table, g.columns), speed, t) for g in alternatives):
             q = Choice(None, (q.group, *q.others))  # the velocity is another position's
     return Reading(path, table, arm, clock, q, dq, _in_one_order(q, tau), table, slope, by_evidence)
 

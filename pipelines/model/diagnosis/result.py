@@ -17,12 +17,12 @@ from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms, WithoutLimit
 
-__all__ = ["RIVALS", "Answer", "BeforeAfter", "Curve", "Detectable", "Diagnosis", "Evidence", "Finding", "Gain", "NotTestable",
-           "Proof", "Rejected", "ResidualRms", "Rival", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",
+__all__ = ["RIVALS", "Answer", "BeforeAfter", "Curve", "DetectionLimit", "Diagnosis", "Evidence", "Finding", "Gain", "NotIdentifiable",
+           "Proof", "Rejected", "ResidualRms", "Alternative", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",
            "TorqueGain", "Trial", "Value", "Verdict"]
 
 RIVALS = 0.8  # similarity from which two causes explain the same
-Verdict = Literal["cause", "nothing-wrong", "unknown", "cannot-judge"]
+Verdict = Literal["cause", "no-fault-found", "unknown", "cannot-judge"]
 
 
 @dataclass(frozen=True)
@@ -35,12 +35,13 @@ class Value:
 
 
 @dataclass(frozen=True)
-class Rival:
+class Alternative:
     """Another cause that explains nearly as much of the same."""
 
     cause: str
     joint: int | None
     similarity: float  # cosine of the angle between what the two explain, after the model was refitted beside each
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -131,9 +132,9 @@ class Finding:
     title: str
     parameters: dict[str, Value]
     explained: float  # share of the residual above the floor that it explains
-    visibility: float  # part of its columns that the refitted model cannot absorb
-    rivals: tuple[Rival, ...]
-    experiment: str | None  # what to record to tell the rivals apart
+    identifiability: float  # part of its columns that the refitted model cannot absorb
+    alternatives: tuple[Alternative, ...]
+    experiment: str | None  # what to record to tell the alternatives apart
     gain: Gain
     origin: Literal["residual", "base parameters", "frequency responses", "reversals"]
     torque_rms: float  # [N m] of its torque on its own joint, or of the largest joint
@@ -141,6 +142,7 @@ class Finding:
     proof: Proof | None
     doubt: str = ""  # of what frequency responses name: why the extended model goes without it; empty where it has it
     answers: tuple[Answer, ...] = ()  # the responses that name it, one a posture; empty where others do, or none is drawn
+    probability: float | None = None  # over its alternatives and shapes without a name; None: a user named it
     log: str | None = None  # of what happened once, the log it happened in; None: it lasts, or comes in every log
 
 
@@ -164,21 +166,21 @@ class Rejected:
 
 
 @dataclass(frozen=True)
-class Detectable:
+class DetectionLimit:
     """The smallest amplitude that would have been found on these logs with 95 %."""
 
     cause: str
     joint: int | None
     parameter: str  # whose value it is
-    smallest: Value
+    minimum: Value
     at: dict[str, Value] = field(default_factory=dict)  # non-linear numbers for which it is: order, speed
     way: Literal["injected", "analytic"] = "analytic"  # hidden in these logs and found, or worked out
-    visibility: float = float("nan")  # part of its columns that the refitted model cannot absorb
+    identifiability: float = float("nan")  # part of its columns that the refitted model cannot absorb
     or_less: bool = False  # of less of the parameter there is more of the cause: of a limit, the largest that would have been found
 
 
 @dataclass(frozen=True)
-class NotTestable:
+class NotIdentifiable:
     """A cause of which these logs cannot tell."""
 
     cause: str
@@ -193,7 +195,7 @@ class ResidualRms:
 
     identify: Array
     validate: Array
-    floor: Array
+    noise_floor: Array
 
 
 @dataclass(frozen=True)
@@ -206,7 +208,7 @@ class Trial:
     gain: float  # share of the squared weighted residual that it takes away, fitted; of base parameters that have moved, of
     # what one set of them for before and after leaves more
     threshold: float  # that it had to exceed
-    visibility: float
+    identifiability: float
     exact_gain: float  # the same after the exact refit; NaN where it was not refitted
     accepted: bool
     reason: str
@@ -274,10 +276,10 @@ class Diagnosis:
     verdict: Verdict
     summary: str  # one sentence a technician understands
     findings: tuple[Finding, ...]  # strongest first
-    standing: tuple[Standing, ...]
+    baseline_effects: tuple[Standing, ...]
     rejected: tuple[Rejected, ...]
-    detectable: tuple[Detectable, ...]
-    not_testable: tuple[NotTestable, ...]
+    detection_limits: tuple[DetectionLimit, ...]
+    not_identifiable: tuple[NotIdentifiable, ...]
     residual_rms: ResidualRms
     question: Literal["what is wrong", "what has changed"]
     held_out: JudgedBy

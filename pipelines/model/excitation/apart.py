@@ -53,12 +53,12 @@ class Alike:
     """How alike two causes look in a motion."""
 
     similarity: float  # 0: nothing of one can be taken for the other; 1: everything
-    visibility: tuple[float, float]  # of either: what the nominal model cannot take up
+    identifiability: tuple[float, float]  # of either: what the nominal model cannot take up
     condition_number: float
 
     @property
     def score(self) -> float:
-        return self.similarity + sum(max(0.0, 1.0 - eta / _HIDDEN) for eta in self.visibility)
+        return self.similarity + sum(max(0.0, 1.0 - eta / _HIDDEN) for eta in self.identifiability)
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
                          where="--tell-apart", remedy="name a model: --model model.json")
     problem, rng = landscape(task), np.random.default_rng([seed, 9])
     seen = _judged(task, task.arm, problem, problem.start(rng), pair)
-    hidden = [name for name, eta in zip(_names(pair), seen.visibility, strict=True) if eta < _RANK]
+    hidden = [name for name, eta in zip(_names(pair), seen.identifiability, strict=True) if eta < _RANK]
     if hidden:
         show, them = ("show", "them") if len(hidden) > 1 else ("shows", "it")
         raise UsageError("C02", f"{' and '.join(hidden)} {show} in no motion: the base parameters take {them} up",

@@ -78,7 +78,7 @@ class Ladder:
         return not one.reason and no_worse(one.residual, self.best.residual)
 
     @property
-    def rivals(self) -> tuple[Tried, ...]:
+    def alternatives(self) -> tuple[Tried, ...]:
         """Laws as simple as the chosen one, or nearly, that explain the fitted rows as well: nothing there speaks against them."""
         own = self.chosen.fit.found.residual
         return tuple(one for one in self.tried if one is not self.chosen and not one.reason

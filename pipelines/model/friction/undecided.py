@@ -1,6 +1,6 @@
 """Laws that the chosen one is not told from, why it was chosen all the same, and what the choice changes.
 
-What is chosen is the simplest law that is not measurably worse than the best on rows that were held out (ladder.py). A rival
+What is chosen is the simplest law that is not measurably worse than the best on rows that were held out (ladder.py). A alternative
 explains the rows that were fitted as well. It may have been as good on those held out, or measurably worse: then these speak
 for the chosen law, but they are the same few rows, and another day may fall out otherwise.
 """
@@ -20,7 +20,7 @@ _POINTS = 60  # speeds each way
 
 
 def undecided(ladder: Ladder, slowest: float, fastest: float, alone: bool) -> tuple[tuple[str, str], ...]:
-    """Of every rival: what is undecided, and what to record.
+    """Of every alternative: what is undecided, and what to record.
 
     Args:
         slowest, fastest: speeds that were driven [rad/s].
@@ -28,30 +28,30 @@ def undecided(ladder: Ladder, slowest: float, fastest: float, alone: bool) -> tu
     """
     side = np.geomspace(max(slowest, 1e-3 * fastest), fastest, _POINTS)
     speed = np.concatenate([-side[::-1], side])
-    return tuple((f"{ladder.chosen.law.title} or {rival.law.title}: {_why(ladder, rival)}; "
-                  f"{_apart(ladder.chosen, rival, speed, alone)}", find_effect(rival.law.members[-1]).experiment)
-                 for rival in ladder.rivals)
+    return tuple((f"{ladder.chosen.law.title} or {alternative.law.title}: {_why(ladder, alternative)}; "
+                  f"{_apart(ladder.chosen, alternative, speed, alone)}", find_effect(alternative.law.members[-1]).experiment)
+                 for alternative in ladder.alternatives)
 
 
-def _why(ladder: Ladder, rival: Tried) -> str:
+def _why(ladder: Ladder, alternative: Tried) -> str:
     """What speaks for the chosen law."""
     chosen = ladder.chosen
-    sizes = f"{chosen.law.size} numbers against {rival.law.size}"
+    sizes = f"{chosen.law.size} numbers against {alternative.law.size}"
     held_out = "held-out logs" if ladder.by == "logs" else "held-out blocks"
-    if not ladder.alike(rival):
+    if not ladder.alike(alternative):
         best = ladder.best  # what chance was asked of, ladder.py
-        more = plain_number(100.0 * (rival.validate_rms / best.validate_rms - 1.0))
+        more = plain_number(100.0 * (alternative.validate_rms / best.validate_rms - 1.0))
         than = "" if best is chosen else f" than {best.law.title}, the best of all"
         return (f"of what was fitted both leave as much; the first, {sizes}, is taken because of the {held_out} the second leaves "
                 f"{more} % more (rms){than}, which is more than chance")
-    if chosen.law.size < rival.law.size:
+    if chosen.law.size < alternative.law.size:
         return f"nothing tells them apart, and the first is taken for it is plainer, {sizes}"
     return f"nothing tells them apart, and the first, {sizes}, is taken for it leaves a little less of the {held_out}"
 
 
-def _apart(chosen: Tried, rival: Tried, speed: Array, alone: bool) -> str:
+def _apart(chosen: Tried, alternative: Tried, speed: Array, alone: bool) -> str:
     """How far their curves lie apart at most over the speeds that were driven, and their inertias."""
-    one, other = chosen.fit.curve(speed), rival.fit.curve(speed)
+    one, other = chosen.fit.curve(speed), alternative.fit.curve(speed)
     most = int(np.argmax(np.abs(one - other)))
     torque, rate, inertia = ("N m", "rad/s", "kg m²") if chosen.fit.joint.revolute else ("N", "m/s", "kg")
     share = 100.0 * abs(float(one[most] - other[most])) / max(abs(float(one[most])), 1e-300)
@@ -59,6 +59,6 @@ def _apart(chosen: Tried, rival: Tried, speed: Array, alone: bool) -> str:
              f"{plain_number(float(abs(speed[most])))} {rate} ({plain_number(share)} % of the friction there)")
     if not alone:
         return words
-    moved = abs(chosen.fit.inertia - rival.fit.inertia)
+    moved = abs(chosen.fit.inertia - alternative.fit.inertia)
     hidden = moved < float(chosen.fit.std[0])
     return f"{words}; the inertia by {'less than its uncertainty' if hidden else f'{plain_number(moved)} {inertia}'}"

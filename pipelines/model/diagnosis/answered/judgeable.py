@@ -33,7 +33,7 @@ def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
     An estimate is made only for that verdict, and where viscous friction of the nominal model is
     negative: its check is added then.
     """
-    nothing = found.verdict == "nothing-wrong"
+    nothing = found.verdict == "no-fault-found"
     if not nothing and not _negative(found.nominal):
         return found
     estimated = nominal_estimate(prepared)

@@ -24,7 +24,7 @@ class Result(Diagnosis):
     joints: tuple[str, ...] = ()  # names
     rated: tuple[float, ...] = ()  # [N m] rated torque of each; infinite where nobody knows it
     without: tuple[str, ...] = ()  # causes that were left out
-    doctor: tuple[Check, ...] = ()
+    data_quality: tuple[Check, ...] = ()
     laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
     extension: Extended | None = field(default=None, metadata=NOT_STORED, repr=False, compare=False)  # by all that was named
 
@@ -41,11 +41,11 @@ class Extension:
     residual_rms: ResidualRms  # before
     after_rms: ResidualRms
     held_out: JudgedBy
-    standing: tuple[str, ...]  # effects that the reference logs show as well; the model has them
+    baseline_effects: tuple[str, ...]  # effects that the reference logs show as well; the model has them
     robot: str
     joints: tuple[str, ...]
     rated: tuple[float, ...]  # [N m]
-    doctor: tuple[Check, ...]
+    data_quality: tuple[Check, ...]
     model: ModelFile | None  # None where nothing was accepted
     laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
     fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws that were asked for, and have more terms than these logs tell apart

@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.result import Answer, NotTestable
+from pipelines.model.diagnosis.result import Answer, NotIdentifiable
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
 from pipelines.model.frf.modes import relative_acceleration
@@ -86,20 +86,20 @@ def _moved(now: Acting, before: Acting) -> bool:
     return abs(one.value - other.value) > max(_MOVED * spread, _SAME * other.value)
 
 
-def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotTestable, ...]:
+def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIdentifiable, ...]:
     """Causes that only frequency responses tell, where there are none, or where they leave it open."""
     reason = "only frequency responses tell it, and there is no frf log" if told is None else told.open
     named = () if told is None else tuple(one.effect.name for one in told.named)
-    return tuple(NotTestable(kind.name, None, reason, kind.experiment) for kind in all_effects()
+    return tuple(NotIdentifiable(kind.name, None, reason, kind.experiment) for kind in all_effects()
                  if reason and kind.evidence == "frequency responses" and kind.name not in (*named, *without))
 
 
-def gaps_untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotTestable, ...]:
+def gaps_untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIdentifiable, ...]:
     """Causes at reversals, which have a name only beside frequency responses that name no spring."""
     if told is not None and not told.named:
         return ()
     reason, first = (_NO_RESPONSES, "Measure frequency responses, which tell a spring. ") if told is None else (_GIVES_WAY, "")
-    return tuple(NotTestable(kind.name, None, reason, f"{first}{kind.experiment}")
+    return tuple(NotIdentifiable(kind.name, None, reason, f"{first}{kind.experiment}")
                  for kind in all_effects() if kind.evidence == "reversals" and kind.name not in without)
 
 
