@@ -3,26 +3,27 @@
     python -m benchmarks.judgeable FOLDER...        folders of logs, each a session
     python -m benchmarks.judgeable FOLDER... --keep facts.jsonl     add to these, and print all
 
-Each session is diagnosed once, and once more without its simulated arm where it has one, so that no
-noise floor is known. The facts are kept; the verdict "nothing-wrong" is then decided with half of,
-once and twice `JudgeableConfig.largest_share`.
+Each session is diagnosed once. The facts are kept; the verdict "no-fault-found" is then decided with
+half of, once and twice `JudgeableConfig.largest_share`.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from pipelines import diagnose
+from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.errors import RrridError
 from pipelines.model.diagnosis.answered.judgeable import facts, nominal_estimate
 from pipelines.model.diagnosis.asked.gates import logs_of_roles
+from pipelines.model.diagnosis.asked.inputs import prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
 from pipelines.model.estimation.judgeable import Facts, JudgeableConfig, cannot_judge
 from pipelines.stage import Request
 
@@ -39,30 +40,26 @@ def main() -> None:
     given = parser.parse_args()
     lines = _lines(given.keep)
     for folder in given.folders:
-        for floor in (True, False):
-            name = f"{folder.resolve().parent.name}/{folder.resolve().name}{'' if floor else ', no floor'}"
-            known = lines.get(name.removesuffix(", no floor"), {})
-            if name in lines or (not floor and known.get("origin") != "twin"):
-                continue
-            lines[name] = asked(folder, floor)
-            with given.keep.open("a", encoding="utf-8") as file:
-                file.write(json.dumps({"name": name, **lines[name]}) + "\n")
+        name = f"{folder.resolve().parent.name}/{folder.resolve().name}"
+        if name in lines:
+            continue
+        lines[name] = asked(folder)
+        with given.keep.open("a", encoding="utf-8") as file:
+            file.write(json.dumps({"name": name, **lines[name]}) + "\n")
     _table(lines)
 
 
-def asked(folder: Path, floor: bool) -> dict[str, Any]:
+def asked(folder: Path) -> dict[str, Any]:
     """Return verdict, origin of the floor, and facts of one diagnosis; or why it was refused."""
-    wanted = diagnose.Settings(allow_mismatch=True)
-    settings = wanted if floor else replace(wanted, replicas=0)
+    settings = diagnose.Settings(allow_mismatch=True)
     try:
         inputs = diagnose.read(Request((folder,)), settings)
         found = diagnose.compute(inputs, settings, whole=False)
     except RrridError as refused:
         return {"refused": f"{refused.code}: {refused.message}"}
-    assert found.memory is not None
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
-    engine = DiagnosisSettings(settings.replicas, evidence=False, limits=False)
-    prepared = found.memory.prepared(chosen, engine, None)
+    rows = DiagnosisSettings(cutoff_hz=DiagnosisConfig.cutoff_hz)
+    prepared = with_terms_told_apart(prepare(chosen, rows), settings.blocks)
     known = facts(found, prepared, nominal_estimate(prepared))
     return {"verdict": found.verdict, "origin": found.floor_origin,
             "findings": [f"{one.cause}:{one.joint}" for one in found.findings],
@@ -73,12 +70,12 @@ def asked(folder: Path, floor: bool) -> dict[str, Any]:
 
 def decided(line: dict[str, Any], times: float) -> str:
     """Return the verdict with so many times the share."""
-    if line["verdict"] not in ("nothing-wrong", "cannot-judge"):
+    if line["verdict"] not in ("no-fault-found", "cannot-judge"):
         return str(line["verdict"])
     left, torque, std = (np.array(line[name]) for name in ("left", "torque", "std"))
     known = Facts(left, torque, std, line["unresolved"], np.array(line["floor_known"]))
     config = JudgeableConfig(times * JudgeableConfig.largest_share)
-    return "cannot-judge" if cannot_judge(known, config) else "nothing-wrong"
+    return "cannot-judge" if cannot_judge(known, config) else "no-fault-found"
 
 
 def _lines(kept: Path) -> dict[str, dict[str, Any]]:

@@ -29,7 +29,7 @@ def answer(folder: Path, exclude: tuple[str, ...]) -> dict[str, Any]:
     """Return the fields of `rrrid diagnose --json` that the judge of `hidden_effects` reads."""
     found = diagnosed(folder, exclude)
     verdict = (
-        "nothing-wrong" if found.decision.verdict == "no-fault-found" else found.decision.verdict
+        found.decision.verdict
     )
     nothing: dict[str, Any] = {
         "validate_torque_rms": {"after": []},
@@ -42,7 +42,7 @@ def answer(folder: Path, exclude: tuple[str, ...]) -> dict[str, Any]:
             "cause": cause.key[0],
             "joint": cause.key[1],
             "gain": nothing,
-            "rivals": [{"cause": name, "joint": joint} for name, joint in cause.alternatives],
+            "alternatives": [{"cause": name, "joint": joint} for name, joint in cause.alternatives],
             "parameters": {
                 name: {"value": value, "std": None} for name, value in one.values.items()
             },
@@ -53,9 +53,9 @@ def answer(folder: Path, exclude: tuple[str, ...]) -> dict[str, Any]:
         "verdict": verdict,
         "reason": found.decision.reason,
         "findings": findings,
-        "standing": [],
-        "not_testable": [],
-        "residual_rms": {"floor": []},
+        "baseline_effects": [],
+        "not_identifiable": [],
+        "residual_rms": {"noise_floor": []},
     }
 
 

@@ -21,27 +21,23 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.engine import diagnose_prepared
+from pipelines.diagnosis.selection import Selection
 from pipelines.import_log import STAGE, Settings
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.believed.pruned import settled
-from pipelines.model.diagnosis.fitted.exact import Exact
-from pipelines.model.diagnosis.fitted.nominal import fit_nominal
-from pipelines.model.diagnosis.floor.drive_noise import white
-from pipelines.model.diagnosis.given.clean import clean
-from pipelines.model.diagnosis.named.verdict import rule
 from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.diagnosis.screened.candidates import families, whole_motion
-from pipelines.model.diagnosis.searched.case import Case
-from pipelines.model.diagnosis.searched.search import Found, provisional, search
 from pipelines.stage import Request, run_stage
 
 __all__ = ["TX40", "Judged", "Step", "fold", "imported", "judged_odrive", "judged_tx40", "main", "searched"]
 
-TX40 = DiagnosisSettings(replicas=0, most=8, cutoff_hz=100.0, decimation=100, min_speed=(0.05, 0.05, 0.05, 0.12, 0.12, 0.12))
-_ODRIVE = DiagnosisSettings(replicas=0, most=9, cutoff_hz=40.0)
+TX40 = DiagnosisSettings(cutoff_hz=100.0, decimation=100, min_speed=(0.05, 0.05, 0.05, 0.12, 0.12, 0.12))
+_TX40_CAUSES = 8  # at most
+_ODRIVE = DiagnosisSettings(cutoff_hz=40.0)
+_ODRIVE_CAUSES = 9
 _GUARD = 1  # rows to either side of a held-out block: the low-pass reaches half a row
 
 
@@ -88,31 +84,29 @@ def fold(data: Data, number: int, count: int) -> tuple[Data, Data]:
             replace(data, logs=(replace(one, weighed=one.weighed & inside),)))
 
 
-def searched(prepared: Prepared, settings: DiagnosisSettings) -> Found:
-    """The search of `diagnose` where no floor is known, no twin and no reference logs, and what it keeps of it.
-
-    Without simulated windows: they would run through the time that is held out.
-    """
-    columns, fit = fit_nominal(prepared.data, prepared.columns)
-    model = Exact.start(columns, fit)
-    every = families(columns.laws, whole_motion(prepared.data), model.arm, settings.without)
-    case = Case(prepared.data, None, model, fit.weight, every, None, settings.blocks)
-    rough = provisional(case)
-    floor = white(prepared.data, clean(rough[-1]))
-    found = search(case, settings.most, rough)
-    return settled(found, rule(found, floor, False), case, replace(prepared, motions=(), judging=()), floor, False).found
+def searched(
+    prepared: Prepared, settings: DiagnosisSettings, most: int, exclude: Sequence[str] = ()
+) -> Selection:
+    """Return the causes that `diagnose` selects without reference logs, `most` at most."""
+    usual = DiagnosisConfig()
+    config = replace(usual, causes=most, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
+    return diagnose_prepared(prepared, config, exclude).look.selection
 
 
-def judged(what: str, found: Found, judge: Data, seconds: float) -> Judged:
-    """Every step of a search on `judge`, and what is kept of it."""
-    models = [("nominal", found.nominal.model)]
-    models += [(place(step.best.effect.name, step.best.effect.joint), step.best.done.model) for step in found.steps if step.best]
+def judged(what: str, found: Selection, judge: Data, seconds: float) -> Judged:
+    """Return what the model of every round leaves of `judge`, and that of the selection."""
+    models = [("nominal", found.start.model)]
+    models += [
+        (place(*one.cause.key), one.state.model)
+        for one in found.rounds
+        if one.cause is not None and one.state is not None
+    ]
     steps = []
-    for name, model in (*models, ("kept", found.final.model)):
+    for name, model in (*models, ("kept", found.end.model)):
         left = np.where(judge.counts, judge.y - model.torque(judge), 0.0)
         own = tuple(float(np.sum(left[judge.joint == j] ** 2)) for j in range(judge.n_joints))
         steps.append(Step(name, float(left @ left), own))
-    causes = tuple(place(one.effect.name, one.effect.joint) for one in found.final.model.effects)
+    causes = tuple(place(one.effect.name, one.effect.joint) for one in found.end.model.effects)
     return Judged(what, float(np.sum(np.where(judge.counts, judge.y, 0.0) ** 2)), tuple(steps[:-1]), steps[-1], causes, seconds)
 
 
@@ -127,19 +121,19 @@ def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: Diagno
     for number in numbers:
         begin = time.process_time()
         train, judge = fold(prepared.data, number, count)
-        found = searched(replace(prepared, data=train), settings)
+        found = searched(replace(prepared, data=train), settings, _TX40_CAUSES)
         out.append(judged(f"block {number + 1} of {count}", found, judge, time.process_time() - begin))
         print(f"  {out[-1].what}: " + ", ".join(f"{step.name} {100 * error:.2f} %"
                                               for step, error in zip(out[-1].steps, out[-1].errors, strict=True)), flush=True)
     return out
 
 
-def judged_odrive(data: Path, settings: DiagnosisSettings = _ODRIVE) -> tuple[Found, list[Judged]]:
+def judged_odrive(data: Path, settings: DiagnosisSettings = _ODRIVE) -> tuple[Selection, list[Judged]]:
     """The search on two runs, judged on the others, none of which it saw."""
     logs = imported("odrive", data)
     begin = time.process_time()
     prepared = prepare(Logs((logs["nocomp_0"], logs["nocomp_1"])), settings)
-    found = searched(prepared, settings)
+    found = searched(prepared, settings, _ODRIVE_CAUSES)
     seconds = time.process_time() - begin
     out = []
     for name in ("nocomp_2", "comp_0", "slower_nocomp_0", "slower_comp_0"):
@@ -196,14 +190,12 @@ def _print_tx40(data: Path, count: int) -> None:
 def _print_odrive(data: Path) -> None:
     print("ODrive")
     found, runs = judged_odrive(data)
-    for step in found.steps:
-        if step.best is not None:
-            values = step.best.done.model.effects[-1].values
-            print(f"  {step.best.effect.name:22s}", ", ".join(f"{name} {value:.4g}" for name, value in values.items()))
-    inertia = float(found.final.model.beta[0])
+    for one in found.end.model.effects:
+        print(f"  {one.effect.name:22s}", ", ".join(f"{name} {value:.4g}" for name, value in one.values.items()))
+    inertia = float(found.end.model.beta[0])
     print(f"  inertia {inertia:.3g} kg m^2 (2.5e-4 within 30 %: 1.75e-4 to 3.25e-4)")
-    for one in runs:
-        print(f"  {one.what:18s} held-out error " + " -> ".join(f"{100 * error:.1f}" for error in one.errors) + " %")
+    for run in runs:
+        print(f"  {run.what:18s} held-out error " + " -> ".join(f"{100 * error:.1f}" for error in run.errors) + " %")
     print(f"  {runs[0].seconds:.0f} s of CPU")
 
 

@@ -86,21 +86,21 @@ def test_what_moved_is_named(tmp_path: Path) -> None:
 def test_findings_that_come_or_go(tmp_path: Path) -> None:
     """A verdict and its causes differ by what they say."""
     cogging = [{"cause": "cogging", "joint": 2}]
-    a = written(tmp_path / "a", 1, verdict="nothing-wrong", findings=[], standing=[])
-    b = written(tmp_path / "b", 2, verdict="cause", findings=cogging, standing=[{"cause": "gravity_tilt", "joint": None}])
+    a = written(tmp_path / "a", 1, verdict="no-fault-found", findings=[], baseline_effects=[])
+    b = written(tmp_path / "b", 2, verdict="cause", findings=cogging, baseline_effects=[{"cause": "gravity_tilt", "joint": None}])
     outcome = go(tmp_path, a, b)
     assert [(one.what, one.a, one.b) for one in outcome.result.answers] == [
-        ("verdict", "nothing-wrong", "cause"), ("findings", "none", "cogging:2"), ("standing", "none", "gravity_tilt")]
+        ("verdict", "no-fault-found", "cause"), ("findings", "none", "cogging:2"), ("baseline_effects", "none", "gravity_tilt")]
     assert "verdict (nothing wrong in a, a cause is named in b)" in outcome.report.verdict
     assert outcome.exit_code == 1
 
 
 def test_an_extension_names_what_stands(tmp_path: Path) -> None:
     """`extend` writes "stribeck:1" where `diagnose` writes an object: both are told alike."""
-    a, b = (written(tmp_path / name, 1, findings=[], standing=standing)
+    a, b = (written(tmp_path / name, 1, findings=[], baseline_effects=standing)
             for name, standing in (("a", ["stribeck:1"]), ("b", [{"cause": "stribeck", "joint": 1}])))
     answers = {one.what: (one.a, one.b, one.differs) for one in go(tmp_path, a, b).result.answers}
-    assert answers["standing"] == ("stribeck:1", "stribeck:1", False)
+    assert answers["baseline_effects"] == ("stribeck:1", "stribeck:1", False)
 
 
 def test_models_are_compared(tmp_path: Path, samples: Path) -> None:

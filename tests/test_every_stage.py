@@ -80,7 +80,7 @@ def _run(module: str, tmp_path: Path, samples: Path, no_report: bool = False) ->
         settings = dataclasses.replace(settings, skip=("diagnose", "extend"))
     if module in ("diagnose", "extend"):
         paths = (written(tmp_path / "brief", session("cogging", 1, 2.0, 1)),)
-        more: dict[str, Any] = {"without": but("cogging"), "replicas": 0, "most": 1} if module == "diagnose" else {
+        more: dict[str, Any] = {"without": but("cogging"), "most": 1} if module == "diagnose" else {
             "causes": ("cogging:1",)}
         settings = dataclasses.replace(settings, **more)
     if module == "demo":

@@ -48,7 +48,7 @@ def test_no_message_speaks_of_a_paper_without_its_name() -> None:
     assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("what", [*STAGES, "batch", "model", "calibration", "log"])
+@pytest.mark.parametrize("what", [*STAGES, "batch", "model", "log"])
 def test_no_schema_speaks_of_a_paper_without_its_name(what: str) -> None:
     texts = re.findall(r'"description": "((?:[^"\\]|\\.)*)"', json.dumps(_schema(what), ensure_ascii=False))
     assert not [text for text in texts if nameless(text)]

@@ -85,7 +85,7 @@ def test_it_is_said_whose_friction_went_in(whole: Outcome[run.Result], samples: 
 
 
 def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(samples: Path, tmp_path: Path) -> None:
-    words = ("diagnose", samples / "rrr-closed-form/excitation-1.h5", "--replicas", "0", "--out", tmp_path / "out", "--no-report")
+    words = ("diagnose", samples / "rrr-closed-form/excitation-1.h5", "--out", tmp_path / "out", "--no-report")
     told = rrrid(*words, cwd=tmp_path).stdout
     assert "Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run" in told
     assert "--set diagnose.model=FILE" in told
@@ -173,7 +173,7 @@ def test_the_sample_logs_are_three_sessions(samples: Path) -> None:
 def test_one_of_several_robots_does_without_what_fits_another(place: str) -> None:
     """C02 of a robot's stage is that stage's word, where several robots are reported apart; alone it ends the run."""
     def refused(inputs: object, settings: object) -> None:
-        raise UsageError("C02", "the calibration is not for these logs", remedy="leave it out")
+        raise UsageError("C02", "the model has 2 joints", remedy="leave it out")
 
     stage: Any = SimpleNamespace(name="diagnose", compute=refused)
     given: Any = SimpleNamespace(names={}, store=SimpleNamespace(keep=lambda place, key, about, *rest: about))

@@ -30,8 +30,7 @@ __all__ = ["Diagnose", "asked", "by_command", "by_compute", "engine_named", "jud
 
 Diagnose = Callable[[Path, tuple[str, ...]], Any]
 Task = tuple[Sealed, tuple[str, ...]]
-_KEPT = ("verdict", "findings", "standing", "rejected", "not_testable", "residual_rms", "reason", "floor_origin",
-         "held_out_floor")
+_KEPT = ("verdict", "findings", "baseline_effects", "rejected", "not_identifiable", "residual_rms", "reason", "floor_origin")
 
 
 def by_command(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
@@ -44,7 +43,7 @@ def by_command(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
 
 def by_compute(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
     """What `by_command` says without detection limits, series of figures and a folder of output: verdict, findings and numbers are
-    the same, `not_testable` lacks causes of which the limits say that no arm could have so much."""
+    the same, `not_identifiable` lacks causes of which the limits say that no arm could have so much."""
     module = importlib.import_module("pipelines.diagnose")
     settings = module.Settings(without=without)
     found: Mapping[str, Any] = encode(module.compute(module.read(Request((folder,)), settings), settings, whole=False))[0]

@@ -24,7 +24,7 @@ from pipelines.log.files import write_log
 
 __all__ = ["Sealed", "answers_in", "make_case", "make_cases", "seal"]
 
-_VERDICTS = {"zero": "nothing-wrong", "outside": "unknown", "invisible": "not-testable", "uncentred": "flagged"}
+_VERDICTS = {"zero": "no-fault-found", "outside": "unknown", "invisible": "not-testable", "uncentred": "flagged"}
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Sealed:
 
     key: str
     family: str
-    verdict: str  # what a diagnosis should say: "cause", "nothing-wrong", "unknown"; "not-testable", "flagged" (anything)
+    verdict: str  # what a diagnosis should say: "cause", "no-fault-found", "unknown"; "not-testable", "flagged" (anything)
     findings: tuple[dict[str, Any], ...]  # cause, joint, parameters of each true cause; of "not-testable" what it must name
     standing: tuple[dict[str, Any], ...]
     case: dict[str, Any]  # the SealedCase, whose strength, session and so on the table is split by
@@ -80,8 +80,8 @@ def make_case(case: SealedCase, out: Path) -> bool:
 
 def seal(case: SealedCase, session: Session) -> Sealed:
     """The answer of a case."""
-    verdict = _VERDICTS.get(case.family, "cause" if case.hidden else "nothing-wrong")
-    findings = answer(session.hidden) if verdict != "nothing-wrong" else []
+    verdict = _VERDICTS.get(case.family, "cause" if case.hidden else "no-fault-found")
+    findings = answer(session.hidden) if verdict != "no-fault-found" else []
     return Sealed(case.key, case.family, verdict, tuple(findings), tuple(answer(session.standing)), asdict(case))
 
 

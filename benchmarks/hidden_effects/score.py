@@ -43,8 +43,7 @@ class Score:
     joint: bool | None = None  # of the first finding, where one joint is to be named
     parameters: tuple[tuple[str, bool], ...] = ()  # "cogging order", whether it agrees
     angles: tuple[tuple[str, bool], ...] = ()
-    residual: float | None = None  # held-out residual over the floor of the held-out logs, all findings, worst joint
-    over_fitted: float | None = None  # the same over the floor of the fitted logs
+    residual: float | None = None  # held-out residual over the noise floor, with all findings, of the worst joint
     simulated: bool | None = None  # the simulated position error fell; None: nothing was named, or nothing simulated
     seconds: float = math.nan
     case: Mapping[str, Any] = field(default_factory=dict)
@@ -69,8 +68,7 @@ def score(sealed: Sealed, said: Said, seconds: float = math.nan, without: Sequen
         sealed.key, "taken out" if without else sealed.family, kinds, sealed.strength, said.verdict,
         tuple(found.cause for found in said.findings), _right(sealed, said, true, without, twins or {}), len(true),
         len(pairs) - len(true), _joint(first, truths), tuple(named), tuple(angles),
-        _over_floor(said, said.held_out_floor or said.floor) if true else None, _over_floor(said, said.floor) if true else None,
-        _fell(said.findings) if true else None, seconds, sealed.case)
+        _over_floor(said, said.floor) if true else None, _fell(said.findings) if true else None, seconds, sealed.case)
 
 
 def same_place(found: Found, truth: Mapping[str, Any]) -> bool:
@@ -97,7 +95,7 @@ def _right(sealed: Sealed, said: Said, true: Sequence[object], without: Sequence
         case "cause":
             return _first(sealed, said)
         case "not-testable":
-            return not said.findings and all(said.not_testable.get(truth["cause"]) for truth in sealed.findings)
+            return not said.findings and all(said.not_identifiable.get(truth["cause"]) for truth in sealed.findings)
         case "flagged":
             return said.verdict in ("cause", "unknown")
         case expected:

@@ -27,12 +27,11 @@ class Found:
 class Said:
     """One answer."""
 
-    verdict: str  # "cause", "nothing-wrong", "unknown", "cannot-judge"; "refused" and "crashed" where there is none
+    verdict: str  # "cause", "no-fault-found", "unknown", "cannot-judge"; "refused" and "crashed" where there is none
     findings: tuple[Found, ...] = ()
     standing: tuple[Place, ...] = ()
-    not_testable: Mapping[str, str] = field(default_factory=dict)  # cause -> reason
-    floor: tuple[float, ...] = ()  # [N m] of each joint, of the fitted logs
-    held_out_floor: tuple[float, ...] = ()  # of the held-out ones; empty where nobody knows
+    not_identifiable: Mapping[str, str] = field(default_factory=dict)  # cause -> reason
+    floor: tuple[float, ...] = ()  # [N m] of each joint
 
 
 def read_verdict(answer: Mapping[str, Any]) -> Said:
@@ -43,9 +42,8 @@ def read_verdict(answer: Mapping[str, Any]) -> Said:
     """
     return Said(
         answer["verdict"], tuple(_found(one) for one in answer["findings"]),
-        tuple((one["cause"], one["joint"]) for one in answer["standing"]),
-        {one["cause"]: one["reason"] for one in answer["not_testable"]}, _numbers(answer["residual_rms"]["floor"]),
-        _numbers(answer.get("held_out_floor")))
+        tuple((one["cause"], one["joint"]) for one in answer["baseline_effects"]),
+        {one["cause"]: one["reason"] for one in answer["not_identifiable"]}, _numbers(answer["residual_rms"]["noise_floor"]))
 
 
 def _found(one: Mapping[str, Any]) -> Found:

@@ -109,7 +109,7 @@ def judged(case: Case, line: Mapping[str, Any]) -> tuple[str, str]:
         outcome = "wrong"
     elif not case.fault:
         silent = case.answers or verdict == "cannot-judge"
-        outcome = "right" if verdict == "nothing-wrong" or names else "open" if silent else "wrong"
+        outcome = "right" if verdict == "no-fault-found" or names else "open" if silent else "wrong"
     elif case.answers:
         outcome = "right" if names else "open"
     else:
@@ -124,7 +124,7 @@ def _errors(answer: Mapping[str, Any]) -> str:
     after = min((one["gain"]["validate_torque_rms"]["after"] for one in answer["findings"]), key=lambda each: sum(map(float, each)),
                 default=rms["validate"])
     return "; ".join(f"{a:.3g}>{b:.3g}/{f:.3g}" if None not in (a, b, f) else "-"
-                     for a, b, f in zip(rms["validate"], after, rms["floor"], strict=True))
+                     for a, b, f in zip(rms["validate"], after, rms["noise_floor"], strict=True))
 
 
 if __name__ == "__main__":

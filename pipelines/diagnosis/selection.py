@@ -21,7 +21,9 @@ from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Acting
+from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.coulomb import Coulomb
 
 __all__ = ["Candidate", "Cause", "Round", "Selection", "refit", "select"]
 
@@ -287,14 +289,29 @@ def _candidate(
     start = np.zeros(max(len(amplitudes), _width(later, effect)))
     start[: len(amplitudes)] = amplitudes
     info, moment = later.freed(state.info, state.moment, effect)
+    model = state.model.with_effect(effect, start, log=log)
     try:
-        fitted = later.fit(
-            state.model.with_effect(effect, start, log=log), state.theta, info, moment
-        )
+        fits = [later.fit(one, state.theta, info, moment) for one in (model, *_plainer(model))]
     except np.linalg.LinAlgError:
         return None
+    fitted = min(fits, key=lambda one: one.cost)
     possible = later.possible(fitted, config) and bool(np.isfinite(fitted.losses).all())
     return Candidate(key, gain, fitted, possible)
+
+
+def _plainer(model: Exact) -> tuple[Exact, ...]:
+    """Return the model with the plain sign change at the joint of its last effect, if it has another.
+
+    Fitted without the effect, the curve of the sign change has taken some of it.
+    """
+    columns, joint = model.columns, model.effects[-1].effect.joint
+    plain = tuple(
+        law.plain() if law.joint == joint and isinstance(law, Coulomb) else law
+        for law in columns.laws
+    )
+    if plain == tuple(columns.laws):
+        return ()
+    return (replace(model, columns=replace(columns, laws=plain)),)
 
 
 def _width(later: Later, effect: Effect) -> int:

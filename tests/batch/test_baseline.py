@@ -158,15 +158,15 @@ def test_a_known_cause_that_is_gone_is_told() -> None:
     """Where so strong a one would have been found, it is a change; where these logs would not show it, it is said. One that the
     reference logs show as well is there."""
     baseline = _baseline()  # cogging at joint 2 with 0.5 N m, known to 0.01
-    quiet = item_of("a", figures={"p1": (1.0, STD, "kg m^2")}, diagnosed=True, detectable={"cogging:2": ("amplitude", 0.04)})
+    quiet = item_of("a", figures={"p1": (1.0, STD, "kg m^2")}, diagnosed=True, detection_limits={"cogging:2": ("amplitude", 0.04)})
     judged = against(quiet, baseline)
     assert judged.status == "found"
     assert "cogging:2 is not found any more: amplitude 0.5 N m before, and from 0.04 N m on" in judged.verdict
     for least in (0.48, 0.6):  # 0.5 less 3 std is 0.47
-        deaf = against(_known(quiet, detectable={"cogging:2": ("amplitude", least)}), baseline)
+        deaf = against(_known(quiet, detection_limits={"cogging:2": ("amplitude", least)}), baseline)
         assert deaf.status == "ok"
         assert "cogging:2 is not found, and might be there" in deaf.verdict
-    assert against(_known(quiet, standing=("cogging:2",)), baseline) == _known(quiet, standing=("cogging:2",))
+    assert against(_known(quiet, baseline_effects=("cogging:2",)), baseline) == _known(quiet, baseline_effects=("cogging:2",))
     assert against(_known(quiet, diagnosed=False), baseline).verdict == ""
 
 
@@ -176,9 +176,9 @@ def test_what_the_baseline_cannot_tell_from_nothing_is_not_missed() -> None:
         offset = StoredEffect("torque_offset", 2, {"offset": StoredValue(0.22, std, "N m", "fitted")})
         baseline = dataclasses.replace(_baseline(), effects=(offset,))
         silent = item_of("a", figures={"p1": (1.0, STD, "kg m^2")}, diagnosed=True,
-                         detectable={"torque_offset:2": ("offset", 0.025)})
+                         detection_limits={"torque_offset:2": ("offset", 0.025)})
         assert against(silent, baseline).status == status
-        deaf = _known(silent, detectable={})
+        deaf = _known(silent, detection_limits={})
         assert ("torque_offset:2" in against(deaf, baseline).verdict) is (status == "found")
 
 
@@ -188,7 +188,7 @@ def test_where_something_has_no_name_no_cause_is_gone() -> None:
     said = "Something is wrong that has no name."
     unnamed = dataclasses.replace(
         item_of("a", "found", figures={"p1": (1.0, STD, "kg m^2")}, diagnosed=True, verdict="unknown",
-                detectable={"cogging:2": ("amplitude", 0.04)}), verdict=said)
+                detection_limits={"cogging:2": ("amplitude", 0.04)}), verdict=said)
     judged = against(unnamed, _baseline())
     assert judged.status == "found"
     assert judged.verdict.startswith(f"{said} Of the baseline: cogging:2 is not found, and might be there")
@@ -199,7 +199,7 @@ def test_where_something_has_no_name_no_cause_is_gone() -> None:
     elsewhere = Record("a", "a", "found", 1, verdict=said, parts=parts_of(other, "several", "2026-01-01"), accepts=True)
     words = against(elsewhere, dataclasses.replace(_baseline(), robot='name = "arm"')).verdict
     assert words.startswith(f"{said} Beyond the baseline: arm: cogging:2 amplitude 0.6 N m")
-    unknown = {"verdict": "unknown", "findings": [], "detectable": []}
+    unknown = {"verdict": "unknown", "findings": [], "detection_limits": []}
     assert [part.verdict for part in parts_of(unknown, "arm", "2026-01-01")] == ["unknown"]
 
 
@@ -210,8 +210,8 @@ def _run(name: str, robot: str, amplitude: float | None, p1: float = 1.0) -> dic
     least = [{"cause": "cogging", "joint": 2, "parameter": "amplitude", "smallest": {"value": 0.04, "std": None, "unit": "N m"}}]
     figure = {"name": "p1", "value": p1, "std": STD, "unit": "kg m^2"}
     estimated = {"name": "estimate-bps", "exit": 0, "result": {"robot": robot, "parameters": [figure]}}
-    return {"name": name, "stages": [estimated], "verdict": "cause" if findings else "nothing-wrong", "findings": findings,
-            "standing": [], "detectable": least}
+    return {"name": name, "stages": [estimated], "verdict": "cause" if findings else "no-fault-found", "findings": findings,
+            "baseline_effects": [], "detection_limits": least}
 
 
 def test_several_robots_in_one_folder_are_held_against_the_baseline() -> None:

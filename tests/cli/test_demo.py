@@ -17,7 +17,7 @@ import pytest
 from pipelines import demo
 from pipelines.errors import InputRejected
 from pipelines.log.files import write_log
-from pipelines.model.diagnosis.result import Diagnosis, Finding, NotTestable, Value
+from pipelines.model.diagnosis.result import Diagnosis, Finding, NotIdentifiable, Value
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.simulation.example import FAULT, example_arm, example_session
 from pipelines.stage import Request
@@ -102,12 +102,12 @@ def test_the_end_lays_what_was_found_beside_what_was_hidden() -> None:
     one = Finding(**(bare | {"cause": "cogging", "joint": 2, "parameters": numbers}))
 
     def end(verdict: str, *findings: Finding) -> str:
-        nothing: Any = {field.name: None for field in fields(Diagnosis)} | {"not_testable": ()}
+        nothing: Any = {field.name: None for field in fields(Diagnosis)} | {"not_identifiable": ()}
         return demo.ending(recorded, Diagnosis(**(nothing | {"verdict": verdict, "findings": findings})))[1]
 
     assert demo.ending(recorded, None)[0] == "Was hidden: cogging at joint 2 (order 18 per rev, amplitude 0.4 N m)."
     assert end("cause", one) == "Was found:  cogging at joint 2 (order 18.0010 ± 0.0020 per rev, amplitude 0.3990 ± 0.0020 N m)."
-    assert len({end("nothing-wrong"), end("unknown"), demo.ending(recorded, None)[1]}) == 3
+    assert len({end("no-fault-found"), end("unknown"), demo.ending(recorded, None)[1]}) == 3
 
 
 @pytest.mark.parametrize(("fault", "joint", "blind"), [
@@ -115,9 +115,9 @@ def test_the_end_lays_what_was_found_beside_what_was_hidden() -> None:
     ("rotor_inertia:3:inertia=0.1", 1, False), ("torque_gain:1:gain_error=0.1", None, False)])
 def test_what_such_logs_cannot_show_is_said_with_what_would(fault: str, joint: int | None, blind: bool) -> None:
     """A spring that only frequency responses tell: nothing was found, for another reason than that nothing is there."""
-    beyond = NotTestable(fault.split(":")[0], joint, "needs what nobody recorded", "Record that.")
+    beyond = NotIdentifiable(fault.split(":")[0], joint, "needs what nobody recorded", "Record that.")
     nothing: Any = {field.name: None for field in fields(Diagnosis)}
-    found = Diagnosis(**(nothing | {"verdict": "nothing-wrong", "findings": (), "not_testable": (beyond,)}))
+    found = Diagnosis(**(nothing | {"verdict": "no-fault-found", "findings": (), "not_identifiable": (beyond,)}))
     _, second, *more = demo.ending(demo.Result("arm", (fault,), ()), found)
     assert second.startswith("Was found:  nothing; of " if blind else "Was found:  nothing.")
     assert ("such logs say nothing: needs what nobody recorded" in second) is blind

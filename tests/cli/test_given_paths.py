@@ -13,8 +13,8 @@ from tests.log.logs import small_log
 
 
 @pytest.mark.parametrize(("words", "place"), [
-    (("diagnose", "logs", "--calibration", "empty"), "empty: "), (("diagnose", "logs", "--identify", "no.h5"), "no.h5: "),
-    (("run", "logs", "--set", "diagnose.calibration=empty"), "empty: "), (("report", "empty"), "empty: "),
+    (("diagnose", "logs", "--identify", "no.h5"), "no.h5: "),
+    (("report", "empty"), "empty: "),
     (("run", "no", "--dry-run"), "no: "), (("batch", "empty"), "empty: "), (("batch", "./empty"), "empty: "),
     (("batch", "."), ".: "),
     (("batch", "../w/logs", "--out", "../w/logs/out"), "../w/logs/out: lies inside the input ../w/logs."),

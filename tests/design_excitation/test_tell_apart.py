@@ -70,14 +70,14 @@ def test_the_two_look_less_alike(both: dict[str, Outcome[Result]]) -> None:
     (0.81, "0.81", "attention"), (0.8004, "0.8004", "attention"), (0.797, "0.797", "good"), (0.004, "0.004", "good")])
 def test_a_design_that_leaves_rivals_is_not_called_good(both: dict[str, Outcome[Result]], similarity: float, shown: str,
                                                         tone: str) -> None:
-    """What diagnose would still call rivals was not told apart; rounding puts no figure on the other side of 0.8."""
+    """What diagnose would still call alternatives was not told apart; rounding puts no figure on the other side of 0.8."""
     result = both["apart"].result
     assert result.apart is not None
     apart = replace(result.apart, after=replace(result.apart.after, similarity=similarity))
     report = excitation_report(replace(result, apart=apart))
     assert report.tone == tone
     assert f"look alike by {shown} " in report.verdict
-    assert ("still call them rivals" in report.verdict) == (tone == "attention")
+    assert ("still call them alternatives" in report.verdict) == (tone == "attention")
 
 
 def test_a_robot_that_nobody_named_is_said_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -140,7 +140,7 @@ def test_a_wave_is_told_from_a_spring(tmp_path: Path) -> None:
     """Of a wave of no given order gravity has the first one: that one nobody has found, and the others can be told."""
     found = designed(tmp_path / "out", "spring:2", "cogging:2", evaluations=20).result.apart
     assert found is not None
-    assert min(found.after.visibility) > 0.01
+    assert min(found.after.identifiability) > 0.01
     assert 0.0 < found.after.similarity < 1.0
 
 

@@ -16,18 +16,17 @@ from pipelines.diagnosis import engine
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import encode
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose as diagnosed
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.stage import Request
 from tests.diagnose.sessions import but, healthy_again, session, written
 from tests.healthy import fourier, make_log, with_signal
+from tests.model.diagnosis.asking import answered
 
 FEW = but("torque_offset", "torque_gain")
 
 
 def undescribed(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
-    """Return the logs without their controller: no simulated arm tells the noise floor."""
+    """Return the logs without their controller."""
     return [replace(log, controller=None) for log in logs]
 
 
@@ -40,8 +39,8 @@ def rubbing(logs: Sequence[ExperimentLog], size: float) -> list[ExperimentLog]:
     return [with_signal(log, tau=torque(log)) for log in logs]
 
 
-def asked(logs: Sequence[ExperimentLog], replicas: int = 0) -> Diagnosis:
-    return diagnosed(Logs.by_role(logs), DiagnosisSettings(replicas=replicas, most=1, without=FEW, evidence=False, limits=False))
+def asked(logs: Sequence[ExperimentLog]) -> Diagnosis:
+    return answered(Logs.by_role(logs), exclude=FEW)
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +69,7 @@ def test_the_report_does_not_call_it_nothing_wrong(rubbed: diagnose.Result) -> N
 
 
 def test_a_model_that_leaves_next_to_nothing_needs_no_floor() -> None:
-    assert asked(undescribed(session())).verdict == "nothing-wrong"
+    assert asked(undescribed(session())).verdict == "no-fault-found"
 
 
 def test_reference_logs_are_a_noise_floor() -> None:
@@ -79,7 +78,7 @@ def test_reference_logs_are_a_noise_floor() -> None:
     assert engine.diagnose([*logs, *healthy_again(logs)]).decision.verdict == "no-fault-found"
 
 
-@pytest.mark.parametrize(("repeated", "verdict"), [(True, "nothing-wrong"), (False, "cannot-judge")])
+@pytest.mark.parametrize(("repeated", "verdict"), [(True, "no-fault-found"), (False, "cannot-judge")])
 def test_repeated_periods_are_a_noise_floor(repeated: bool, verdict: str) -> None:
     """Noise of some hundredths of the torque in a motion that comes three times: what differs from time to time is noise."""
     rng, logs = np.random.default_rng(5), []

@@ -11,11 +11,10 @@ import pytest
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.motion import Reconstruction, reconstruct
 from tests.diagnose.sessions import but, session
+from tests.model.diagnosis.asking import answered
 
 _HZ = 40.0
 
@@ -37,8 +36,7 @@ def smooth(x: Array, rate: float) -> Array:
 
 def found(judging: Sequence[ExperimentLog]) -> Diagnosis:
     fitted = tuple(log for log in session("cogging", 2) if log.role == "identify")
-    chosen = DiagnosisSettings(replicas=0, most=1, without=but("cogging", "torque_offset"), evidence=False, limits=False)
-    return diagnose(Logs(fitted, tuple(judging)), chosen)
+    return answered(Logs(fitted, tuple(judging)), exclude=but("cogging", "torque_offset"))
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ class Told:
 
 
 @pytest.mark.parametrize(("verdict", "said", "told"), [
-    ("nothing-wrong", (OTHER, LATE), True), ("nothing-wrong", (OTHER,), False), ("cause", (LATE,), False)])
+    ("no-fault-found", (OTHER, LATE), True), ("no-fault-found", (OTHER,), False), ("cause", (LATE,), False)])
 @pytest.mark.parametrize("reason", ["", "no floor"])
 def test_that_all_logs_are_late_is_in_the_verdict(verdict: str, said: tuple[Check, ...], told: bool, reason: str) -> None:
     before: Any = Told(verdict, reason)

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 
 from benchmarks.recorded_diagnosis import Judged, imported, judged_odrive, judged_tx40, nested_error, payoff, searched
+from pipelines.diagnosis.selection import Selection
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.searched.search import Found
 
 _FOLDS = 5
 _TORQUE_CONSTANT = 0.0551  # N m/A
 
 
-def names(found: Found) -> list[str]:
-    return [step.best.effect.name for step in found.steps if step.best is not None]
+def names(found: Selection) -> list[str]:
+    return [one.key[0] for one in found.causes]
 
 
 @pytest.fixture(scope="module")
@@ -53,24 +53,24 @@ def test_tx40_has_no_effect_that_does_not_pay_held_out(tx40: list[Judged]) -> No
 
 
 @pytest.fixture(scope="module")
-def odrive(shared: Path) -> tuple[Found, list[Judged]]:
+def odrive(shared: Path) -> tuple[Selection, list[Judged]]:
     return judged_odrive(shared / "real")
 
 
 @pytest.mark.slow
-def test_odrive_ripple_lag_and_inertia(odrive: tuple[Found, list[Judged]]) -> None:
+def test_odrive_ripple_lag_and_inertia(odrive: tuple[Selection, list[Judged]]) -> None:
     """Seven pole pairs; a logged current that is a tenth of a second late; and the rotor's inertia behind it."""
     found, _ = odrive
     assert names(found)[:2] == ["cogging", "torque_lag"]
-    orders = [one.values["order"] for one in found.final.model.effects if one.effect.name == "cogging"]
+    orders = [one.values["order"] for one in found.end.model.effects if one.effect.name == "cogging"]
     assert orders[0] == pytest.approx(7.0, rel=0.005)
     for line in (12.0, 28.0):
         assert min(abs(np.array(orders) - line)) < 0.005 * line
-    assert 1.75e-4 <= found.final.model.beta[0] <= 3.25e-4
+    assert 1.75e-4 <= found.end.model.beta[0] <= 3.25e-4
 
 
 @pytest.mark.slow
-def test_odrive_ripple_is_that_of_the_holding_current(odrive: tuple[Found, list[Judged]], shared: Path) -> None:
+def test_odrive_ripple_is_that_of_the_holding_current(odrive: tuple[Selection, list[Judged]], shared: Path) -> None:
     """The current that holds the rotor at each angle, from either side, was recorded at rest; nothing here was fitted to it."""
     found, _ = odrive
     forward, reverse = (np.genfromtxt(shared / "real" / "odrive" / f"holding_current_{way}.csv", delimiter=",", skip_header=1)
@@ -78,14 +78,14 @@ def test_odrive_ripple_is_that_of_the_holding_current(odrive: tuple[Found, list[
     grid = np.arange(0.0, 8192.0, 16.0)
     mean = sum(0.5 * np.interp(grid, *one[np.argsort(one[:, 0])].T, period=8192.0) for one in (forward, reverse))
     lines = 2.0 * _TORQUE_CONSTANT * np.abs(np.fft.rfft(mean)) / len(grid)
-    waves = [one.values for one in found.final.model.effects if one.effect.name == "cogging"]
+    waves = [one.values for one in found.end.model.effects if one.effect.name == "cogging"]
     amplitude = {round(wave[f"order{tail}"]): wave[f"amplitude{tail}"] for wave in waves for tail in ("_3", "_2", "")}
     for order in (np.argsort(lines[1:])[::-1][:5] + 1).tolist():
         assert amplitude[order] == pytest.approx(lines[order], rel=0.25), order
 
 
 @pytest.mark.slow
-def test_odrive_error_on_runs_that_chose_nothing(odrive: tuple[Found, list[Judged]]) -> None:
+def test_odrive_error_on_runs_that_chose_nothing(odrive: tuple[Selection, list[Judged]]) -> None:
     """6 % at the speed that was fitted, 12 % at a third of it."""
     last = {one.what: one.errors[-1] for one in odrive[1]}
     assert last["nocomp_2"] <= 0.06
@@ -95,6 +95,6 @@ def test_odrive_error_on_runs_that_chose_nothing(odrive: tuple[Found, list[Judge
 def test_odrive_in_brief(shared: Path) -> None:
     """The two greatest causes, in the order of their size: the ripple of seven pole pairs, and the lag of the logged current."""
     logs = imported("odrive", shared / "real")
-    brief = DiagnosisSettings(replicas=0, most=2, cutoff_hz=40.0, without=("contact", "presliding", "backlash"))
-    found = searched(prepare(Logs((logs["nocomp_0"],), ()), brief), brief)
+    brief = DiagnosisSettings(cutoff_hz=40.0)
+    found = searched(prepare(Logs((logs["nocomp_0"],), ()), brief), brief, 2, ("contact", "presliding", "backlash"))
     assert names(found) == ["cogging", "torque_lag"]

@@ -14,27 +14,27 @@ import pytest
 
 from pipelines import diagnose, run
 from pipelines.errors import UsageError
-from pipelines.model.diagnosis.memory import Memory
 from pipelines.stage import Outcome, Request, run_stage
-from tests.diagnose.sessions import but, session, written
+from tests.diagnose.sessions import but, healthy_again, session, written
 
 FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
-TOP = {"verdict", "findings", "standing", "rejected", "detectable", "not_testable", "residual_rms"}
-FINDING = {"cause", "joint", "parameters", "explained", "visibility", "rivals", "experiment", "gain"}
+TOP = {"verdict", "findings", "baseline_effects", "rejected", "detection_limits", "not_identifiable", "residual_rms"}
+FINDING = {"cause", "joint", "parameters", "explained", "identifiability", "alternatives", "experiment", "gain"}
 GAIN = {"validate_torque_rms", "simulated_position_rms", "simulation", "simulated_span", "tip_error_rms"}
 
 
 def asked(folder: Path, out: Path, **settings: object) -> Outcome[diagnose.Result]:
     """The stage, its library cut down."""
-    chosen = diagnose.Settings(**({"without": FEW, "replicas": 0, "most": 1} | settings))  # type: ignore[arg-type]
+    chosen = diagnose.Settings(**({"without": FEW, "most": 1} | settings))  # type: ignore[arg-type]
     return run_stage(diagnose.STAGE, Request((folder,), out=out, no_report=True, check=True), chosen)
 
 
 @pytest.fixture(scope="module")
 def rippled(tmp_path_factory: pytest.TempPathFactory) -> Outcome[diagnose.Result]:
-    """Cogging at joint 2."""
+    """Cogging at joint 2, since reference logs."""
     place = tmp_path_factory.mktemp("cogging")
-    return asked(written(place / "logs", session("cogging", 2)), place / "out")
+    logs = (*healthy_again(session()), *session("cogging", 2))
+    return asked(written(place / "logs", logs), place / "out")
 
 
 @pytest.mark.slow
@@ -54,9 +54,9 @@ def test_the_result_holds_what_the_contract_says(rippled: Outcome[diagnose.Resul
     assert finding["gain"]["simulation"] == "closed-loop"
     assert all(set(one) == {"value", "std", "unit"} for one in finding["parameters"].values())
     assert set(stored["residual_rms"]) == {"identify", "validate", "floor"}
-    assert all(set(one) >= {"cause", "joint", "smallest"} for one in stored["detectable"])
-    assert all(set(one["smallest"]) >= {"value", "unit"} for one in stored["detectable"])
-    assert all(set(one) >= {"cause", "reason"} for one in (*stored["not_testable"], *stored["rejected"]))
+    assert all(set(one) >= {"cause", "joint", "minimum"} for one in stored["detection_limits"])
+    assert all(set(one["minimum"]) >= {"value", "unit"} for one in stored["detection_limits"])
+    assert all(set(one) >= {"cause", "reason"} for one in (*stored["not_identifiable"], *stored["rejected"]))
 
 
 def test_a_cause_is_named_with_its_joint_and_its_numbers(rippled: Outcome[diagnose.Result]) -> None:
@@ -70,6 +70,14 @@ def test_a_cause_is_named_with_its_joint_and_its_numbers(rippled: Outcome[diagno
     assert gain.tip_error_rms.after < gain.tip_error_rms.before
 
 
+@pytest.mark.parametrize("seconds", [3.0, pytest.param(10.0, marks=pytest.mark.slow)])
+def test_a_cause_is_named_without_reference_logs(seconds: float, tmp_path: Path) -> None:
+    """Of two logs of so many seconds, blocks of which are held out."""
+    found = asked(written(tmp_path / "logs", session("cogging", 2, seconds)), tmp_path / "out")
+    assert [(one.cause, one.joint) for one in found.result.findings] == [("cogging", 2)]
+    assert found.result.findings[0].parameters["amplitude"].value == pytest.approx(0.28, rel=0.05)
+
+
 def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> None:
     """Verdict in words, the remedy, the joint, millimetres at the tip; and the figure that proves it."""
     report = rippled.report
@@ -79,7 +87,7 @@ def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> Non
     assert any(text.startswith("What to check: ") for text in first.text)
     assert any(" mm " in text for text in first.text)
     assert first.figures[0].name == "proof-1"
-    assert {"What this rests on", "What these logs cannot tell"} <= {section.title for section in report.sections}
+    assert {"What this rests on", "What would have been found"} <= {section.title for section in report.sections}
 
 
 def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagnose.Result]) -> None:
@@ -103,10 +111,10 @@ def test_other_causes_have_other_names(cause: str, joint: int, tmp_path: Path) -
 @pytest.mark.slow
 def test_an_arm_in_order_has_nothing_wrong(tmp_path: Path) -> None:
     """Exit 0, and it is said what would have been found."""
-    outcome = asked(written(tmp_path / "logs", session()), tmp_path / "out", replicas=2)
-    assert (outcome.result.verdict, outcome.result.findings, outcome.exit_code) == ("nothing-wrong", (), 0)
-    assert {one.cause for one in outcome.result.detectable} >= {"cogging", "torque_offset"}
-    assert outcome.result.floor_origin == "twin"
+    outcome = asked(written(tmp_path / "logs", session()), tmp_path / "out")
+    assert (outcome.result.verdict, outcome.result.findings, outcome.exit_code) == ("no-fault-found", (), 0)
+    assert {one.cause for one in outcome.result.detection_limits} >= {"cogging", "torque_offset"}
+    assert outcome.result.floor_origin == "blocks"
 
 
 def test_what_the_user_excludes_is_not_named(tmp_path: Path) -> None:
@@ -132,14 +140,14 @@ def test_paths_go_before_what_logs_say_of_themselves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("settings", "words"), [
-    ({"without": ("cogs",)}, "cogging"), ({"blocks": 1}, "1 block"), ({"replicas": -1}, "replicas"), ({"seed": -1}, "seed"),
+    ({"without": ("cogs",)}, "cogging"), ({"blocks": 1}, "1 block"),
     ({"filter": 0.0}, "low-pass"), ({"most": 0}, "findings"), ({"min_speed": (-1.0,)}, "--min-speed"),
     ({"min_speed": (math.nan,)}, "--min-speed"), ({"min_speed": (0.1, 0.2)}, "--min-speed: 2 values for 3 joints"),
     ({"decimate": 0}, "--decimate"), ({"decimate": -3}, "--decimate"), ({"filter": 450.0}, "sampled at 1000 Hz")])
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """Before any log is examined, let alone simulated."""
-    monkeypatch.setattr(Memory, "examined", lambda *given: pytest.fail("was not refused at once"))
+    monkeypatch.setattr(diagnose, "examined", lambda *given: pytest.fail("was not refused at once"))
     folder = written(tmp_path / "logs", session())
     with pytest.raises(UsageError) as refused:
         asked(folder, tmp_path / "out", **settings)

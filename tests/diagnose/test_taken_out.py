@@ -5,17 +5,15 @@ from __future__ import annotations
 import pytest
 
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.result import Diagnosis
 from tests.diagnose.sessions import but, session
+from tests.model.diagnosis.asking import answered
 
 _LIBRARY = but("torque_offset", "stribeck")  # neither is like what is hidden here
 
 
 def diagnosed(cause: str = "", joint: int | None = None) -> Diagnosis:
-    settings = DiagnosisSettings(limits=False, evidence=False, replicas=6, without=_LIBRARY)
-    return diagnose(Logs.by_role(session(cause, joint, 4.0, 3)), settings)
+    return answered(Logs.by_role(session(cause, joint, 4.0, 3)), exclude=_LIBRARY)
 
 
 @pytest.mark.slow
@@ -29,4 +27,4 @@ def test_something_is_wrong_that_has_no_name(cause: str, joint: int) -> None:
 
 
 def test_nothing_is_wrong_with_the_same_arm_in_order() -> None:
-    assert diagnosed().verdict == "nothing-wrong"
+    assert diagnosed().verdict == "no-fault-found"

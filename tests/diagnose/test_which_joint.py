@@ -12,10 +12,9 @@ from benchmarks.hidden_effects.sessions import record_case
 from pipelines.diagnosis import engine
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose
 from pipelines.model.diagnosis.result import Diagnosis
 from tests.diagnose.sessions import but
+from tests.model.diagnosis.asking import answered
 
 WRONG = 1.1
 
@@ -34,7 +33,7 @@ def scaled(log: ExperimentLog, joint: int) -> ExperimentLog:
 
 
 def diagnosed(logs: tuple[ExperimentLog, ...], *causes: str) -> Diagnosis:
-    return diagnose(Logs.by_role(logs), DiagnosisSettings(replicas=4, most=1, without=but(*causes), evidence=False, limits=False))
+    return answered(Logs.by_role(logs), exclude=but(*causes))
 
 
 @pytest.mark.slow

@@ -87,7 +87,7 @@ def test_the_extended_arm_leaves_what_is_told_of_it(lagging: _Arm) -> None:
 
 
 def test_as_small_a_lag_would_have_been_found_at_the_other_joints(lagging: _Arm) -> None:
-    limits = {(one.cause, one.joint): one.smallest.value for one in lagging.told.detectable}
+    limits = {(one.cause, one.joint): one.smallest.value for one in lagging.told.detection_limits}
     assert lagging.place not in limits
     for joint in (1, 3):
         smallest = limits["drive_lag", joint]

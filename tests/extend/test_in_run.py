@@ -20,7 +20,7 @@ from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, session, written
 
 OTHERS = ("fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf")
-QUICK = diagnose.Settings(without=but("cogging", "torque_offset"), replicas=0, most=1)
+QUICK = diagnose.Settings(without=but("cogging", "torque_offset"), most=1)
 
 
 def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
@@ -67,8 +67,8 @@ def test_what_does_harm_to_the_model_is_not_offered() -> None:
 
 
 @pytest.mark.parametrize(("verdict", "question", "words"), [
-    ("nothing-wrong", "what is wrong", "diagnose found nothing wrong: "),
-    ("nothing-wrong", "what has changed", "diagnose found nothing that has changed since the reference logs: "),
+    ("no-fault-found", "what is wrong", "diagnose found nothing wrong: "),
+    ("no-fault-found", "what has changed", "diagnose found nothing that has changed since the reference logs: "),
     ("unknown", "what is wrong", "diagnose found something wrong, and no cause for it: ")])
 def test_why_there_is_nothing_to_add_is_said_in_words(verdict: str, question: str, words: str) -> None:
     """By no identifier of a verdict."""

@@ -16,7 +16,6 @@ from pipelines.errors import UsageError
 from pipelines.log.files import open_log
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.memory import Memory
 from pipelines.model.named_cause import wanted_cause
 from pipelines.model.simulation import Experiment, simulate
 from pipelines.stage import Outcome, Request, run_stage
@@ -160,7 +159,7 @@ def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_sa
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """C02, by the option's name, before any log is examined."""
-    monkeypatch.setattr(Memory, "examined", lambda *given: pytest.fail("was not refused at once"))
+    monkeypatch.setattr(extend, "examined", lambda *given: pytest.fail("was not refused at once"))
     folder = written(tmp_path / "logs", session())
     with pytest.raises(UsageError) as refused:
         run_stage(extend.STAGE, Request((folder,), out=tmp_path / "out", no_report=True),

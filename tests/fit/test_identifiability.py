@@ -12,7 +12,7 @@ from pipelines.fit.identifiability import (
     resolved_rank,
     typical_size,
     unresolved,
-    visibility,
+    identifiability,
     visible,
 )
 from pipelines.fit.least_squares import Solution, fit
@@ -110,6 +110,6 @@ def test_visibility_of_further_columns() -> None:
     rest = a[:, extra] - a[:, nominal] @ np.linalg.lstsq(a[:, nominal], a[:, extra], rcond=None)[0]
     truth = np.linalg.norm(rest, axis=0) / np.linalg.norm(a[:, extra], axis=0)
     for method in (gather, triangulate):
-        eta = visibility(method([Block.of(Y, one.clean)]), weights, nominal, extra)
+        eta = identifiability(method([Block.of(Y, one.clean)]), weights, nominal, extra)
         np.testing.assert_allclose(eta, truth, atol=1e-6)
         assert eta[1] < 1e-6

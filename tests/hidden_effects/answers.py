@@ -35,17 +35,17 @@ def written(out: Path, cases: list[SealedCase]) -> Path:
 
 def finding(cause: str, joint: int | None, parameters: Mapping[str, float] | None = None, std: float = 0.0,
             after: float = FLOOR) -> dict[str, Any]:
-    return {"cause": cause, "joint": joint, "explained": 0.9, "visibility": 0.9, "rivals": [], "experiment": None,
+    return {"cause": cause, "joint": joint, "explained": 0.9, "identifiability": 0.9, "alternatives": [], "experiment": None,
             "parameters": {name: {"value": value, "std": std, "unit": ""} for name, value in (parameters or {}).items()},
             "gain": {"validate_torque_rms": {"before": [1.0] * 3, "after": [after] * 3, "ci95": [[0.0, 0.0]] * 3},
                      "simulated_position_rms": {"before": [1e-3] * 3, "after": [5e-4] * 3}, "simulation": "closed-loop",
                      "tip_error_rms": {"before": 1e-3, "after": 5e-4}}}
 
 
-def answer(*findings: dict[str, Any], verdict: str | None = None, not_testable: Mapping[str, str] | None = None) -> dict[str, Any]:
-    return {"verdict": verdict or ("cause" if findings else "nothing-wrong"), "findings": list(findings), "standing": [],
-            "rejected": [], "detectable": [],
-            "not_testable": [{"cause": cause, "reason": reason} for cause, reason in (not_testable or {}).items()],
+def answer(*findings: dict[str, Any], verdict: str | None = None, not_identifiable: Mapping[str, str] | None = None) -> dict[str, Any]:
+    return {"verdict": verdict or ("cause" if findings else "no-fault-found"), "findings": list(findings), "standing": [],
+            "rejected": [], "detection_limits": [],
+            "not_identifiable": [{"cause": cause, "reason": reason} for cause, reason in (not_identifiable or {}).items()],
             "residual_rms": {"identify": [1.0] * 3, "validate": [1.0] * 3, "floor": [FLOOR] * 3}}
 
 
@@ -58,7 +58,7 @@ def oracle(out: Path) -> Engine:
         if one.verdict in ("unknown", "flagged") or without:
             return answer(verdict="unknown")
         if one.verdict == "not-testable":
-            return answer(not_testable={cause["cause"]: "absorbed by p3" for cause in one.findings})
+            return answer(not_identifiable={cause["cause"]: "absorbed by p3" for cause in one.findings})
         return answer(*(finding(cause["cause"], cause["joint"], cause["parameters"]) for cause in one.findings))
 
     return diagnose

@@ -12,12 +12,11 @@ import pytest
 
 from pipelines.log.field_words import words_of
 from pipelines.log.result_words import WORDS
-from pipelines.model.diagnosis.floor.calibration import Calibration
 from pipelines.stage import result_type
 from rrrid_cli.commands.application import STAGES
 from rrrid_cli.commands.tools import _schema
 
-FILES = ("model", "calibration", "log", "batch", *STAGES)
+FILES = ("model", "log", "batch", *STAGES)
 
 
 def wordless(schema: Any, place: str = "") -> Iterator[str]:
@@ -35,7 +34,7 @@ def wordless(schema: Any, place: str = "") -> Iterator[str]:
 
 @pytest.mark.parametrize("what", FILES)
 def test_every_field_is_told_in_words(what: str) -> None:
-    """Of each stage's result.json, of a model, a calibration and a log: at every depth."""
+    """Of each stage's result.json, of a model and a log: at every depth."""
     assert list(wordless(_schema(what))) == []
 
 
@@ -56,7 +55,7 @@ def test_no_words_are_left_over() -> None:
 
     seen: set[type[Any]] = set()
     modules = ("import_log" if name == "import" else name.replace("-", "_") for name in STAGES)
-    for one in (*(result_type(import_module(f"pipelines.{name}").STAGE) for name in modules), Batch, ModelFile, Calibration):
+    for one in (*(result_type(import_module(f"pipelines.{name}").STAGE) for name in modules), Batch, ModelFile):
         kinds(one, seen)
     told = "\n".join(words for kind in seen for words in words_of(kind).values())
     assert [name for name, words in WORDS.items() if words not in told] == []

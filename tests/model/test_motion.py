@@ -47,8 +47,8 @@ def test_every_filter_beats_central_differences_and_the_smoother_all(seed: int) 
     for method in ("observer", "zero-phase", "smoother"):
         assert off[method][2] < off["central-differences"][2] / 10
     assert off["smoother"][2] < off["central-differences"][2] / 100
-    for rival in ("observer", "zero-phase", "central-differences"):
-        assert all(mine < theirs for mine, theirs in zip(off["smoother"], off[rival], strict=True))
+    for alternative in ("observer", "zero-phase", "central-differences"):
+        assert all(mine < theirs for mine, theirs in zip(off["smoother"], off[alternative], strict=True))
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -60,7 +60,7 @@ def test_a_stage_consists_of_what_it_imports() -> None:
                    "pipelines.model.effects.cogging", "pipelines.log.results"):
         assert module in code, module
     assert not [name for name in code if name.startswith("pipelines.report")]
-    assert not {"pipelines.validate_writing", "pipelines.run", "pipelines.model.diagnosis.searched.search"} & set(code)
+    assert not {"pipelines.validate_writing", "pipelines.run", "pipelines.diagnosis.selection"} & set(code)
     assert "pipelines.report.frf_report" in code_of("pipelines.frf")
 
 

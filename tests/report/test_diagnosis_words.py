@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import fields, replace
 from typing import Any
@@ -12,15 +13,14 @@ import pytest
 from pipelines.model.diagnosis.answered.outcome import Result
 from pipelines.model.diagnosis.result import (
     BeforeAfter,
-    Detectable,
-    Diagnosis,
+    DetectionLimit,
     Finding,
     Gain,
-    NotTestable,
+    NotIdentifiable,
     Proof,
     Rejected,
     ResidualRms,
-    Rival,
+    Alternative,
     Threshold,
     TorqueGain,
     Trial,
@@ -28,7 +28,7 @@ from pipelines.model.diagnosis.result import (
 )
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_floor import held_out_floor, torque_errors
+from pipelines.report.diagnosis_floor import torque_errors
 from pipelines.report.diagnosis_proof import proof_figures
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.diagnosis_words import in_order, meaning_of, named, spoken, together, told_values, without_keys
@@ -38,9 +38,9 @@ COMMAND = re.compile(r'"rrrid [^"]*"')
 
 NOTHING: Any = {field.name: () for field in fields(Result)} | {
     "boundary": None,
-    "verdict": "nothing-wrong", "question": "what is wrong", "reason": "", "floor_origin": "twin", "held_out": "logs",
-    "held_out_floor": None, "replicas": 0, "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
-    "after_rms": ResidualRms(*(np.ones(3),) * 3), "noise": np.ones(3), "memory": None, "rated": (50.0,) * 3}
+    "verdict": "no-fault-found", "question": "what is wrong", "reason": "", "floor_origin": "reference logs", "held_out": "logs",
+    "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
+    "after_rms": ResidualRms(*(np.ones(3),) * 3), "rated": (50.0,) * 3}
 
 
 def found(cause: str) -> Finding:
@@ -48,7 +48,7 @@ def found(cause: str) -> Finding:
     three = np.ones(3)
     gain = Gain(TorqueGain(three, 0.5 * three, np.zeros((3, 2))), None, "none", None)
     parameters = {q.name: Value(1.0, 0.1, q.unit) for q in find_effect(cause).parameters}
-    return Finding(cause, 2, find_effect(cause).title, parameters, 0.9, 0.8, (Rival("torque_offset", 1, 0.9),), "record more", gain,
+    return Finding(cause, 2, find_effect(cause).title, parameters, 0.9, 0.8, (Alternative("torque_offset", 1, 0.9),), "record more", gain,
                    "residual", 0.2, 0.01, None)
 
 
@@ -115,23 +115,23 @@ def test_a_cause_at_a_joint_and_at_all_together_is_a_sentence() -> None:
     assert said == "wrong torque scale at joints 1 and 3 and at all joints together"
 
 
-def test_whether_an_error_is_in_order_is_said() -> None:
-    """Beside what an arm in order leaves: 1.18 times is in order, 9 times is not, and what is mended is told as mended."""
-    now, then = np.array([0.088, 0.27, 0.09]), np.array([0.088, 0.03, 0.08])
-    floor = np.array([0.0746, 0.03, 0.01])
-    nothing: Any = {field.name: None for field in fields(Diagnosis)} | {"floor_origin": "twin"}
-    known = held_out_floor(Diagnosis(**(nothing | {"held_out_floor": floor})))
-    before, after = ResidualRms(now, now, floor), ResidualRms(then, then, floor)
-    table = torque_errors(before, after, (50.0,) * 3, *known)
-    beside = [row[table.columns.index("beside it")] for row in table.rows]
-    assert beside == ["1.2×, in order", "9× → 1×, in order", "9× → 8×, above it"]
-    assert "1.3 times" in table.caption
-    near = torque_errors(before, ResidualRms(then, np.array([0.0965, 0.03, 0.01339]), floor), (50.0,) * 3, *known)
-    assert [row[near.columns.index("beside it")] for row in near.rows][::2] == ["1.3×, in order", "9× → 1.34×, a little above it"]
-    loud = torque_errors(before, before, (50.0,) * 3, *held_out_floor(Diagnosis(**(nothing | {"held_out_floor": 5.0 * now}))))
-    assert {row[loud.columns.index("beside it")] for row in loud.rows} == {"0.2×, no measure"}  # so loud is no arm in order
-    noise = held_out_floor(Diagnosis(**(nothing | {"residual_rms": before})))  # noise alone: any arm leaves more at its reversals
-    assert "beside it" not in torque_errors(before, after, (50.0,) * 3, *noise).columns
+def test_a_torque_error_stands_beside_the_noise_floor() -> None:
+    """In N m and in percent of the rated torque; where nothing extends the model, no column of an extended one."""
+    now, then, floor = np.array([0.3, 0.088]), np.array([0.03, 0.08]), np.array([0.03, 0.075])
+    before, after = (ResidualRms(one, one, floor) for one in (now, then))
+    table = torque_errors(before, after, (60.0, math.inf), floor, "left by reference logs", "")
+    assert table.columns == (
+        "joint",
+        "torque error now [N m]",
+        "extended [N m]",
+        "left by reference logs [N m]",
+        "now [% of rated]",
+        "extended [% of rated]",
+    )
+    assert table.rows[0] == (1, 0.3, 0.03, 0.03, 0.5, 0.05)
+    assert table.rows[1][1:4] == (0.088, 0.08, 0.075)
+    same = torque_errors(before, before, (60.0, 60.0), floor, "left by reference logs", "")
+    assert not any("extended" in name for name in same.columns)
 
 
 def test_a_change_is_told_in_figures_that_show_its_sign() -> None:
@@ -143,18 +143,18 @@ def test_a_change_is_told_in_figures_that_show_its_sign() -> None:
     assert [row[4:] for row in rows] == [(0.0487, 0.0474), (0.213, 0.0156)]
 
 
-@pytest.mark.parametrize(("causes", "rivals", "question", "tone"), [
+@pytest.mark.parametrize(("causes", "alternatives", "question", "tone"), [
     (("stribeck", "presliding"), (), "what is wrong", "attention"),
     (("stribeck", "cogging"), (), "what is wrong", "bad"),
     (("presliding",), ("stribeck",), "what is wrong", "attention"),
     (("presliding",), ("backlash",), "what is wrong", "bad"),
     (("stribeck",), (), "what has changed", "bad")])
-def test_what_machines_in_order_have_is_no_problem(causes: tuple[str, ...], rivals: tuple[str, ...], question: str,
+def test_what_machines_in_order_have_is_no_problem(causes: tuple[str, ...], alternatives: tuple[str, ...], question: str,
                                                    tone: str) -> None:
     """No technician needs to look after a machine for the hump of its friction; where it is new he does, or where it may be a gap.
     """
-    near = tuple(Rival(cause, 2, 0.9) for cause in rivals)
-    findings = tuple(replace(found(cause), rivals=near) for cause in causes)
+    near = tuple(Alternative(cause, 2, 0.9) for cause in alternatives)
+    findings = tuple(replace(found(cause), alternatives=near) for cause in causes)
     there = NOTHING | {"verdict": "cause", "question": question, "findings": findings}
     assert diagnosis_report(Result(**there)).tone == tone
 
@@ -217,11 +217,11 @@ def test_causes_rejected_for_one_reason_share_a_line() -> None:
 def test_limits_are_told_for_what_a_technician_can_see() -> None:
     """At how many waves a turn, from which joint: not by which form of a law."""
     at = {"order": Value(106.918, None, "1/rev"), "sharpness": Value(111.0, None, "s/rad"), "inner_loops": Value(0, None, "1")}
-    found = (Detectable("cogging", 1, "amplitude", Value(0.1, None, "N m"), at),
-             Detectable("cogging", 3, "amplitude", Value(0.1, None, "N"), {"order": Value(40.0, None, "1/(2 pi m)")}),
-             Detectable("presliding", 2, "force", Value(0.1, None, "N m"), {"elastic": Value(-1.0, None, "1")}),
-             Detectable("stribeck", 2, "amplitude", Value(0.1, None, "N m"), {"speed": Value(0.0341, None, "rad/s")}))
-    page = diagnosis_report(Result(**(NOTHING | {"detectable": found})))
+    found = (DetectionLimit("cogging", 1, "amplitude", Value(0.1, None, "N m"), at),
+             DetectionLimit("cogging", 3, "amplitude", Value(0.1, None, "N"), {"order": Value(40.0, None, "1/(2 pi m)")}),
+             DetectionLimit("presliding", 2, "force", Value(0.1, None, "N m"), {"elastic": Value(-1.0, None, "1")}),
+             DetectionLimit("stribeck", 2, "amplitude", Value(0.1, None, "N m"), {"speed": Value(0.0341, None, "rad/s")}))
+    page = diagnosis_report(Result(**(NOTHING | {"detection_limits": found})))
     (table,) = (section.tables[0] for section in page.sections if section.title == "What would have been found")
     assert [row[table.columns.index("at")] for row in table.rows] == [
         "107 waves a turn", "40 waves in 2π m", "", "speed 0.0341 rad/s"]
@@ -252,17 +252,16 @@ def test_a_torque_of_any_size_is_told_as_that() -> None:
         assert ("How large its torque is these logs do not tell" in text) is open_
 
 
-@pytest.mark.parametrize("verdict", ["cause", "nothing-wrong", "unknown"])
+@pytest.mark.parametrize("verdict", ["cause", "no-fault-found", "unknown"])
 def test_the_verdict_says_that_no_log_of_its_own_judged(verdict: str) -> None:
     there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
-    for held_out in ("logs", "blocks", "blocks of all logs"):
+    for held_out in ("logs", "blocks"):
         page = diagnosis_report(Result(**(there | {"held_out": held_out})))
-        assert ("Judged by blocks held out of the fitted logs" in page.verdict) is (held_out != "logs")
+        assert ("Judged by blocks held out of the identification logs" in page.verdict) is (held_out != "logs")
         assert ("none has role validate" in page.verdict) is (held_out == "blocks")
-        assert ("shows in those of role validate alone" in page.verdict) is (held_out == "blocks of all logs")
 
 
-@pytest.mark.parametrize("verdict", ["cause", "nothing-wrong", "unknown"])
+@pytest.mark.parametrize("verdict", ["cause", "no-fault-found", "unknown"])
 def test_the_verdict_says_what_was_not_looked_for(verdict: str) -> None:
     """Nothing wrong, but for what nobody looked for, is another answer."""
     there = NOTHING | {"verdict": verdict, "findings": (found("cogging"),) if verdict == "cause" else ()}
@@ -275,10 +274,10 @@ def test_the_verdict_says_what_was_not_looked_for(verdict: str) -> None:
 
 def test_nothing_wrong_says_at_once_of_what_it_says_nothing() -> None:
     """A load at the tip that these logs cannot tell from the arm is not nothing."""
-    beyond = tuple(NotTestable(cause, joint, "why", "what") for cause, joint in (
+    beyond = tuple(NotIdentifiable(cause, joint, "why", "what") for cause, joint in (
         ("rotor_inertia", 1), ("rotor_inertia", 2), ("payload", None)))
-    said = diagnosis_report(Result(**(NOTHING | {"not_testable": beyond}))).verdict
+    said = diagnosis_report(Result(**(NOTHING | {"not_identifiable": beyond}))).verdict
     assert "as far as these logs can tell, and they say nothing of rotor inertia at joints 1 and 2 and a load at the tip;" in said
-    one = diagnosis_report(Result(**(NOTHING | {"not_testable": beyond[2:]}))).verdict
+    one = diagnosis_report(Result(**(NOTHING | {"not_identifiable": beyond[2:]}))).verdict
     assert "they say nothing of a load at the tip;" in one
     assert "nothing of" not in diagnosis_report(Result(**NOTHING)).verdict

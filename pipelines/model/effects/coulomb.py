@@ -75,6 +75,10 @@ class Coulomb(Effect):
     def forms(self) -> tuple[Self, ...]:
         return (replace(self, roundness=_BETWEEN),)
 
+    def plain(self) -> Self:
+        """Return the law by tanh, whose roundness is not fitted."""
+        return replace(self, roundness=1.0)
+
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
             yield replace(self, sharpness=sharpness)

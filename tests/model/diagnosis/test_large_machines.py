@@ -13,11 +13,9 @@ import pytest
 
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.quadratic_drag import QuadraticDrag
+from tests.model.diagnosis.asking import answered, extended
 from tests.model.diagnosis.slides import SLIDE
 
 _RATE, _SECONDS = 500.0, 20.0
@@ -47,8 +45,7 @@ def slide(seed: int, role: str, load: Load) -> ExperimentLog:
     ("stribeck", "amplitude", 40.0, lambda q, v: 40.0 * np.exp(-(v / 0.06)**2) * np.tanh(v / 1e-3))])
 def test_what_is_large_on_a_small_arm_has_its_name_on_a_large_one(cause: str, number: str, size: float, load: Load) -> None:
     """Not that of a cause which imitates it: an offset of 32 N passed for a base that leans by two degrees."""
-    logs = Logs((slide(1, "identify", load), slide(2, "identify", load)), (slide(3, "validate", load),))
-    found = diagnose(logs, DiagnosisSettings(replicas=0, evidence=False, limits=False))
+    found = answered(Logs((slide(1, "identify", load), slide(2, "identify", load)), (slide(3, "validate", load),)))
     assert [one.cause for one in found.findings] == [cause]
     told = found.findings[0].parameters[number]
     assert told.std is not None
@@ -61,7 +58,7 @@ def test_a_cause_that_would_have_to_push_is_refused_for_that() -> None:
     def less(q: Array, v: Array) -> Array:
         return -100.0 * v * np.abs(v)
 
-    found = extend(Logs((slide(1, "identify", less),), (slide(3, "validate", less),)), (Wanted(QuadraticDrag(joint=1)),))
+    found = extended(Logs((slide(1, "identify", less),), (slide(3, "validate", less),)), Wanted(QuadraticDrag(joint=1)))
     (rejected,) = found.rejected
     assert rejected.reason.startswith("fitted exactly, its numbers are none that it can have: coefficient = -")
     assert rejected.reason.endswith(" N s^2/m^2")

@@ -15,8 +15,8 @@ FOLDERS = {path.parent.relative_to(TOP).as_posix(): path for path in sorted(TOP.
 
 
 def _entries(docstring: str) -> list[str]:
-    """What the lines of a map are about: indented by four, names, and two spaces or more before what is said of them."""
-    return [name for line in docstring.splitlines() if (entry := re.match(r" {4}(\w+(?:, \w+)*)  ", line))
+    """What the lines of a map are about: names, and two spaces or more before what is said of them."""
+    return [name for line in docstring.splitlines() if (entry := re.match(r"(?: {4})?(\w+(?:, \w+)*)  ", line))
             for name in entry[1].split(", ")]
 
 
@@ -27,11 +27,11 @@ def test_every_module_stands_on_the_map_and_none_that_is_not_there(folder: str) 
     there |= {path.parent.name for path in FOLDERS[folder].parent.glob("*/__init__.py")}
     text = ast.get_docstring(ast.parse(FOLDERS[folder].read_text(encoding="utf-8")), clean=False) or ""
     assert sorted(_entries(text)) == sorted(there)
-    elsewhere = re.findall(r"`(\w+)\.(\w+)`", text)
+    elsewhere = re.findall(r"`(?!pipelines\b)(\w+)\.(\w+)`", text)
     assert [name for name in elsewhere if not (TOP / name[0] / f"{name[1]}.py").is_file()] == []
 
 
 def test_a_map_is_read_line_by_line() -> None:
     """Of each entry the names, not what is said of them, nor what is said before and after."""
-    lines = ("What it is.", "", "    one         the first", "    two, three  the", "                second", "", "four  or more")
+    lines = ("What it is.", "", "    one         the first", "    two, three  the", "                second", "", "four or more")
     assert _entries("\n".join(lines)) == ["one", "two", "three"]

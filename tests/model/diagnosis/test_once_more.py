@@ -1,4 +1,4 @@
-"""A cause that somebody names acts at its place as often as held-out time bears out: a drive has waves of several orders."""
+"""A cause that somebody names is found once at its place; two starts of one cause are two."""
 
 from __future__ import annotations
 
@@ -7,28 +7,19 @@ from collections.abc import Mapping
 import pytest
 
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.extend import extend
 from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.cogging import Cogging
-from tests.model.diagnosis.screened.test_through import turned
-
-SETTINGS = DiagnosisSettings(replicas=0, cutoff_hz=40.0)
+from tests.model.diagnosis.asking import extended
+from tests.model.diagnosis.rotor import turned
 
 
 def orders(hidden: Mapping[float, float], *wanted: Wanted) -> list[float]:
     """First orders of the waves that the extended model has, of a rotor with these `hidden` amplitudes [N m] of each order."""
     logs = Logs((turned(1, hidden, 0.0), turned(2, hidden, 0.0)), (turned(3, hidden, 0.0),))
-    found = extend(logs, wanted, SETTINGS)
+    found = extended(logs, *wanted, cutoff_hz=40.0)
     assert found.arm is not None
     assert not found.rejected
     return sorted(acting.values["order"] for acting in found.arm.effects)
-
-
-@pytest.mark.slow
-def test_a_cause_is_named_once_and_found_as_often_as_it_acts() -> None:
-    """Poles, slots and teeth: what `diagnose` finds in three steps is one cause to whoever asks for it."""
-    assert orders({7.0: 0.05, 28.0: 0.03, 12.0: 0.014}, Wanted(Cogging(joint=1))) == [7.0, 12.0, 28.0]
 
 
 def test_what_acts_once_is_found_once() -> None:

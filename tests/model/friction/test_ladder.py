@@ -57,13 +57,13 @@ def climbed(stretch: Stretch) -> tuple[object, tuple[str, ...], tuple[str, ...]]
     joint = OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)
     ladder = climb(Judge(LawEquations.of((stretch,), joint), None))
     gaps = unseen(coverage((stretch,)), ladder)
-    return ladder.chosen.law.name, tuple(one.law.name for one in ladder.rivals), tuple(f"{gap.what} {gap.record}" for gap in gaps)
+    return ladder.chosen.law.name, tuple(one.law.name for one in ladder.alternatives), tuple(f"{gap.what} {gap.record}" for gap in gaps)
 
 
 def test_an_offset_is_not_told_from_asymmetric_friction_without_rest() -> None:
     """Always moving, an offset and friction that is larger one way are one column: both are named, and what to record."""
-    chosen, rivals, words = climbed(plateaus((0.5, 1.0, 2.0, 4.0), lambda v: 1.2 * np.sign(v) + 0.12 * v + 0.1, False, 0.02))
-    assert {chosen, *rivals} >= {"torque_offset", "asymmetric_friction"}
+    chosen, alternatives, words = climbed(plateaus((0.5, 1.0, 2.0, 4.0), lambda v: 1.2 * np.sign(v) + 0.12 * v + 0.1, False, 0.02))
+    assert {chosen, *alternatives} >= {"torque_offset", "asymmetric_friction"}
     assert any("Asymmetric friction" in text and "old still" in text for text in words)
 
 
@@ -72,10 +72,10 @@ def test_few_speeds_do_not_tell_stribeck_from_drag() -> None:
     def drag(v: float) -> float:
         return float(1.2 * np.sign(v) + 0.12 * v + 0.03 * v * abs(v))
 
-    chosen, rivals, words = climbed(plateaus((0.2, 1.0, 3.0), drag, False, 0.02))
-    assert {chosen, *rivals} >= {"stribeck", "quadratic_drag"}
+    chosen, alternatives, words = climbed(plateaus((0.2, 1.0, 3.0), drag, False, 0.02))
+    assert {chosen, *alternatives} >= {"stribeck", "quadratic_drag"}
     assert any("Stribeck friction" in text and "seven to ten constant speeds" in text for text in words)
     assert any("decades" in text for text in words)
-    chosen, rivals, _ = climbed(plateaus(tuple(np.geomspace(0.03, 5.0, 9).tolist()), drag, True, 0.02))
+    chosen, alternatives, _ = climbed(plateaus(tuple(np.geomspace(0.03, 5.0, 9).tolist()), drag, True, 0.02))
     assert chosen == "quadratic_drag"
-    assert "stribeck" not in rivals
+    assert "stribeck" not in alternatives

@@ -13,7 +13,7 @@ import pytest
 from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose
+from tests.model.diagnosis.asking import answered
 from tests.model.diagnosis.slides import SLIDE
 
 _RATE, _MOVE, _REST, _OFFSET = 500.0, 0.6, 0.4, -3.2  # [Hz], [s], [s], [N]
@@ -55,7 +55,7 @@ def _counting(*logs: ExperimentLog) -> float:
 @pytest.mark.slow
 def test_what_friction_holds_at_rest_is_no_cause() -> None:
     """The offset keeps its name, and nothing that the places have in common gets another."""
-    found = diagnose(Logs((slide(1, "identify", 18.0),)), DiagnosisSettings(replicas=0, evidence=False, limits=False))
+    found = answered(Logs((slide(1, "identify", 18.0),)))
     assert [one.cause for one in found.findings] == ["torque_offset"]
     told = found.findings[0].parameters["offset"]
     assert told.std is not None
@@ -70,11 +70,11 @@ def test_rests_are_left_out_where_friction_holds_the_joint() -> None:
     assert _counting(slide(1, "identify", 0.0, dry=0.0)) == 1.0
 
 
-def test_a_controller_that_is_not_described_makes_no_twin() -> None:
+def test_a_controller_of_unknown_law_is_none() -> None:
     assert _counting(replace(slide(1, "identify", 18.0), controller=Controller("unknown"))) < 0.6
 
 
-def test_a_twin_rests_as_its_arm_does() -> None:
+def test_rests_count_where_the_controller_is_known() -> None:
     """Where the log describes its controller, rows at rest stay."""
     log = replace(slide(1, "identify", 18.0), controller=Controller("pd", kp=np.array([1e5]), kd=np.array([4e3])))
     assert _counting(log) == 1.0

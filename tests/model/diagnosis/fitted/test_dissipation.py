@@ -11,16 +11,15 @@ from pipelines.model.diagnosis.fitted.dissipation import dissipating, driving
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
-from pipelines.model.diagnosis.searched.beside import less
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.effects.viscous import Viscous
-from tests.model.diagnosis.screened.test_through import turned
+from tests.model.diagnosis.rotor import turned
 
 
 def fitted(waves: dict[float, float], lag: float) -> tuple[float, Refined]:
     """Viscous friction of the linear fit, and the model that dissipates."""
-    prepared = prepare(Logs((turned(3, waves, lag),)), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
+    prepared = prepare(Logs((turned(3, waves, lag),)), DiagnosisSettings(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     start = Exact.start(columns, fit)
     return float(start.beta[2]), refine(start, prepared.data, fit.weight)
@@ -48,19 +47,3 @@ def test_only_laws_of_friction_are_held() -> None:
     laws = (Coulomb(1), Viscous(1), TorqueOffset(1))
     assert dissipating(np.array([-1.0, 2.0, -3.0, -4.0]), laws).tolist() == [-1.0, 2.0, 0.0, -4.0]
     assert driving(np.array([0.0, 1.0, 0.5, 1.0]), np.array([-9.0, -0.5, -0.6, -9.0, -9.0]), laws) == [2]
-
-
-def test_of_what_is_left_of_friction_either_sign_may_be() -> None:
-    """A standing law at joint 1 that was taken too large and subtracted: the rest of its dry friction drives, and is fitted so."""
-    prepared = prepare(Logs((turned(3, {7.0: 0.0}, 0.0),)), DiagnosisSettings(replicas=0, cutoff_hz=40.0))
-    data = prepared.data
-    more = data.lay(lambda motion: np.tanh(40.0 * motion.dq) * 0.5)
-    done = []
-    for effects in ((), (Coulomb(1),)):
-        there = less(data, more, effects)
-        columns, fit = fit_nominal(there, prepared.columns)
-        done.append(refine(Exact.start(columns, fit), there, fit.weight))
-    held, free = (one.model.beta[1] for one in done)
-    assert held == 0.0
-    assert free < -0.1
-    assert done[1].rss < 0.1 * done[0].rss

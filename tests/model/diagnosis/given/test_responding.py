@@ -10,21 +10,18 @@ import pytest
 
 from pipelines.bench.faults import make
 from pipelines.bench.machine import draw_machine
+from pipelines.diagnosis import engine, extension
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.extend import extend
-from pipelines.model.diagnosis.given import responding
 from pipelines.model.diagnosis.given.compliance import Compliance, compared
-from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.base_resonance import BaseResonance
 from pipelines.report.diagnosis_finding import finding_section
 from tests.diagnose.sessions import but, session
+from tests.model.diagnosis.asking import answered, extended
 
-SETTINGS = DiagnosisSettings(without=but("base_resonance", "torque_offset"), replicas=0, most=1, evidence=False, limits=False)
+FEW = but("base_resonance", "torque_offset")
 
 
 def base(frequency: float | None = None, std: float = 0.02) -> Acting:
@@ -40,18 +37,15 @@ def told(monkeypatch: pytest.MonkeyPatch) -> None:
     def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance | None:
         return Compliance((base(),), False, "") if logs else None
 
-    monkeypatch.setattr(responding, "compliance", compliance)
-
-
-def asked() -> Diagnosis:
-    fitted, judging = session("base_resonance", None)
-    return diagnose(Logs((fitted,), (judging,), (), (fitted,)), SETTINGS)
+    for module in (engine, extension):
+        monkeypatch.setattr(module, "compliance", compliance)
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("told")
 def test_a_soft_base_is_worth_something_on_held_out_logs_and_enters_the_model() -> None:
-    found = asked()
+    fitted, judging = session("base_resonance", None)
+    found = answered(Logs((fitted,), (judging,), (), (fitted,)), exclude=FEW, whole=True)
     assert [(one.cause, one.origin) for one in found.findings] == [("base_resonance", "frequency responses")]
     gain = found.findings[0].gain
     assert gain.validate_torque_rms.ci95[0, 1] < 0.0
@@ -68,7 +62,7 @@ def test_a_soft_base_is_worth_something_on_held_out_logs_and_enters_the_model() 
 def test_what_does_harm_to_the_model_is_told_once() -> None:
     """Responses name a soft base where motion shows a firm one: a finding, with why the model goes without it."""
     fitted, judging = session(seed=3)
-    found = diagnose(Logs((fitted,), (judging,), (), (fitted,)), SETTINGS)
+    found = answered(Logs((fitted,), (judging,), (), (fitted,)), exclude=FEW)
     assert [one.cause for one in found.findings] == ["base_resonance"]
     assert found.findings[0].doubt
     assert "base_resonance" not in [one.cause for one in found.rejected]
@@ -84,7 +78,7 @@ def test_what_does_harm_to_the_model_is_told_once() -> None:
 def test_the_extension_takes_the_responses_numbers() -> None:
     """Nothing but the base: its frequency is that of the responses, within their deviation."""
     fitted, judging = session("base_resonance", None)
-    found = extend(Logs((fitted,), (judging,), (), (fitted,)), (Wanted(BaseResonance()),), SETTINGS)
+    found = extended(Logs((fitted,), (judging,), (), (fitted,)), Wanted(BaseResonance()))
     assert [one.cause for one in found.findings] == ["base_resonance"]
     assert not found.rejected
     assert found.arm is not None

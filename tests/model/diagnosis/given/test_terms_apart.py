@@ -15,9 +15,7 @@ import pytest
 from pipelines.log.experiment import Array
 from pipelines.log.files import open_log
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, narrowed, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.diagnose import diagnose
-from pipelines.model.diagnosis.extend import extend
+from pipelines.model.diagnosis.asked.settings import BLOCKS, DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
@@ -31,8 +29,8 @@ from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.rigid.body import Motion
 from sample_logs.make_model import synthetic_arm
-from tests.diagnose.sessions import but
 from tests.model.diagnosis.arms import hidden, wave
+from tests.model.diagnosis.asking import extended
 from tests.model.estimation.experiments import COULOMB, VISCOUS
 
 SETTINGS = DiagnosisSettings()
@@ -83,7 +81,7 @@ def sampled(samples: Path, *names: str) -> Logs:
 @pytest.mark.parametrize("cogging", [False, True])
 def test_of_three_sigmoids_one_is_left_where_friction_has_one(cogging: bool) -> None:
     """Coulomb and viscous friction come out right at every joint, and what is left is what their own law leaves, waves or none."""
-    told = with_terms_told_apart(prepare(simple(cogging), SETTINGS, synthetic_arm()), SETTINGS.blocks)
+    told = with_terms_told_apart(prepare(simple(cogging), SETTINGS, synthetic_arm()), BLOCKS)
     assert [(one.joint, one.law, one.taken) for one in told.fewer] == [(j, "three_sigmoid", ("coulomb", "viscous")) for j in JOINTS]
     done = fitted(told)
     for joint, level, viscous in zip(JOINTS, COULOMB, VISCOUS, strict=True):
@@ -98,7 +96,7 @@ def test_of_three_sigmoids_one_is_left_where_friction_has_one(cogging: bool) -> 
 def test_of_three_sigmoids_two_are_left_where_friction_has_two() -> None:
     """A dip keeps its own term, with its height and sharpness."""
     logs = Logs((hidden(1, dipping), hidden(2, dipping)), (hidden(3, dipping, "validate"),))
-    told = with_terms_told_apart(prepare(logs, SETTINGS, synthetic_arm()), SETTINGS.blocks)
+    told = with_terms_told_apart(prepare(logs, SETTINGS, synthetic_arm()), BLOCKS)
     assert {one.taken for one in told.fewer} == {("two_sigmoid",)}
     done = fitted(told)
     for joint, level, dip in zip(JOINTS, COULOMB, DIP, strict=True):
@@ -114,7 +112,7 @@ def test_three_sigmoids_that_are_told_apart_stay(samples: Path) -> None:
     and blurs them: by these logs alone two are left of them, and beside logs of the time before all three stay."""
     now = [f"rrr-changed/{kind}-{number}.h5" for number in (3, 4) for kind in ("excitation", "free")]
     before = [f"rrr-changed/{kind}-3-commissioning.h5" for kind in ("excitation", "free")]
-    alone, beside = (with_terms_told_apart(prepare(sampled(samples, *names), SETTINGS, synthetic_arm()), SETTINGS.blocks)
+    alone, beside = (with_terms_told_apart(prepare(sampled(samples, *names), SETTINGS, synthetic_arm()), BLOCKS)
                      for names in (now, [*now, *before]))
     assert [(one.joint, one.taken) for one in alone.fewer] == [(2, ("two_sigmoid",))]
     assert beside.fewer == ()
@@ -133,7 +131,7 @@ def test_three_sigmoids_come_out_right_beside_cogging(samples: Path) -> None:
     """The motor of joint 2 cogs since the reference logs, 0.35 N m. By its waves two of the three sigmoids had merged (124 +- 6e4
     s/rad), and 0.17 N m was left of what was held out. The machine has 120, 60 and 12 s/rad."""
     names = [f"rrr-changed/{kind}-{which}.h5" for which in ("3", "4", "3-commissioning") for kind in ("excitation", "free")]
-    found = extend(sampled(samples, *names), (Wanted(Cogging(2)),), SETTINGS, synthetic_arm())
+    found = extended(sampled(samples, *names), Wanted(Cogging(2)), arm=synthetic_arm())
     assert found.findings[0].parameters["amplitude"].value == pytest.approx(0.35, rel=0.02)
     assert found.after.validate[1] < 0.03
     assert found.fewer == ()
@@ -192,62 +190,34 @@ def test_the_time_before_says_what_friction_was() -> None:
     before = tuple(replace(hidden(seed), role="reference") for seed in (4, 5))
     logs = Logs((hidden(1, dip_at_2), hidden(2, dip_at_2)), (hidden(3, dip_at_2, "validate"),), before)
     prepared = prepare(logs, SETTINGS, synthetic_arm())
-    told = with_terms_told_apart(prepared, SETTINGS.blocks)
+    told = with_terms_told_apart(prepared, BLOCKS)
     assert kinds(told, 2) == [Coulomb, Viscous]
     assert prepared.reference is not None
-    alone = with_terms_told_apart(replace(prepared, data=prepared.reference, reference=None), SETTINGS.blocks)
+    alone = with_terms_told_apart(replace(prepared, data=prepared.reference, reference=None), BLOCKS)
     assert told.fewer == alone.fewer
-    now = with_terms_told_apart(replace(prepared, reference=None), SETTINGS.blocks)
+    now = with_terms_told_apart(replace(prepared, reference=None), BLOCKS)
     assert kinds(now, 2) == [TwoSigmoid]
     still = tuple(replace(one, weighed=one.weighed & (np.array(JOINTS) != 2)[:, None]) for one in prepared.reference.logs)
     unmoved = replace(prepared, reference=replace(prepared.reference, logs=still))
-    assert kinds(with_terms_told_apart(unmoved, SETTINGS.blocks), 2) == [TwoSigmoid]
+    assert kinds(with_terms_told_apart(unmoved, BLOCKS), 2) == [TwoSigmoid]
 
 
 @pytest.mark.slow
 def test_what_judges_the_model_does_not_choose_it() -> None:
     prepared = prepare(simple(), SETTINGS, synthetic_arm())
     nothing: Any = object()  # whoever asks it fails
-    told = with_terms_told_apart(replace(prepared, judge=nothing), SETTINGS.blocks)
-    assert told.fewer == with_terms_told_apart(prepared, SETTINGS.blocks).fewer != ()
+    told = with_terms_told_apart(replace(prepared, judge=nothing), BLOCKS)
+    assert told.fewer == with_terms_told_apart(prepared, BLOCKS).fewer != ()
 
 
 def test_the_reason_tells_of_every_law_that_was_passed_over() -> None:
-    told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), SETTINGS.blocks)
+    told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), BLOCKS)
     assert any('of "Friction of two sigmoids": ' in one.reason for one in told.fewer)
-
-
-@pytest.mark.slow
-def test_a_calibration_is_taken_with_its_own_laws(samples: Path) -> None:
-    """An arm in order has shown three sigmoids; by later logs alone two are left of them at joint 2, where its motor cogs by then.
-    Its thresholds are taken, for the three that they were found by."""
-    before, now = (sampled(samples, *(f"rrr-changed/{kind}-{which}.h5" for kind in ("excitation", "free")))
-                   for which in ("3-commissioning", "3"))
-    before = Logs(tuple(replace(log, role="identify") for log in before.reference))
-    chosen = DiagnosisSettings(replicas=2, most=1, without=but("cogging", "torque_offset"), limits=False)
-    first = diagnose(before, chosen, synthetic_arm())
-    assert first.calibration is not None
-    assert {law.split(":")[0] for law in first.calibration.conditions.laws} == {"three_sigmoid"}
-    alone = with_terms_told_apart(prepare(now, chosen, synthetic_arm()), chosen.blocks)
-    assert kinds(alone, 2) == [TwoSigmoid]
-    again = diagnose(now, chosen, synthetic_arm(), calibration=first.calibration)
-    assert again.nominal is not None
-    assert [type(law.effect) for law in again.nominal.friction] == [ThreeSigmoid] * 3
-    assert [(one.cause, one.joint) for one in again.findings] == [("cogging", 2)]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("stored", "wanted"), [
-    (("coulomb:1", "viscous:1", "two_sigmoid:2", "three_sigmoid:3"), [[Coulomb, Viscous], [TwoSigmoid], [ThreeSigmoid]]),
-    (("stribeck:1", "stribeck:2", "stribeck:3"), [[Coulomb, Viscous]] * 3)])
-def test_stored_laws_are_taken_as_far_as_they_are_forms_of_those_asked_for(stored: tuple[str, ...], wanted: object) -> None:
-    told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), SETTINGS.blocks, stored)
-    assert [kinds(told, joint) for joint in JOINTS] == wanted
 
 
 def test_laws_of_one_term_are_left_alone() -> None:
     prepared = prepare(simple(), SETTINGS)
-    assert with_terms_told_apart(prepared, SETTINGS.blocks) is prepared
+    assert with_terms_told_apart(prepared, BLOCKS) is prepared
 
 
 @pytest.mark.slow
@@ -255,20 +225,20 @@ def test_a_part_that_stands_beside_a_law_is_not_laid_twice() -> None:
     """A model with viscous friction of its own beside three sigmoids is left with Coulomb friction and that."""
     prepared = prepare(simple(), SETTINGS, synthetic_arm())
     laws = (*prepared.columns.laws, Viscous(2))
-    told = with_terms_told_apart(replace(prepared, columns=replace(prepared.columns, laws=laws)), SETTINGS.blocks)
+    told = with_terms_told_apart(replace(prepared, columns=replace(prepared.columns, laws=laws)), BLOCKS)
     assert kinds(told, 2) == [Coulomb, Viscous]
 
 
 @pytest.mark.slow
 def test_a_narrower_look_still_says_so() -> None:
-    told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), SETTINGS.blocks)
+    told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), BLOCKS)
     assert narrowed(told, 10.0, [0.0] * 3).fewer == told.fewer != ()
 
 
 @pytest.mark.slow
 def test_cogging_is_accepted_with_its_numbers_beside_a_law_of_three_sigmoids() -> None:
     """0.1 N m, eleven waves a turn, on a machine whose friction has one sigmoid; the result says what law it was fitted beside."""
-    found = extend(simple(True), (Wanted(Cogging(2)),), SETTINGS, synthetic_arm())
+    found = extended(simple(True), Wanted(Cogging(2)), arm=synthetic_arm())
     (one,) = found.findings
     assert one.parameters["order"].value == pytest.approx(11.0, abs=0.01)
     assert one.parameters["amplitude"].value == pytest.approx(0.1, rel=0.03)
