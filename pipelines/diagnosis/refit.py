@@ -182,21 +182,34 @@ class Later:
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
     def possible(self, state: State, config: DiagnosisConfig) -> bool:
-        """Return whether the last effect can have its numbers, each as uncertain as it is."""
-        last = state.model.effects[-1]
-        if last.possible:
-            return True
+        """Return whether the last effect can have its numbers, each as uncertain as it is.
+
+        An amplitude outside its range may be within it by its standard deviation; a number of a
+        shape that is held at the end of its range has its best value outside.
+        """
         slopes, names = self._slopes(state.model)
-        variance = self._factor(state.info, state.effects).inverse_diagonal[-len(names) :]
-        spread = config.deviations * np.sqrt(variance) / _unit(slopes.norms)
-        for (of_effect, place, name), reach in zip(names, spread, strict=True):
-            if of_effect and place == len(state.model.effects) - 1 and name.isdigit():
-                for way in (-reach, reach):
-                    amplitudes = np.array(last.amplitudes)
-                    amplitudes[int(name)] += way
-                    if last.effect.possible(last.effect.values(amplitudes)):
-                        return True
-        return False
+        factor, first = self._factor(state.info, state.effects), self.base.width
+        std = np.sqrt(factor.inverse_diagonal[first:]) / _unit(slopes.norms)
+        gradient = np.r_[self._slope(state), state.effects.moments(state.residual)]
+        step = factor.solve(gradient)[first:] / _unit(slopes.norms)
+        last, place = state.model.effects[-1], len(state.model.effects) - 1
+        within = last.possible
+        for (of_effect, which, name), by, reach in zip(names, step, config.deviations * std, strict=True):
+            if not of_effect or which != place:
+                continue
+            if not name.isdigit():
+                if abs(by) > reach and last.effect.at_end(name, float(by)):
+                    return False
+                continue
+            for way in (-reach, reach):
+                amplitudes = np.array(last.amplitudes)
+                amplitudes[int(name)] += way
+                within |= last.effect.possible(last.effect.values(amplitudes))
+        return within
+
+    def _slope(self, state: State) -> Array:
+        """Return the slope (k,) of -cost / 2 by nominal and standing numbers."""
+        return state.moment - state.info @ state.theta + self.base.moments(state.residual)
 
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.

@@ -207,7 +207,7 @@ def _run(name: str, robot: str, amplitude: float | None, p1: float = 1.0) -> dic
     """What result.json has of one of several robots: a cause or none, and a fitted figure."""
     finding = {"cause": "cogging", "joint": 2, "parameters": {"amplitude": {"value": amplitude, "std": 0.01, "unit": "N m"}}}
     findings = [] if amplitude is None else [finding]
-    least = [{"cause": "cogging", "joint": 2, "parameter": "amplitude", "smallest": {"value": 0.04, "std": None, "unit": "N m"}}]
+    least = [{"cause": "cogging", "joint": 2, "parameter": "amplitude", "minimum": {"value": 0.04, "std": None, "unit": "N m"}}]
     figure = {"name": "p1", "value": p1, "std": STD, "unit": "kg m^2"}
     estimated = {"name": "estimate-bps", "exit": 0, "result": {"robot": robot, "parameters": [figure]}}
     return {"name": name, "stages": [estimated], "verdict": "cause" if findings else "no-fault-found", "findings": findings,

@@ -74,8 +74,8 @@ def test_held_out_torque_falls_to_what_the_reference_leaves(lagging: _Arm) -> No
     gain = _only(lagging).gain.validate_torque_rms
     assert gain.ci95[1, 1] < 0.0
     before, after = lagging.told.residual_rms, lagging.told.after_rms
-    assert (after.validate < 1.2 * after.floor).all()
-    assert before.validate[1] > 10.0 * after.floor[1]
+    assert (after.validate < 1.2 * after.noise_floor).all()
+    assert before.validate[1] > 10.0 * after.noise_floor[1]
 
 
 def test_the_extended_arm_leaves_what_is_told_of_it(lagging: _Arm) -> None:
@@ -87,7 +87,7 @@ def test_the_extended_arm_leaves_what_is_told_of_it(lagging: _Arm) -> None:
 
 
 def test_as_small_a_lag_would_have_been_found_at_the_other_joints(lagging: _Arm) -> None:
-    limits = {(one.cause, one.joint): one.smallest.value for one in lagging.told.detection_limits}
+    limits = {(one.cause, one.joint): one.minimum.value for one in lagging.told.detection_limits}
     assert lagging.place not in limits
     for joint in (1, 3):
         smallest = limits["drive_lag", joint]
@@ -108,4 +108,4 @@ def test_a_cause_that_is_not_there_does_not_extend_the_model(lagging: _Arm) -> N
 def test_a_torque_scale_is_right_within_its_deviation(shared: Path) -> None:
     arm = _arm(shared, "05")
     assert _within(_only(arm), "gain_error", arm.truth["gain_error"], 2.0)
-    assert (arm.told.after_rms.validate < 1.2 * arm.told.after_rms.floor).all()
+    assert (arm.told.after_rms.validate < 1.2 * arm.told.after_rms.noise_floor).all()

@@ -17,14 +17,14 @@ from pipelines.log.model_file import read_model
 from pipelines.model.diagnosis.result import Rejected
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Request, run_stage
-from tests.diagnose.sessions import but, session, written
+from tests.diagnose.sessions import but, healthy_again, session, written
 
 OTHERS = ("fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf")
 QUICK = diagnose.Settings(without=but("cogging", "torque_offset"), most=1)
 
 
 def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
-    folder = written(tmp_path / "logs", session("cogging", 2))
+    folder = written(tmp_path / "logs", (*healthy_again(session()), *session("cogging", 2)))
     settings = run.Settings({"diagnose": QUICK}, OTHERS)
     outcome = run_stage(run.STAGE, Request((folder,), out=tmp_path / "out", no_report=True, check=True), settings)
     stored = json.loads((outcome.folder / "result.json").read_text())

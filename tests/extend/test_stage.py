@@ -30,10 +30,10 @@ def extended(folder: Path, out: Path, *causes: str, model: Path | None = None) -
 
 @pytest.fixture(scope="module")
 def rippled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome[extend.Extension]]:
-    """Cogging at joint 2; extended by that and by a Stribeck hump that is not there."""
+    """Cogging at joint 2; extended by that and by a drag that is not there."""
     place = tmp_path_factory.mktemp("extend")
     folder = written(place / "logs", session("cogging", 2))
-    return folder, extended(folder, place / "out", "cogging:2", "stribeck:2")
+    return folder, extended(folder, place / "out", "cogging:2", "quadratic_drag:1")
 
 
 def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Path, Outcome[extend.Extension]]) -> None:
@@ -41,11 +41,19 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
     _, outcome = rippled
     result = outcome.result
     assert [(one.cause, one.joint) for one in result.findings] == [("cogging", 2)]
-    assert [(one.cause, one.joint) for one in result.rejected] == [("stribeck", 2)]
+    assert [(one.cause, one.joint) for one in result.rejected] == [("quadratic_drag", 1)]
     assert result.rejected[0].reason
     assert (result.accepted, outcome.exit_code) == (False, 1)
-    assert "Stribeck friction at joint 2" in outcome.report.verdict
+    assert "at joint 1" in outcome.report.verdict
     assert "Now: fitted without what it is extended by." in outcome.report.key_figures.caption
+
+
+def test_a_hump_that_is_not_there_is_refused_beside_a_ripple(
+    rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path
+) -> None:
+    result = extended(rippled[0], tmp_path / "out", "cogging:2", "stribeck:2").result
+    assert [(one.cause, one.joint) for one in result.findings] == [("cogging", 2)]
+    assert [(one.cause, one.joint) for one in result.rejected] == [("stribeck", 2)]
 
 
 def test_an_order_of_which_only_a_harmonic_is_there_is_refused_with_what_was_fitted(

@@ -9,10 +9,10 @@ from pipelines.fit.equations import Array, Block
 from pipelines.fit.identifiability import (
     condition_number,
     hard_to_see,
+    identifiability,
     resolved_rank,
     typical_size,
     unresolved,
-    identifiability,
     visible,
 )
 from pipelines.fit.least_squares import Solution, fit

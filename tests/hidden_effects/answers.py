@@ -42,11 +42,12 @@ def finding(cause: str, joint: int | None, parameters: Mapping[str, float] | Non
                      "tip_error_rms": {"before": 1e-3, "after": 5e-4}}}
 
 
-def answer(*findings: dict[str, Any], verdict: str | None = None, not_identifiable: Mapping[str, str] | None = None) -> dict[str, Any]:
-    return {"verdict": verdict or ("cause" if findings else "no-fault-found"), "findings": list(findings), "standing": [],
+def answer(*findings: dict[str, Any], verdict: str | None = None,
+           not_identifiable: Mapping[str, str] | None = None) -> dict[str, Any]:
+    return {"verdict": verdict or ("cause" if findings else "no-fault-found"), "findings": list(findings), "baseline_effects": [],
             "rejected": [], "detection_limits": [],
             "not_identifiable": [{"cause": cause, "reason": reason} for cause, reason in (not_identifiable or {}).items()],
-            "residual_rms": {"identify": [1.0] * 3, "validate": [1.0] * 3, "floor": [FLOOR] * 3}}
+            "residual_rms": {"identify": [1.0] * 3, "validate": [1.0] * 3, "noise_floor": [FLOOR] * 3}}
 
 
 def oracle(out: Path) -> Engine:

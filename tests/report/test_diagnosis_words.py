@@ -12,6 +12,7 @@ import pytest
 
 from pipelines.model.diagnosis.answered.outcome import Result
 from pipelines.model.diagnosis.result import (
+    Alternative,
     BeforeAfter,
     DetectionLimit,
     Finding,
@@ -20,7 +21,6 @@ from pipelines.model.diagnosis.result import (
     Proof,
     Rejected,
     ResidualRms,
-    Alternative,
     Threshold,
     TorqueGain,
     Trial,
@@ -48,7 +48,8 @@ def found(cause: str) -> Finding:
     three = np.ones(3)
     gain = Gain(TorqueGain(three, 0.5 * three, np.zeros((3, 2))), None, "none", None)
     parameters = {q.name: Value(1.0, 0.1, q.unit) for q in find_effect(cause).parameters}
-    return Finding(cause, 2, find_effect(cause).title, parameters, 0.9, 0.8, (Alternative("torque_offset", 1, 0.9),), "record more", gain,
+    alternatives = (Alternative("torque_offset", 1, 0.9, 0.4),)
+    return Finding(cause, 2, find_effect(cause).title, parameters, 0.9, 0.8, alternatives, "record more", gain,
                    "residual", 0.2, 0.01, None)
 
 
@@ -153,7 +154,7 @@ def test_what_machines_in_order_have_is_no_problem(causes: tuple[str, ...], alte
                                                    tone: str) -> None:
     """No technician needs to look after a machine for the hump of its friction; where it is new he does, or where it may be a gap.
     """
-    near = tuple(Alternative(cause, 2, 0.9) for cause in alternatives)
+    near = tuple(Alternative(cause, 2, 0.9, 0.4) for cause in alternatives)
     findings = tuple(replace(found(cause), alternatives=near) for cause in causes)
     there = NOTHING | {"verdict": "cause", "question": question, "findings": findings}
     assert diagnosis_report(Result(**there)).tone == tone

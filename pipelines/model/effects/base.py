@@ -190,6 +190,12 @@ class Effect(Placed, ABC):
         """Names of the non-linear numbers that may be moved continuously."""
         return tuple(q.name for q in self.parameters if q.shape and not q.discrete and not q.derived)
 
+    def at_end(self, name: str, by: float) -> bool:
+        """Return whether a number of the shape is at the end of its range, and `by` points out of it."""
+        quantity = next(q for q in self.parameters if q.name == name)
+        here = float(getattr(self, name))
+        return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
+
     def possible(self, values: Values) -> bool:
         """Whether every parameter lies in its range."""
         return all(q.low <= values[q.name] <= q.high for q in self.parameters)

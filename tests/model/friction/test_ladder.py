@@ -57,7 +57,8 @@ def climbed(stretch: Stretch) -> tuple[object, tuple[str, ...], tuple[str, ...]]
     joint = OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)
     ladder = climb(Judge(LawEquations.of((stretch,), joint), None))
     gaps = unseen(coverage((stretch,)), ladder)
-    return ladder.chosen.law.name, tuple(one.law.name for one in ladder.alternatives), tuple(f"{gap.what} {gap.record}" for gap in gaps)
+    others = tuple(one.law.name for one in ladder.alternatives)
+    return ladder.chosen.law.name, others, tuple(f"{gap.what} {gap.record}" for gap in gaps)
 
 
 def test_an_offset_is_not_told_from_asymmetric_friction_without_rest() -> None:

@@ -200,6 +200,4 @@ def _beyond(model: Exact, which: Which, by: float) -> bool:
     if name.isdigit():
         return False
     effect = model.columns.laws[place] if kind == 0 else model.effects[place].effect
-    quantity = next(q for q in effect.parameters if q.name == name)
-    here = float(getattr(effect, name))
-    return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
+    return effect.at_end(name, by)
