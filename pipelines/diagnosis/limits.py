@@ -91,7 +91,9 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
     )
 
 
-def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> DetectionLimit | NotIdentifiable:
+def _limit(
+    later: Later, shapes: Sequence[_Shape], baseline: Baseline
+) -> DetectionLimit | NotIdentifiable:
     """Return the smallest of a cause that would have been found, or why none would."""
     visible = max(one.identifiability for one in shapes)
     first = shapes[0].effect
@@ -114,7 +116,9 @@ def _limit(later: Later, shapes: Sequence[_Shape], baseline: Baseline) -> Detect
     return _told(later, min(seen, key=lambda s: s.effect.strength), amplitudes, visible)
 
 
-def _told(later: Later, one: _Shape, amplitudes: Array, visible: float) -> DetectionLimit | NotIdentifiable:
+def _told(
+    later: Later, one: _Shape, amplitudes: Array, visible: float
+) -> DetectionLimit | NotIdentifiable:
     """Return the parameter that goes with the amplitudes, where an arm can have as much of it."""
     effect = one.effect
     values = effect.values(amplitudes)

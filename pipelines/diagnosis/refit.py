@@ -194,7 +194,9 @@ class Later:
         step = factor.solve(gradient)[first:] / _unit(slopes.norms)
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within = last.possible
-        for (of_effect, which, name), by, reach in zip(names, step, config.deviations * std, strict=True):
+        for (of_effect, which, name), by, reach in zip(
+            names, step, config.deviations * std, strict=True
+        ):
             if not of_effect or which != place:
                 continue
             if not name.isdigit():

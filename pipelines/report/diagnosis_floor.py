@@ -13,7 +13,14 @@ from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, to_one_place
 
-__all__ = ["floor_name", "floor_words", "held_out_words", "judge_words", "torque_errors", "what_stays"]
+__all__ = [
+    "floor_name",
+    "floor_words",
+    "held_out_words",
+    "judge_words",
+    "torque_errors",
+    "what_stays",
+]
 
 _TURNING = Units()
 # Ratio to the noise floor from which the residual of a joint is mentioned: of reference logs, and
@@ -64,9 +71,7 @@ def held_out_words(held_out: str) -> str:
     """Return which rows validate."""
     if held_out == "logs":
         return "Held-out errors are those of logs of role validate, to which nothing was fitted."
-    return (
-        "No log has the role validate: contiguous blocks of time were held out, one after the other."
-    )
+    return "No log has the role validate: contiguous blocks of time were held out, one after the other."
 
 
 def torque_errors(
@@ -96,6 +101,8 @@ def torque_errors(
     rows = tuple((j + 1, *torques[j::joints], *shares[j::joints]) for j in range(joints))
     unit, now = units.torque, "torque error now" if extended else "torque error"
     more = (f"extended [{unit}]",) if extended else ()
-    of_rated = ("now [% of rated]", "extended [% of rated]") if extended else ("error [% of rated]",)
+    of_rated = (
+        ("now [% of rated]", "extended [% of rated]") if extended else ("error [% of rated]",)
+    )
     heads = ("joint", f"{now} [{unit}]", *more, f"{name} [{unit}]", *of_rated)
     return Table(heads, rows, f"Held out, root mean square. {words}".strip())
