@@ -30,7 +30,7 @@ class Part:
     diagnosed: bool = False  # its result names causes, be it none
     verdict: str = ""  # of a diagnosis: "cause", "no-fault-found", "unknown", "cannot-judge"
     baseline_effects: tuple[str, ...] = ()  # what the reference logs show as well: "stribeck:2"
-    detection_limits: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, the least that is found
+    detection_limits: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, limit
 
 
 def parts_of(result: Mapping[str, Any], robot: str, recorded: str, turning: Sequence[bool] = ()) -> tuple[Part, ...]:
@@ -65,6 +65,7 @@ def read_part(about: Mapping[str, Any]) -> Part:
     told: dict[str, Any] = {
         "figures": {name: (float(v), float(s), str(u)) for name, (v, s, u) in about["figures"].items()},
         "residuals": {name: (float(v), str(u)) for name, (v, u) in about["residuals"].items()},
-        "detection_limits": {name: (str(parameter), float(least)) for name, (parameter, least) in about["detection_limits"].items()},
+        "detection_limits": {name: (str(parameter), float(least))
+                             for name, (parameter, least) in about["detection_limits"].items()},
         "findings": tuple(about["findings"]), "baseline_effects": tuple(about["baseline_effects"])}
     return Part(**{**about, **told})

@@ -14,9 +14,9 @@ import numpy as np
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.engine import Diagnosis as Found
 from pipelines.diagnosis.findings import (
+    alternatives_of,
     extension_of,
     findings_of,
-    alternatives_of,
     weigh,
 )
 from pipelines.diagnosis.limits import Limits, limits_of

@@ -216,11 +216,6 @@ class Dataset:
         return self.model.arm
 
     @property
-    def n_base(self) -> int:
-        """Numbers of the nominal model that are linear."""
-        return len(self.model.beta)
-
-    @property
     def known(self) -> Rows:
         """The rows that tell what is usual on this machine."""
         return self.reference or self.cleared or self.later

@@ -31,7 +31,7 @@ from pipelines.model.diagnosis.worth.gains import (
 from pipelines.model.diagnosis.worth.numbers import parameters
 from pipelines.model.diagnosis.worth.proof import proof
 
-__all__ = ["Worth", "extension_of", "findings_of", "alternatives_of", "weigh"]
+__all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "weigh"]
 
 
 @dataclass(frozen=True, eq=False)

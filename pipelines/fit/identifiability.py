@@ -23,9 +23,19 @@ from pipelines.fit.equations import Array
 from pipelines.fit.least_squares import Solution
 from pipelines.fit.statistics import Statistics
 
-__all__ = ["Direction", "Separation", "Unresolved", "condition_number", "hard_to_see", "not_separated",
-           "resolved_rank", "typical_size", "unresolved",
-           "identifiability", "visible"]
+__all__ = [
+    "Direction",
+    "Separation",
+    "Unresolved",
+    "condition_number",
+    "hard_to_see",
+    "identifiability",
+    "not_separated",
+    "resolved_rank",
+    "typical_size",
+    "unresolved",
+    "visible",
+]
 
 _WHOLE = 3.0  # a direction is lost if three standard deviations of it are as large as all that was measured
 _SURE = 3.0  # standard deviations that a value must stand from zero

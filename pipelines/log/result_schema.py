@@ -16,7 +16,7 @@ import numpy as np
 
 from pipelines.log.field_words import words_of
 
-__all__ = ["DRAFT", "object_schema", "result_schema"]
+__all__ = ["DRAFT", "result_schema"]
 
 DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
 _PLAIN: Final[dict[Any, dict[str, Any]]] = {
@@ -36,13 +36,6 @@ def result_schema(kind: type[Any], command: str) -> dict[str, Any]:
     whole["properties"] = {"command": {"const": command, "description": "the command that has left this"}} | whole["properties"]
     whole["required"] = ["command", *whole["required"]]
     title = f"result.json of rrrid {command}"
-    return {"$schema": DRAFT, "title": title, **whole, "$defs": {name: defs[name] for name in sorted(defs)}}
-
-
-def object_schema(kind: type[Any], title: str) -> dict[str, Any]:
-    """The schema of another file that `encode` writes of a `kind`."""
-    defs: _Defs = {"numbers": _ARRAY, "series": _SERIES}
-    whole = _object(kind, defs)
     return {"$schema": DRAFT, "title": title, **whole, "$defs": {name: defs[name] for name in sorted(defs)}}
 
 

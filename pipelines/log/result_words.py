@@ -20,7 +20,8 @@ WORDS: Final[dict[str, str]] = {
     "experiment": "kind of experiment: friction, excitation, writing, frf, hold or free",
     "role": "what the log serves for: identify, validate or reference", "model": "the model that was taken, or null",
     "samples": "number of samples", "seed": "seed of everything drawn", "checks": "what the log doctor remarks",
-    "doctor": "remarks on the data", "data_quality": "remarks on the data", "stage": "the command that was run", "stages": "every stage, in the order it was run",
+    "doctor": "remarks on the data", "data_quality": "remarks on the data",
+    "stage": "the command that was run", "stages": "every stage, in the order it was run",
     "LogSummary.joints": "number of joints", "ImportedLog.joints": "number of joints", "Converted.joints": "number of joints",
     "torque_units": "unit of torque of each joint: N m, or N where it slides",
     # numbers

@@ -128,7 +128,8 @@ def _angle(e: Evidence, before: float, after: float, joint: int | None, factor: 
                              signal="q", gate=True,
                              remedy="correct the unit of the angles on import, rad or deg or turns: it is declared for all of them")
     return e.subject.say("S15", "warn",
-                         f"q of joint {joint + 1} fits if multiplied by {factor}, residual {before:.2g} -> {after:.2g}{alternative}",
+                         f"q of joint {joint + 1} fits if multiplied by {factor}, residual {before:.2g} -> {after:.2g}"
+                         f"{alternative}",
                          signal="q", joint=joint, gate=True,
                          remedy="correct the gear ratio, the direction or the counts per turn of this encoder"
                                 + (", or the gear ratio or torque constant of this torque" if alternative else ""))

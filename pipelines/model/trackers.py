@@ -110,7 +110,7 @@ def _near_ends(lost: Mask, reach: int) -> Mask:
 
 
 def difference_tracker(seen: Measured, how: Reconstruction) -> Tracker:
-    """Central differences, of the samples or of what a zero-phase low-pass leaves of them: textbook alternatives without deviations."""
+    """Central differences, of the samples or of what a zero-phase low-pass leaves of them: textbook methods without deviations."""
     lowest, highest = 1.0 / (seen.longest.size * seen.step), _FASTEST / seen.step
     if how.method == "zero-phase" and not all(lowest <= hz <= highest for hz in how.bandwidth or ()):
         raise UsageError("C02", "a cut-off whose period is longer than the log, or near half the rate", where="--bandwidth",

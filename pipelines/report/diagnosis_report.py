@@ -1,4 +1,4 @@
-"""The report of a diagnosis: the verdict and what to check, the proof, the picture of what is wrong, alternatives, ledger, limits."""
+"""The report of a diagnosis: verdict, what to check, proof, residual analysis, alternatives, candidates, limits."""
 
 from __future__ import annotations
 
@@ -203,7 +203,8 @@ def _others(result: Result) -> list[Section]:
         more = len(result.ledger) - len(rows)
         text = (f"{more} more, all weaker, stand in result.json.",) if more > 0 else ()
         sections.append(Section("Ledger of hypotheses", text, (Table(
-            ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]", "identifiability",
+            ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]",
+             "identifiability",
              "outcome"), rows,
             "Gain in square: share of the squared residual of the fitted logs that each takes away; what does not exceed its "
             f"threshold is not believed, nor what time held out does not bear out. {_OUT_OF_REACH} "

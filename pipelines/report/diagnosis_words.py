@@ -5,9 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-import numpy as np
-
-from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.answered.words import other_joint
 from pipelines.model.diagnosis.result import Finding, Rejected, Value
 from pipelines.model.effects import effect_names, find_effect
@@ -16,7 +13,7 @@ from pipelines.model.words import within
 from pipelines.report.joint_units import Units
 from pipelines.report.style import format_number, format_unit, unit_in_words, with_std
 
-__all__ = ["as_sentence", "at_places", "cause_at", "in_order", "is_cause", "meaning_of", "named", "per_joint", "spoken",
+__all__ = ["as_sentence", "at_places", "cause_at", "in_order", "is_cause", "meaning_of", "named", "spoken",
            "title_of", "together", "told_value", "told_values", "torque_of", "unit_or_dash", "without_keys"]
 
 _COUNTED = ("second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth")
@@ -149,6 +146,3 @@ def in_order(cause: str, parameters: Mapping[str, Value]) -> list[tuple[str, Val
     return sorted(parameters.items(), key=lambda item: rank(item[0]))
 
 
-def per_joint(x: Array) -> str:
-    """"0.02, 0.01, 0.005"."""
-    return ", ".join(format_number(float(v), 2) for v in np.ravel(x))

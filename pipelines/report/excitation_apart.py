@@ -17,7 +17,7 @@ def are_rivals(found: Apart | None) -> bool:
 
 
 def alike_words(found: Apart) -> str:
-    """How alike two causes look, on which side of what diagnose calls alternatives that is, and whether the plain design was kept."""
+    """Return how alike two causes look, and whether the plain design was kept."""
     before, after = (_on_its_side(one.similarity) for one in (found.before, found.after))
     judged = (f"more than {RIVALS:g}: diagnose would still call them alternatives, and a longer search or wider limits may "
               "tell them apart" if are_rivals(found) else f"no more than {RIVALS:g}: diagnose would not call them alternatives")

@@ -14,15 +14,38 @@ from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.experiment import Array
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms, WithoutLimit
 
-__all__ = ["RIVALS", "Answer", "BeforeAfter", "Curve", "DetectionLimit", "Diagnosis", "Evidence", "Finding", "Gain", "NotIdentifiable",
-           "Proof", "Rejected", "ResidualRms", "Alternative", "SimulatedSpan", "Spectrum", "Standing", "Threshold", "TipError",
-           "TorqueGain", "Trial", "Value", "Verdict"]
+__all__ = [
+    "RIVALS",
+    "Alternative",
+    "Answer",
+    "BeforeAfter",
+    "Curve",
+    "DetectionLimit",
+    "Diagnosis",
+    "Evidence",
+    "Finding",
+    "Gain",
+    "JudgedBy",
+    "NotIdentifiable",
+    "Proof",
+    "Rejected",
+    "ResidualRms",
+    "SimulatedSpan",
+    "Spectrum",
+    "Standing",
+    "Threshold",
+    "TipError",
+    "TorqueGain",
+    "Trial",
+    "Value",
+    "Verdict",
+]
 
 RIVALS = 0.8  # similarity from which two causes explain the same
 Verdict = Literal["cause", "no-fault-found", "unknown", "cannot-judge"]
+JudgedBy = Literal["logs", "blocks"]
 
 
 @dataclass(frozen=True)

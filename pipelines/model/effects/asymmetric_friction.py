@@ -39,7 +39,6 @@ class AsymmetricFriction(Effect):
     explanation = "Preload, seal lips and worm or harmonic gears rub more in one direction of motion."
     remedy = "Look at preload and seals; what stays, compensate with coefficients of its own in each direction."
     experiment = "Hold still for two seconds in several positions, then move at several equal speeds in both directions."
-    twins = ("torque_offset", "spring")
     shared = ("sharpness",)
     from_motion = True
 

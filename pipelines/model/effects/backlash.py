@@ -58,8 +58,6 @@ class Backlash(Effect):
     size = "gap"
     evidence = "reversals"
     from_body = True
-    twins = ("joint_elasticity", "presliding")
-    needs = ("reversals of torque, or frequency responses at two amplitudes",)
     fixed_amplitudes = (1.0,)
     grows_with = "gap"
 

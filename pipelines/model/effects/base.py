@@ -90,8 +90,6 @@ class Effect(Placed, ABC):
     remedy: ClassVar[str]  # what to do about it
     experiment: ClassVar[str]  # what to record to be sure
     size: ClassVar[str] = ""  # the number that a verdict tells beside the title, if one alone says how much of it there is
-    twins: ClassVar[tuple[str, ...]] = ()  # effects it can be mistaken for
-    needs: ClassVar[tuple[str, ...]] = ()  # what beyond position and torque it takes to see it: "reference log"
     fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
     grows_with: ClassVar[str] = ""  # where physics gives all amplitudes: the number that says how much of it there is
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
@@ -107,7 +105,6 @@ class Effect(Placed, ABC):
     passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
-    shapeless: ClassVar[bool] = False  # its law is the machine's to the last: it leaves no rest for another to mend
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
     slight: ClassVar[float] = 0.0  # of its amplitude, if it has one alone: what surely is less, instruments in order have as well
     turns: ClassVar[bool] = False  # only a joint that turns can have it
@@ -147,15 +144,6 @@ class Effect(Placed, ABC):
         """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
         return self
 
-    def looser(self) -> Self:
-        """A form with more numbers than any that is named: what it takes of a later finding is the rest of its own shape."""
-        return self
-
-    @property
-    def decided(self) -> float:
-        """Share of the squared error that another law of the same cause leaves, that it leaves at most, to be taken instead."""
-        return 0.9
-
     def forms(self) -> tuple[Self, ...]:
         """Other laws of the same cause, each to be tried in place of this one, which is the most likely."""
         return ()
@@ -175,10 +163,6 @@ class Effect(Placed, ABC):
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
         """The samples in which it acts, where it acts for a moment only."""
         return None
-
-    def believable(self, motions: Sequence[Motion], arm: ArmModel) -> bool:
-        """Whether an arm with it, in this shape, could have moved as it did in these logs."""
-        return True
 
     @property
     def strength(self) -> float:

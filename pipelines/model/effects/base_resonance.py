@@ -43,9 +43,7 @@ class BaseResonance(Effect):
     experiment = "Measure the frequency response of the first joint in two postures with different inertia."
     size = "frequency"
     evidence = "frequency responses"
-    twins = ("joint_elasticity",)
     from_body = True
-    needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

@@ -58,7 +58,6 @@ class Cogging(Effect):
     explanation = "Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: each once or many times a turn."
     remedy = "Look for a damaged magnet, tooth or bearing where it is new; else add it to the feed-forward by the joint's angle."
     experiment = "Turn the joint slowly through its whole range, both ways, at two speeds."
-    twins = ("position_friction", "spring", "gravity_tilt", "encoder_eccentricity")
     per_log = ("phase", "phase_2", "phase_3")  # where an encoder is zeroed at each start
     from_motion = True
 
@@ -109,11 +108,6 @@ class Cogging(Effect):
     def forms(self) -> tuple[Self, ...]:
         """Behind a gear; of an order close to a whole one as well."""
         return (replace(self, whole=False), replace(self, whole=False, apart=0.0)) if self.whole else ()
-
-    @property
-    def decided(self) -> float:
-        """An order close to a whole one has to explain nearly all of the rest: waves that are missing pull as far as that."""
-        return super().decided if self.whole or self.apart else _ALL_BUT
 
     def possible(self, values: Values) -> bool:
         apart = self.whole or abs(self.order - round(self.order)) >= self.apart

@@ -42,7 +42,6 @@ class ConcaveFriction(Effect):
     remedy = ("Harmonic drives and greased gears have it, and nothing need be broken: compensate it in the feed-forward; "
               "a single viscous coefficient is too large at speed and too small below it.")
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
-    twins = ("stribeck", "quadratic_drag", "viscous", "three_sigmoid")
     friction = True
     ordinary = True
     from_motion = True

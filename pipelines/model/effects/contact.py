@@ -46,7 +46,6 @@ class Contact(Effect):
     explanation = "Somebody or something touched the arm, or it brushed against an obstacle."
     remedy = "Leave the moment out of the fit; clear the workspace and record again."
     experiment = "Repeat the same motion: what does not come again was a touch."
-    twins = ("backlash", "payload")
     per_log = ("start", "duration", "force", "force_x", "force_y", "force_z")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -50,7 +50,6 @@ class Coulomb(Effect):
     remedy = "If it has grown, check lubrication, preload and seals; compensate it in the feed-forward."
     experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
     evidence = "none"
-    twins = ("viscous", "three_sigmoid", "asymmetric_friction", "presliding")
     friction = True
     from_motion = True
 

@@ -25,7 +25,6 @@ class DriveLag(Effect):
     remedy = "Tune the current loop; lead the feed-forward by the time constant."
     experiment = "Repeat an experiment at two speeds, or record the joint's frequency response."
     size = "time_constant"
-    twins = ("time_delay", "torque_lag", "rotor_inertia")
     in_drive = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

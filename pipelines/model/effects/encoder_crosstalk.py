@@ -33,7 +33,6 @@ class EncoderCrosstalk(Effect):
     remedy = "Take the part found off the reading; look at what couples the two encoders."
     experiment = "Hold this joint still against a stop or a level and move the other over its range."
     size = "coefficient"
-    twins = ("link_length", "transmission_coupling")
     from_own_joint = True
     misread = True
 

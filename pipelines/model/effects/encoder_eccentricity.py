@@ -34,7 +34,6 @@ class EncoderEccentricity(Effect):
     remedy = "Correct the reading by the sine found, or centre the disc; two opposite heads cancel it."
     experiment = "Turn the joint over a full turn at three constant speeds."
     size = "amplitude"
-    twins = ("cogging", "spring", "gravity_tilt")
     from_own_joint = True
     misread = True
     turns = True

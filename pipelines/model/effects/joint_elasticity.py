@@ -45,9 +45,7 @@ class JointElasticity(Effect):
     experiment = "Measure the frequency response of this joint in two postures with different inertia."
     size = "frequency"
     evidence = "frequency responses"
-    twins = ("base_resonance", "backlash")
     from_body = True
-    needs = ("frequency responses in two postures",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

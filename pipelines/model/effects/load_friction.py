@@ -44,7 +44,6 @@ class LoadFriction(Effect):
     explanation = "Teeth and bearings are pressed together by the torque that passes them, and rub in proportion."
     remedy = "Check the lubrication of the gear; compensate it with the predicted torque."
     experiment = "Move the joint at one speed in both directions under three loads: three postures, or payloads."
-    twins = ("torque_gain", "position_friction")
     shared = ("sharpness",)
     friction = True
 

@@ -42,8 +42,6 @@ class Payload(Effect):
     experiment = "Repeat the same experiment without the load."
     evidence = "base parameters"
     size = "mass"
-    twins = ("link_length",)
-    needs = ("a reference log without the load",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         regressor = arm.body.regressor(motion.q, motion.dq, motion.ddq)

@@ -50,7 +50,6 @@ class PositionFriction(Effect):
     explanation = "A bent shaft, an uneven seal or bearing, cables that press in some postures."
     remedy = "Look for wear, a bent shaft or cables that rub; compensate it with the angle."
     experiment = "Turn the joint slowly through its whole range in both directions, at two speeds."
-    twins = ("cogging", "load_friction", "viscous_drift")
     shared = ("sharpness",)
     from_motion = True
 

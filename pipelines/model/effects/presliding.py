@@ -68,7 +68,6 @@ class Presliding(Effect):
     remedy = ("Every bearing has it, and nothing need be broken: simulate it where slow reversals matter; friction compensation "
               "by the sign of speed alone pushes too early.")
     experiment = "Reverse the joint slowly and often, with strokes from a tenth of the distance to many times it."
-    twins = ("backlash", "coulomb", "stribeck")
     ordinary = True
     from_motion = True
 

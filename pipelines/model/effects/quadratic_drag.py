@@ -23,7 +23,6 @@ class QuadraticDrag(Effect):
     explanation = "Windage, and oil that is churned by gears or fills a bearing."
     remedy = "Check the oil level; compensate it in the feed-forward."
     experiment = "Move the joint in both directions at seven to ten constant speeds up to the highest it allows."
-    twins = ("stribeck", "concave_friction", "viscous")
     friction = True
     from_motion = True
 

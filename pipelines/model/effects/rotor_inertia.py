@@ -25,9 +25,7 @@ class RotorInertia(Effect):
     remedy = "Add it to the model; it is a property of the machine, not a fault."
     experiment = "Accelerate the joint in two postures with different load inertia."
     size = "inertia"
-    twins = ("torque_gain", "link_length")
     from_motion = True
-    shapeless = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self.own(motion.ddq))

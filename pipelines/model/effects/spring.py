@@ -55,7 +55,6 @@ class Spring(Effect):
     explanation = "A cable bundle, a hose or a balancing spring pulls the joint."
     remedy = "Look for a cable that is led too short or has come loose; add it to the model."
     experiment = "Hold the joint at rest in many angles over its whole range, with another joint in two postures."
-    twins = ("gravity_tilt", "cogging", "torque_offset")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -82,9 +81,6 @@ class Spring(Effect):
 
     def full(self) -> Self:
         return replace(self, degree=self.highest)
-
-    def looser(self) -> Self:
-        return replace(self, degree=_ANY)
 
     def forms(self) -> tuple[Self, ...]:
         return (replace(self, degree=_MORE, highest=_MORE),) if self.highest == _DEGREE else ()

@@ -47,7 +47,6 @@ class Stribeck(Effect):
     remedy = ("Most oiled gears have it, and nothing need be broken: compensate it in the feed-forward; "
               "another lubricant moves the hump.")
     experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
-    twins = ("quadratic_drag", "three_sigmoid", "concave_friction", "presliding")
     shared = ("sharpness",)
     friction = True
     ordinary = True

@@ -42,7 +42,6 @@ class ThreeSigmoid(Effect):
     remedy = "Compensate it in the feed-forward; the dip is what makes slow motion stick."
     experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
     evidence = "none"
-    twins = ("coulomb", "viscous", "stribeck", "concave_friction")
     plainer = (("two_sigmoid",), ("coulomb", "viscous"))
     friction = True
     from_motion = True

@@ -34,7 +34,6 @@ class TimeDelay(Effect):
     remedy = "Stamp positions where they are taken, or move this joint's signal by the delay before it is used; lower the gains."
     experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
     size = "delay"
-    twins = ("drive_lag", "torque_lag")
     from_own_joint = True
     misread = True
 

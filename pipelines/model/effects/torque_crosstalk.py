@@ -31,9 +31,7 @@ class TorqueCrosstalk(Effect):
     remedy = "Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission."
     experiment = "Load one joint while the others carry nothing, each in turn."
     size = "coefficient"
-    twins = ("torque_gain", "transmission_coupling")
     in_drive = True
-    shapeless = True
     slight = 0.002  # amplifiers that are in order lead over as much; between a turn and a slide it is one per metre
 
     def __post_init__(self) -> None:

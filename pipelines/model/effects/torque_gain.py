@@ -30,11 +30,8 @@ class TorqueGain(Effect):
     remedy = "Where it fell, look at the motor's magnets and the amplifier; correct the torque constant."
     experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
     size = "gain_error"
-    twins = ("load_friction", "torque_crosstalk", "rotor_inertia", "torque_saturation")
     in_drive = True
-    shapeless = True
     slight = 0.0075  # a current sensor that is exact to a hundredth of its range may be off by so much
-    needs = ("a known payload, where all joints have the same error",)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self.own(self.predicted(motion, arm)))

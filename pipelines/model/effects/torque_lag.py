@@ -27,7 +27,6 @@ class TorqueLag(Effect):
     remedy = "Log the torque unfiltered, or filter position by the same low-pass; it is no fault of the arm."
     experiment = "Repeat an experiment at two speeds: a fit at one must hold at the other."
     size = "time_constant"
-    twins = ("time_delay", "drive_lag", "rotor_inertia")
     from_own_joint = True
     last = True
     passing = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)

@@ -23,7 +23,6 @@ class TorqueOffset(Effect):
     explanation = "The zero of the current sensor or of the amplifier is off, or a cable or spring pulls evenly."
     remedy = "Calibrate the zero of the current measurement; look for a cable under tension."
     experiment = "Hold still for two seconds, and cross the same position in both directions."
-    twins = ("asymmetric_friction", "spring")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

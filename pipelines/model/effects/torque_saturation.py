@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -39,7 +39,6 @@ class TorqueSaturation(Effect):
     remedy = "Correct the limit in the controller's settings, or ask for less acceleration; look at supply and temperature limits."
     experiment = "Repeat the experiment slower, so that the torque stays below the limit."
     size = "limit"
-    twins = ("torque_gain", "load_friction", "quadratic_drag")
     in_drive = True
     fixed_amplitudes = (1.0,)
     grows_with = "limit"
@@ -63,12 +62,6 @@ class TorqueSaturation(Effect):
         asked = self.own(tau if motion.tau is None else motion.tau)
         tau[:, self._index] += values["coefficient"] * self._excess(motion, asked, values["limit"])
         return tau
-
-    def believable(self, motions: Sequence[Motion], arm: ArmModel) -> bool:
-        """Not where most of the time more is asked for than comes out: such a joint follows nothing. Of clipped torque the logs say
-        no more than that it is high, so that a limit below nearly all of it would explain whatever there is."""
-        beyond = [np.abs(self.own(self._asked(motion, arm))) > self.limit for motion in motions]
-        return bool(np.concatenate(beyond).mean() <= _MOST)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         def applied(command: Array, motion: Motion, _: Array) -> Array:

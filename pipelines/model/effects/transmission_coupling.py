@@ -39,7 +39,6 @@ class TransmissionCoupling(Effect):
     remedy = ("Keep this effect in the model, and see that the robot description has the transmission matrix: the motor is felt "
               "through both joints.")
     experiment = "Move the two joints together, against each other, and each alone."
-    twins = ("load_friction", "torque_crosstalk", "rotor_inertia")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -41,7 +41,6 @@ class TwoSigmoid(Effect):
     remedy = "Compensate it in the feed-forward; a dip is what makes slow motion stick."
     experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
     evidence = "none"
-    twins = ("coulomb", "viscous", "three_sigmoid", "stribeck", "concave_friction")
     plainer = (("coulomb", "viscous"),)
     friction = True
     from_motion = True

@@ -22,7 +22,6 @@ class Viscous(Effect):
     remedy = "Compensate it in the feed-forward; it falls as the joint warms up, so log the temperature."
     experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
     evidence = "none"
-    twins = ("coulomb", "three_sigmoid", "quadratic_drag", "viscous_drift")
     friction = True
     from_motion = True
 

@@ -34,7 +34,6 @@ class ViscousDrift(Effect):
     explanation = "Grease gets thinner as it warms up, and thickens again in a pause."
     remedy = "Warm the arm up before it is measured or used; let the feed-forward follow the temperature."
     experiment = "Repeat one cycle for several minutes from a cold start, and once more when the arm is warm."
-    twins = ("position_friction", "load_friction")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         start = motion.t[0] if self.since is None else self.since

@@ -8,9 +8,8 @@ from pipelines.errors import Check
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
-from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, JudgedBy, Rejected, ResidualRms
 from pipelines.model.diagnosis.worth.extended import Extended
 
 __all__ = ["Extension", "Result"]

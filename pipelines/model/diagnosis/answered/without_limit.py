@@ -31,7 +31,8 @@ def without_limit(told: Diagnosis, frf: bool, without: Collection[str] = ()) -> 
         frf: whether there are frequency responses.
         without: names of causes that were left out.
     """
-    there = {one.cause for some in (told.findings, told.baseline_effects, told.detection_limits, told.not_identifiable) for one in some}
+    there = {one.cause
+             for some in (told.findings, told.baseline_effects, told.detection_limits, told.not_identifiable) for one in some}
     laws = set() if told.nominal is None else {law.effect.name for law in told.nominal.friction}
     refused = {one.cause: one.reason for one in told.rejected}
     return tuple(WithoutLimit(kind.name, f"rejected: {refused[kind.name]}" if kind.name in refused else _seen(kind, laws, frf))

@@ -65,23 +65,6 @@ class Refined:
     def rms(self) -> Array:
         return self.data.rms(self.left)
 
-    @property
-    def lean(self) -> Refined:
-        """Without its rows, and what is kept of them beside residual and slopes: what another process need not send."""
-        return replace(self, data=Data(()), model=replace(self.model))
-
-    def with_rows(self, data: Data, like: Exact) -> Refined:
-        """A `lean` one with its rows, and with what it shares with the model `like` that it was fitted from: the very rigid body,
-        laws that have not moved, and what stands beside every model."""
-        laws = tuple(own if own == law else law for law, own in zip(self.model.columns.laws, like.columns.laws, strict=True))
-        columns = replace(self.model.columns, body=like.columns.body, arm=like.columns.arm, laws=laws)
-        return replace(self, data=data, model=replace(self.model, columns=columns, standing=like.standing))
-
-    @property
-    def of_effects(self) -> Array:
-        """(rows,) [N m] what all effects together do to the torque."""
-        return np.asarray(self.model.torque(self.data) - replace(self.model, effects=()).torque(self.data))
-
     def of_effect(self, place: int) -> list[int]:
         """Which slopes belong to effect number `place`."""
         first = len(self.model.beta)

@@ -26,7 +26,7 @@ from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Arms", "Family", "Laid", "families", "lay_family", "lay_one", "lay_shape", "place_of", "runs_away", "whole_motion"]
+__all__ = ["Arms", "Family", "Laid", "families", "lay_family", "place_of", "runs_away", "whole_motion"]
 
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
@@ -137,15 +137,6 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
         yield _lay_some(data, family, first, size, arm)
 
 
-def lay_shape(data: Data, family: Family, place: int, arm: Arm) -> Array:
-    """(k, rows) of shape number `place`, kept with those that `lay_family` lays beside it."""
-    size = _at_once(data, family, arm.unrecorded)
-    laid = _lay_some(data, family, place // size * size, size, arm)
-    whole = np.zeros((laid.table.shape[1], data.rows))
-    whole[:, laid.rows] = laid.table[place - laid.first]
-    return whole
-
-
 def _lay_some(data: Data, family: Family, first: int, size: int, whole: Arm) -> Laid:
     some, arm = family.shapes[first:first + size], whole.unrecorded
     with np.errstate(all="ignore"):
@@ -233,6 +224,3 @@ def _first_samples(data: Data) -> Motion:
     return Motion(motion.t[:8], motion.q[:8], motion.dq[:8], motion.ddq[:8], None if motion.tau is None else motion.tau[:8])
 
 
-def lay_one(data: Data, effect: Effect, arm: Arm) -> Array:
-    """(k, rows) of one effect in one shape."""
-    return data.lay(lambda motion: effect.columns(motion, arm))

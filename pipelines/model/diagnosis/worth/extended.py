@@ -9,10 +9,9 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.asked.fitted_too import JudgedBy
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.fitted.refit import Refined
-from pipelines.model.diagnosis.result import Finding, Gain, Rejected, ResidualRms
+from pipelines.model.diagnosis.result import Finding, Gain, JudgedBy, Rejected, ResidualRms
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
 

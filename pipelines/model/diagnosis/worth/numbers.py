@@ -24,7 +24,7 @@ from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.result import Value
 from pipelines.model.effects.base import Effect, Values
 
-__all__ = ["acting", "of_amplitudes", "of_no_size", "parameters", "standard_deviations", "told", "too_slight"]
+__all__ = ["acting", "of_amplitudes", "parameters", "standard_deviations", "told"]
 
 Mask = npt.NDArray[np.bool_]
 
@@ -67,16 +67,6 @@ def of_amplitudes(effect: Effect, amplitudes: Array, covariance: Array, revolute
     return Acting.of(effect, values, known, revolute=_turning(effect, revolute))
 
 
-def of_no_size(done: Refined) -> list[int]:
-    """Places of effects that are not told from none, in the model with all of them: of one number alone, by that; of several
-    amplitudes, by all of them together; and of what happened once, a touch so short, or so near the end of its log, that any force
-    would do."""
-    effects = done.model.effects
-    several = {place for place, one in enumerate(effects) if one.log is not None or len(one.amplitudes) > 1}
-    alone = [place for place, size, std in _sizes(done) if std > 0.0 and size < _STDS * std and place not in several]
-    return sorted([*alone, *(place for place in several if _from_none(done, place) < _limit(len(effects[place].amplitudes)))])
-
-
 def _limit(count: int) -> float:
     """Deviations from none of so many numbers together that chance gives as seldom as `_STDS` of one: of χ², whose third root is
     nearly normal (Wilson & Hilferty 1931)."""
@@ -93,12 +83,6 @@ def _from_none(done: Refined, place: int) -> float:
     a = np.array(done.model.effects[place].amplitudes)
     size = np.maximum(np.sqrt(np.maximum(np.diag(own), 0.0)), 1e-300)
     return float(np.sqrt(max(float(a / size @ np.linalg.pinv(own / size[:, None] / size, hermitian=True) @ (a / size)), 0.0)))
-
-
-def too_slight(done: Refined) -> list[int]:
-    """Places of effects of which there surely is less than machines in order have, in the model with all of them."""
-    return [place for place, size, std in _sizes(done)
-            if std > 0.0 and size + _SURE * std < done.model.effects[place].effect.slight]
 
 
 def _sizes(done: Refined) -> list[tuple[int, float, float]]:
