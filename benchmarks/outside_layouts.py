@@ -27,7 +27,7 @@ import numpy as np
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("formats", "formats_2", "formats_5")
+SETS = ("formats", "formats_2", "formats_5", "formats_6")
 
 
 @dataclass(frozen=True)
