@@ -22,9 +22,8 @@ from benchmarks.outside_formats import (
     SIX,
     THREE,
     TWO,
-    UR,
     UNITS,
-    current,
+    UR,
     stamps,
     table,
     values,
@@ -294,7 +293,7 @@ def parquet_ns(folder: Path, run: Run) -> Answer:
     specs += "*joint_act_torque_{}=tau; joint_ext_torque_{}=ext; joint_temp_{}=temp"
     tick = 1712143331250000000 + np.round(run.t * 1e9).astype(np.int64)
     columns, right = wide(run, specs, tick=tick)
-    frame = pd.DataFrame({k: v for k, v in columns.items()})
+    frame = pd.DataFrame(columns)
     reals = frame.select_dtypes("float64").columns
     frame[reals] = frame[reals].astype(np.float32)
     frame.to_parquet(folder / "part-0.parquet")
