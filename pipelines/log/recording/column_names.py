@@ -82,7 +82,7 @@ _MOTOR = _set("motor mot motors rotor drive antrieb encoder servo")
 _JOINT = _set("joint joints jnt jnts axis axes achse gelenk link actuator actuators arm j a")
 _NOISE = _set(
     "field fields data msg value values val state states robot robots header vector array log record signal "
-    "channel ch info feedback_data raw side of the in and ma"
+    "channel ch info feedback_data raw side of the in and ma active applied control"
 )
 _COMPOUND = sorted(
     {word for words in _QUANTITIES.values() for word in words if len(word) > 1}

@@ -26,6 +26,8 @@ from pipelines.log.recording.evidence import (
     Guess,
     Slope,
     held,
+    link_gains,
+    motion_of,
     position_unit,
     quarter_turns,
     sign_of,
@@ -54,7 +56,6 @@ __all__ = ["Draft", "guess_recipe"]
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _USABLE = 0.8  # of the cells of a column that is looked at
-_HELD_UP = 0.1  # of the arm's own weight: torques in N m of the joints hold up at least its order of magnitude
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
@@ -83,15 +84,15 @@ class Draft:
     blanks: tuple[str, ...]  # what must be filled in before it runs
 
 
-Weight = Callable[[RobotDescription, Array], Array | None]
+Model = Callable[[RobotDescription, Array, Array, Array], Array | None]
 
 
-def guess_recipe(path: Path, robot: str | None = None, weight: Weight | None = None) -> Draft:
+def guess_recipe(path: Path, robot: str | None = None, model: Model | None = None) -> Draft:
     """Return a commented recipe for the recording in `path`; companion files and the robot in its folder are used.
 
     Args:
         robot: description to use instead of the one beside the recording.
-        weight: the gravity torques (samples, joints) [N m] of a robot at positions [rad], None where its links are unknown.
+        model: the torques (samples, joints) [N m] of a robot at q, dq, ddq [rad], None where its links are unknown.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
@@ -107,7 +108,7 @@ def guess_recipe(path: Path, robot: str | None = None, weight: Weight | None = N
     if companion is not None:
         companion = _sound(companion, lost)
         reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
-    return _Drafting(reading, lost, weight).draft()
+    return _Drafting(reading, lost, model).draft()
 
 
 def _lost_numbers(table: RawTable) -> list[float]:
@@ -148,9 +149,9 @@ def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
 class _Drafting:
     """Collects the lines of a draft. Not frozen: it is the pencil, the `Draft` is the result."""
 
-    def __init__(self, reading: Reading, lost: Sequence[float], weight: Weight | None) -> None:
+    def __init__(self, reading: Reading, lost: Sequence[float], model: Model | None) -> None:
         self.reading = reading
-        self.lost, self.weight = lost, weight
+        self.lost, self.model = lost, model
         self.evidence: list[str] = []
         self.blanks: list[str] = []
         q, tau = reading.q.group, reading.tau.group
@@ -169,6 +170,7 @@ class _Drafting:
                 self.t = reading.clock.values * factor
                 self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
         self.current = tau is not None and tau.quantity == "current"
+        self.gains = self._link_gains()
         self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
 
     def note(self, what: str, guess: Guess) -> str:
@@ -282,6 +284,10 @@ class _Drafting:
         if choice.group is None or self.q is None or self._out_of_order(choice.group):
             return self._open("q", choice)
         units, further, why = self._position_units(choice.group)
+        refuted = self.gains is not None and not np.isfinite(self.gains).any()
+        if refuted and self.slope is None and set(unit_of_group(choice.group.columns, self.reading.table)) == {None}:
+            units = [""] * self.n
+            why = [Guess("", "unsure", "by the robot's own links the torques do not follow from this motion in " + why[0].value)]
         if BLANK in further:
             self.blanks.append("signals.q.counts_per_rev")
         lines = [f"q = {{ {_columns(choice.group.columns, self.reading.table)}, unit = {self._units('q', units)}{further} }}"]
@@ -354,15 +360,11 @@ class _Drafting:
 
     def _torque(self) -> list[str]:
         choice, table = self.reading.tau, self.reading.torque_table
-        if choice.group is None or self.tau is None or self._out_of_order(choice.group):
+        if choice.group is None or self.tau is None or self._out_of_order(choice.group) or self._unexplained(choice.group):
             return self._open("tau", choice)
         named = unit_of_group(choice.group.columns, table)
-        limits = [joint.torque for joint in self.joints]
-        guess = torque_unit(self.tau, named[0], self.current, limits)
+        guess = torque_unit(self.tau, named[0], self.current, self.gains, choice.group.in_si)
         peak = f"up to {np.abs(self.tau).max():.4g}"
-        known = UNITS.get(guess.value)
-        if known is not None and known.quantity == "torque" and (problem := self._too_weak(known.factor)):
-            guess = Guess("", "unsure", f"{'named so, but ' if named[0] else ''}{peak} {guess.value}: {problem}")
         if choice.group.words == WITHOUT_NAME:
             guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
         elif guess.value == "N m" and guess.confidence != "sure" and self._inside_limits() is False:
@@ -380,24 +382,24 @@ class _Drafting:
             lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
         return [*lines, *_also(choice, self.reading.table)]
 
-    def _too_weak(self, factor: float) -> str:
-        """Say that torques of a unit (SI per number) would not hold up the arm where it weighs most; "" where they would."""
+    def _unexplained(self, group: Group) -> bool:
+        """Tell whether a word that the positions' names have not may make it another torque, and the links do not confirm it."""
+        q = self.reading.q.group
+        confirmed = self.gains is not None and bool(np.isfinite(self.gains).any())
+        return bool(group.unknown - (q.unknown if q else frozenset())) and not confirmed
+
+    def _link_gains(self) -> Array | None:
+        """Return the recorded torque per N m of the robot's links; None where links or motion are unknown."""
         q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
-        if self.weight is None or robot is None or group is None or q is None or self.tau is None:
-            return ""
+        if self.model is None or robot is None or group is None or q is None or self.tau is None or self.t is None:
+            return None
         units = self._position_units(group)[0]
         if not all(joint.revolute for joint in robot.joints) or not set(units) <= UNITS.keys() or self.tau.shape != q.shape:
-            return ""
-        some = slice(None, None, max(1, len(q) // 200))
-        held = self.weight(robot, q[some] * [UNITS[unit].factor for unit in units])
-        if held is None or not np.isfinite(held).all():
-            return ""
-        needed = np.abs(held).max(axis=0)
-        j = int(np.argmax(needed))
-        found = float(np.abs(self.tau[:, j]).max()) * factor
-        return "" if found >= _HELD_UP * needed[j] else (
-            f"joint '{robot.joints[j].name}' has up to {found:.3g} N m, its own weight asks for {needed[j]:.3g}: "
-            "a share of a rated torque, or the motor's side?")
+            return None
+        tau = motion_of(self.tau, self.t)[0]
+        motion = motion_of(np.unwrap(q * [UNITS[unit].factor for unit in units], axis=0), self.t)
+        model = self.model(robot, *motion)
+        return None if model is None or not np.isfinite(model).all() else link_gains(tau, model, motion[1])
 
     def _open(self, signal: str, choice: Choice) -> list[str]:
         """Return a blank line with the candidates."""

@@ -149,7 +149,7 @@ def test_a_handful_of_samples_is_refused(tmp_path: Path) -> None:
 
 def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
     columns = good()
-    odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "torque #1": columns["tau_1"]}
+    odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "tau #1": columns["tau_1"]}
     draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
     assert parse_recipe(draft.text).signals["q"].column
 
