@@ -281,7 +281,8 @@ class _Drafting:
 
     def _position(self) -> list[str]:
         choice = self.reading.q
-        if choice.group is None or self.q is None or self._out_of_order(choice.group):
+        if choice.group is None or self.q is None or self._out_of_order(choice.group) or (
+                self.slope is None and self._unexplained(choice.group, self.reading.tau.group)):
             return self._open("q", choice)
         units, further, why = self._position_units(choice.group)
         refuted = self.gains is not None and not np.isfinite(self.gains).any()
@@ -360,7 +361,8 @@ class _Drafting:
 
     def _torque(self) -> list[str]:
         choice, table = self.reading.tau, self.reading.torque_table
-        if choice.group is None or self.tau is None or self._out_of_order(choice.group) or self._unexplained(choice.group):
+        if choice.group is None or self.tau is None or self._out_of_order(choice.group) or (
+                self._unexplained(choice.group, self.reading.q.group)):
             return self._open("tau", choice)
         named = unit_of_group(choice.group.columns, table)
         guess = torque_unit(self.tau, named[0], self.current, self.gains, choice.group.in_si)
@@ -382,11 +384,10 @@ class _Drafting:
             lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
         return [*lines, *_also(choice, self.reading.table)]
 
-    def _unexplained(self, group: Group) -> bool:
-        """Tell whether a word that the positions' names have not may make it another torque, and the links do not confirm it."""
-        q = self.reading.q.group
+    def _unexplained(self, group: Group, other: Group | None) -> bool:
+        """Tell whether a word that the `other` signal's names have not may say more, and the robot's links do not confirm it."""
         confirmed = self.gains is not None and bool(np.isfinite(self.gains).any())
-        return bool(group.unknown - (q.unknown if q else frozenset())) and not confirmed
+        return bool(group.unknown - (other.unknown if other else frozenset())) and not confirmed
 
     def _link_gains(self) -> Array | None:
         """Return the recorded torque per N m of the robot's links; None where links or motion are unknown."""
