@@ -36,7 +36,7 @@ from benchmarks.outside_formats_5 import DATE, answer
 from benchmarks.outside_layouts import Answer, Run, Signal, layout
 
 SEVEN = range(7)
-moves = partial(layout, points=True)
+moves = partial(layout, how="points")
 
 
 @moves(SIX, rate=125.0)

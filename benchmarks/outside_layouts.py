@@ -27,7 +27,7 @@ import numpy as np
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("formats", "formats_2", "formats_5", "formats_6", "formats_7")
+SETS = ("formats", "formats_2", "formats_5", "formats_6", "formats_7", "formats_8")
 
 
 @dataclass(frozen=True)
@@ -151,10 +151,14 @@ class Run:
 
 
 def from_point_to_point(
-    t: np.ndarray, rng: np.random.Generator, n: int
+    t: np.ndarray, rng: np.random.Generator, n: int, in_turn: bool
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return position, velocity, acceleration of moves by quintics of 1.1 s with rests of 0.4 s."""
+    """Return position, velocity, acceleration of moves by quintics of 1.1 s with rests of 0.4 s,
+    of all joints together or of one after the other."""
     targets = np.vstack([np.zeros(n), rng.uniform(-1, 1, (int(t[-1] / 1.5) + 2, n))])
+    if in_turn:
+        moving = np.arange(len(targets))[:, None] % n == np.arange(n)
+        targets = np.cumsum(np.where(moving, np.sign(targets) * (0.3 + abs(targets)), 0.0), axis=0)
     k = np.floor(t / 1.5).astype(int)
     s = np.clip((t - 1.5 * k) / 1.1, 0.0, 1.0)[:, None]
     start, step = targets[k], targets[k + 1] - targets[k]
@@ -166,10 +170,10 @@ def from_point_to_point(
 
 
 def simulate(
-    arm: Arm, seed: int, rate: float = 200.0, seconds: float = 12.0, points: bool = False
+    arm: Arm, seed: int, rate: float = 200.0, seconds: float = 12.0, how: str = "series"
 ) -> Run:
-    """Move the arm along a Fourier series, or from point to point; Pinocchio's inverse dynamics
-    and friction make its torque."""
+    """Move the arm along a Fourier series, from point to point ("points") or joint by joint
+    ("turns"); Pinocchio's inverse dynamics and friction make its torque."""
     import pinocchio
 
     model = pinocchio.buildModelFromXML(Arm(arm.name, arm.joints, arm.axes, arm.effort).urdf())
@@ -182,8 +186,8 @@ def simulate(
     a, b = rng.normal(size=(2, 5, n)) / np.arange(1, 6)[:, None] ** 0.5
 
     def series(at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        if points:
-            return from_point_to_point(at, np.random.default_rng(seed), n)
+        if how != "series":
+            return from_point_to_point(at, np.random.default_rng(seed), n, how == "turns")
         c, s = np.cos(np.outer(at, w)), np.sin(np.outer(at, w))
         return c @ a + s @ b, (c * w) @ b - (s * w) @ a, -(c * w**2) @ a - (s * w**2) @ b
 
@@ -247,14 +251,14 @@ class Layout:
     robot: str | None
     write: Callable[[Path, Run], Answer]
     rate: float
-    points: bool = False  # a motion from point to point
+    how: str = "series"  # the motion
 
 
 LAYOUTS: list[Layout] = []
 
 
 def layout(
-    arm: Arm, robot: str | None = "arm.urdf", rate: float = 200.0, points: bool = False
+    arm: Arm, robot: str | None = "arm.urdf", rate: float = 200.0, how: str = "series"
 ) -> Callable[[Callable[[Path, Run], Answer]], Callable[[Path, Run], Answer]]:
     """Register a function that writes one recording into a folder; its docstring names the
     source."""
@@ -268,7 +272,7 @@ def layout(
                 robot,
                 write,
                 rate,
-                points,
+                how,
             )
         )
         return write
@@ -405,7 +409,7 @@ def _same(
 
 def written(lay: Layout, folder: Path, seed: int) -> tuple[Run, Answer]:
     """Write a recording, and the robot beside it, into `folder`."""
-    run = simulate(lay.arm, seed, lay.rate, points=lay.points)
+    run = simulate(lay.arm, seed, lay.rate, how=lay.how)
     if lay.robot:
         text = lay.arm.urdf() if lay.robot.endswith("urdf") else lay.arm.toml()
         (folder / lay.robot).write_text(text)
