@@ -27,7 +27,8 @@ import numpy as np
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("formats", "formats_2", "formats_5", "formats_6", "formats_7", "formats_8")
+TESTED = ("formats", "formats_2", "formats_5")
+SETS = (*TESTED, "formats_6", "formats_7", "formats_8")
 
 
 @dataclass(frozen=True)

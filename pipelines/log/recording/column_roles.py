@@ -50,7 +50,7 @@ class Group:
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:
         """Return the side of the gear that the names state: q is a joint's by convention; learning may scale its data."""
-        if {"observation", "action"} & set(self.words.split()):
+        if {"observation", "action", "norm", "normalized", "normalised", "scaled"} & set(self.words.split()):
             return "scaled"
         joint = self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
         return "motor" if self.motor else "joint" if joint else ""

@@ -24,9 +24,10 @@ from pipelines.log.recording.clock_guess import SECONDS, unit_of_clock
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
+    LinkFit,
     Slope,
+    fit_of_links,
     held,
-    link_gains,
     motion_of,
     position_unit,
     quarter_turns,
@@ -170,7 +171,7 @@ class _Drafting:
                 self.t = reading.clock.values * factor
                 self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
         self.current = tau is not None and tau.quantity == "current"
-        self.gains = self._link_gains()
+        self.links = self._links()
         self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
 
     def note(self, what: str, guess: Guess) -> str:
@@ -284,11 +285,10 @@ class _Drafting:
         if choice.group is None or self.q is None or self._out_of_order(choice.group) or (
                 self.slope is None and self._unexplained(choice.group, self.reading.tau.group)):
             return self._open("q", choice)
+        if self.links is not None and not self.links.followed:
+            return [*self._open("q", choice), "    # the torques do not follow from this motion by the robot's own links:",
+                    "    # is it the order of the joints, the unit, the zero, or are they other torques?"]
         units, further, why = self._position_units(choice.group)
-        refuted = self.gains is not None and not np.isfinite(self.gains).any()
-        if refuted and self.slope is None and set(unit_of_group(choice.group.columns, self.reading.table)) == {None}:
-            units = [""] * self.n
-            why = [Guess("", "unsure", "by the robot's own links the torques do not follow from this motion in " + why[0].value)]
         if BLANK in further:
             self.blanks.append("signals.q.counts_per_rev")
         lines = [f"q = {{ {_columns(choice.group.columns, self.reading.table)}, unit = {self._units('q', units)}{further} }}"]
@@ -365,7 +365,9 @@ class _Drafting:
                 self._unexplained(choice.group, self.reading.q.group)):
             return self._open("tau", choice)
         named = unit_of_group(choice.group.columns, table)
-        guess = torque_unit(self.tau, named[0], self.current, self.gains, choice.group.in_si)
+        if self.links is not None and not self.links.followed and named[0] is None:
+            return self._open("tau", choice)
+        guess = torque_unit(self.tau, named[0], self.current, self.links, choice.group.in_si)
         peak = f"up to {np.abs(self.tau).max():.4g}"
         if choice.group.words == WITHOUT_NAME:
             guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
@@ -386,11 +388,11 @@ class _Drafting:
 
     def _unexplained(self, group: Group, other: Group | None) -> bool:
         """Tell whether a word that the `other` signal's names have not may say more, and the robot's links do not confirm it."""
-        confirmed = self.gains is not None and bool(np.isfinite(self.gains).any())
+        confirmed = self.links is not None and self.links.followed and not self.links.alone
         return bool(group.unknown - (other.unknown if other else frozenset())) and not confirmed
 
-    def _link_gains(self) -> Array | None:
-        """Return the recorded torque per N m of the robot's links; None where links or motion are unknown."""
+    def _links(self) -> LinkFit | None:
+        """Return how the torque follows from the motion by the robot's links; None where links or motion are unknown."""
         q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
         if self.model is None or robot is None or group is None or q is None or self.tau is None or self.t is None:
             return None
@@ -400,7 +402,7 @@ class _Drafting:
         tau = motion_of(self.tau, self.t)[0]
         motion = motion_of(np.unwrap(q * [UNITS[unit].factor for unit in units], axis=0), self.t)
         model = self.model(robot, *motion)
-        return None if model is None or not np.isfinite(model).all() else link_gains(tau, model, motion[1])
+        return None if model is None or not np.isfinite(model).all() else fit_of_links(tau, model, motion[1])
 
     def _open(self, signal: str, choice: Choice) -> list[str]:
         """Return a blank line with the candidates."""
