@@ -28,7 +28,7 @@ import numpy as np
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
 TESTED = ("formats", "formats_2", "formats_5")
-SETS = (*TESTED, "formats_6", "formats_7", "formats_8")
+SETS = (*TESTED, "formats_6", "formats_7", "formats_8", "formats_9")
 
 
 @dataclass(frozen=True)
