@@ -302,6 +302,7 @@ class Config:
 
     window: float = 0.1  # [s] of the cubic that is differentiated (Savitzky & Golay 1964): an arm's moves take longer
     fewest: int = 5  # samples in it: a cubic has four coefficients
+    changes: float = 0.1  # of the links' torque over the motion: else friction and noise are most of what changes
     explained: float = 0.5  # of the power that friction leaves: most of it, or the torque is not said to follow
     most: float = 0.8  # of the links' torque is at joints they explain: the light ones of a wrist may be friction alone
     alone: float = 0.99  # of the torque with its friction, which takes more than a hundredth of any drive's
@@ -360,7 +361,7 @@ def motion_of(q: Array, t: Array, config: Config = Config()) -> tuple[Array, Arr
     from scipy.signal import savgol_filter
 
     step = float(np.median(np.diff(t)))
-    width = max(config.fewest, round(config.window / step) | 1)
+    width = max(config.fewest, min(round(config.window / step), (len(q) - 1) // 2) | 1)
     half = width // 2
     lasts = t[2 * half :] - t[: -2 * half]  # a window over a gap lasts longer
     some = half + np.flatnonzero(np.abs(lasts - (width - 1) * step) < 0.5 * width * step)
@@ -369,8 +370,8 @@ def motion_of(q: Array, t: Array, config: Config = Config()) -> tuple[Array, Arr
     return q, dq, ddq
 
 
-def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config()) -> LinkFit:
-    """Fit the recorded torque by that of the links' model and by friction, joint by joint.
+def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config()) -> LinkFit | None:
+    """Fit the recorded torque by that of the links' model and by friction, joint by joint; None where the model hardly changes.
 
     tau = a·model + F sign(dq) + B dq + c; the model explains where it takes most of what friction leaves.
     """
@@ -382,6 +383,8 @@ def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config())
         inner, power[j] = float(rest @ links), float(links @ links)
         if inner**2 > config.explained * float(rest @ rest) * power[j]:
             gains[j] = inner / power[j]
+    if power.sum() < config.changes**2 * float(np.sum(model**2)):
+        return None  # at rest, or one joint at even speeds
     followed = float(power[np.isfinite(gains)].sum()) > config.most * float(power.sum())
     left = np.var(tau - np.nan_to_num(gains) * model, axis=0).sum()
     return LinkFit(gains, followed, bool(left < (1.0 - config.alone) * np.var(tau, axis=0).sum()))

@@ -282,12 +282,9 @@ class _Drafting:
 
     def _position(self) -> list[str]:
         choice = self.reading.q
-        if choice.group is None or self.q is None or self._out_of_order(choice.group) or (
-                self.slope is None and self._unexplained(choice.group, self.reading.tau.group)):
-            return self._open("q", choice)
-        if self.links is not None and not self.links.followed:
-            return [*self._open("q", choice), "    # the torques do not follow from this motion by the robot's own links:",
-                    "    # is it the order of the joints, the unit, the zero, or are they other torques?"]
+        doubt = self._doubt("q", choice.group, self.reading.tau.group)
+        if choice.group is None or self.q is None or doubt is not None:
+            return self._open("q", choice, doubt)
         units, further, why = self._position_units(choice.group)
         if BLANK in further:
             self.blanks.append("signals.q.counts_per_rev")
@@ -359,22 +356,33 @@ class _Drafting:
         columns = _columns(group.columns, self.reading.table)
         return [f"dq = {{ {columns}, unit = {_quoted(unit)} }}", f"    {self.note('dq unit', guess)}"]
 
+    def _doubt(self, signal: str, group: Group | None, other: Group | None) -> str | None:
+        """Return why the columns of a signal are left open, "" without a reason; None where they are not.
+
+        A word that the other signal's names have not may say more, unless a velocity or the robot's links confirm it.
+        """
+        links = self.links
+        if group is None or self._out_of_order(group):
+            return ""
+        confirmed = links is not None and links.followed and not links.alone
+        words = group.unknown - (other.unknown if other else frozenset())
+        if words and not confirmed and (signal == "tau" or self.slope is None):
+            return f"what does '{clean(min(words), 40)}' say of it?"
+        named = any(unit_of_group(group.columns, self.reading.torque_table))
+        if links is not None and not links.followed and (signal == "q" or not named):
+            return ("torque and motion do not agree by the robot's own links: "
+                    "other torques, or the order, unit or zero of the joints?")
+        if links is not None and links.alone and signal == "tau" and group.origin == "plain":
+            return "it is what the robot's own links ask for, without friction: computed, or simulated?"
+        return None
+
     def _torque(self) -> list[str]:
         choice, table = self.reading.tau, self.reading.torque_table
-        if choice.group is None or self.tau is None or self._out_of_order(choice.group) or (
-                self._unexplained(choice.group, self.reading.q.group)):
-            return self._open("tau", choice)
+        doubt = self._doubt("tau", choice.group, self.reading.q.group)
+        if choice.group is None or self.tau is None or doubt is not None:
+            return self._open("tau", choice, doubt)
         named = unit_of_group(choice.group.columns, table)
-        if self.links is not None and not self.links.followed and named[0] is None:
-            return self._open("tau", choice)
-        guess = torque_unit(self.tau, named[0], self.current, self.links, choice.group.in_si)
-        peak = f"up to {np.abs(self.tau).max():.4g}"
-        if choice.group.words == WITHOUT_NAME:
-            guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
-        elif guess.value == "N m" and guess.confidence != "sure" and self._inside_limits() is False:
-            guess = Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
-        elif choice.group.words == BY_FILE and guess.confidence != "sure":
-            guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
+        guess = self._torque_unit(self.tau, choice.group, named[0])
         self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
         units = [unit if guess.value and unit is not None and unit in UNITS else guess.value for unit in named]
         if guess.value == "N m" and self.joints:
@@ -386,10 +394,19 @@ class _Drafting:
             lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
         return [*lines, *_also(choice, self.reading.table)]
 
-    def _unexplained(self, group: Group, other: Group | None) -> bool:
-        """Tell whether a word that the `other` signal's names have not may say more, and the robot's links do not confirm it."""
-        confirmed = self.links is not None and self.links.followed and not self.links.alone
-        return bool(group.unknown - (other.unknown if other else frozenset())) and not confirmed
+    def _torque_unit(self, tau: Array, group: Group, named: str | None) -> Guess:
+        """Return the unit of the torques, "" where columns, file or positions leave it open."""
+        guess, peak = torque_unit(tau, named, self.current, self.links, group.in_si), f"up to {np.abs(tau).max():.4g}"
+        if group.words == WITHOUT_NAME:
+            return Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
+        if guess.confidence == "sure":
+            return guess
+        if guess.value == "N m" and self._inside_limits() is False:
+            return Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
+        if group.words == BY_FILE:
+            file = clean(self.reading.torque_table.source, 60)
+            return Guess("", "unsure", f"{peak}, of a file named '{file}': a torque in N m, or a current in A?")
+        return guess
 
     def _links(self) -> LinkFit | None:
         """Return how the torque follows from the motion by the robot's links; None where links or motion are unknown."""
@@ -397,27 +414,32 @@ class _Drafting:
         if self.model is None or robot is None or group is None or q is None or self.tau is None or self.t is None:
             return None
         units = self._position_units(group)[0]
-        if not all(joint.revolute for joint in robot.joints) or not set(units) <= UNITS.keys() or self.tau.shape != q.shape:
+        turning = all(joint.revolute for joint in robot.joints)
+        if not turning or not set(units) <= UNITS.keys() or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
             return None
         tau = motion_of(self.tau, self.t)[0]
         motion = motion_of(np.unwrap(q * [UNITS[unit].factor for unit in units], axis=0), self.t)
+        if len(tau) < FEWEST:
+            return None  # the steps of time are too uneven
         model = self.model(robot, *motion)
         return None if model is None or not np.isfinite(model).all() else fit_of_links(tau, model, motion[1])
 
-    def _open(self, signal: str, choice: Choice) -> list[str]:
-        """Return a blank line with the candidates."""
+    def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
+        """Return a blank line with the candidates, and why none of them was taken."""
         lines = [f'{signal} = {{ columns = "{self.blank(f"signals.{signal}")}", unit = "{BLANK}" }}']
         found = [*([choice.group] if choice.group else []), *choice.others]
         if not found:
             lines[0] += "   # no column looks like it"
             return lines
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
+        lines += [f"    # {doubt}"] if doubt else []
         if all(group.origin == "commanded" for group in found):
             lines.append("    # named commands, or the points of a plan: what was measured?")
         texts = ", ".join(clean(text, 40) for text in texts_of(self.reading.table, ())) if found[0].order == "text" else ""
         order = f"these are {texts}" if texts else "in the order of the file"
         ask = f"{order}; write them from the base to the tip"
-        return [*lines, *(f"    # {ask if g is choice.group else 'candidate'}: {_columns(g.columns, self.reading.table)}"
+        first = choice.group if not doubt else None
+        return [*lines, *(f"    # {ask if g is first else 'candidate'}: {_columns(g.columns, self.reading.table)}"
                          for g in found[:8])]
 
     def _drive(self) -> list[str]:
