@@ -1,7 +1,7 @@
 """Write motions joint by joint, and others, as forty-two recordings, each with its answer.
 
-The third stranger's: written down before any of it ran, after the importer had been mended on two
-other sets of his that are not kept.
+The third stranger's: written down before any of it ran, after work on two other sets of his
+that are not kept.
 """
 
 import json
