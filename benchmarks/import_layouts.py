@@ -270,7 +270,6 @@ def layout_panda_with_fingers() -> Layout:
         "signals.q.columns": [f"{name}_position" for name in PANDA],
         "signals.q.unit": "rad",
         "signals.tau.columns": [f"{name}_effort" for name in PANDA],
-        "signals.tau.unit": "N m",
     }
     return Layout(
         {"panda.urdf": urdf(PANDA, fingers=True), "run.csv": table({"t": m.t, **columns})},
@@ -459,7 +458,6 @@ def layout_headerless_without_velocity() -> Layout:
         "signals.q.columns": [f"column_{j}" for j in range(2, 8)],
         "signals.q.unit": "rad",
         "signals.tau.columns": [f"column_{j}" for j in range(8, 14)],
-        "signals.tau.unit": "N m",
     }
     return Layout(ARM | {"run.csv": data}, m.t, m.q, m.tau, answers)
 
@@ -490,7 +488,6 @@ def layout_headerless_two_references() -> Layout:
         "signals.q.columns": [f"column_{j}" for j in range(8, 14)],
         "signals.q.unit": "rad",
         "signals.tau.columns": [f"column_{j}" for j in range(20, 26)],
-        "signals.tau.unit": "N m",
     }
     return Layout(ARM | {"run.csv": data}, m.t, m.q, m.tau, answers)
 
@@ -588,7 +585,6 @@ def layout_names_without_robot() -> Layout:
         "signals.q.columns": [f"{name}.pos" for name in UR],
         "signals.q.unit": "rad",
         "signals.tau.columns": [f"{name}.torque" for name in UR],
-        "signals.tau.unit": "N m",
     }
     return Layout(
         {"robot/arm.urdf": urdf(UR), "run.csv": table({"t": m.t, **columns})},
@@ -712,7 +708,7 @@ def verdict(made: Layout, folder: Path) -> Verdict:
     except RrridError as problem:
         return Verdict("asks", f"refused: {problem}")
     try:
-        recipe = filled(draft.text, made.answers)
+        recipe = filled(draft.text, {"signals.tau.unit": "N m", **made.answers})
     except KeyError as place:
         return Verdict("failed", f"asks for {place}, which has no answer")
     path = folder / "recipe.toml"

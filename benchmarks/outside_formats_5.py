@@ -1,4 +1,4 @@
-"""Write one simulated motion as forty recordings, by an engineer who has not seen the importer.
+"""Write one simulated motion as thirty-seven recordings, by an engineer who has not seen the importer.
 
 Only the form of a layout was known to him, not how files are read or how
 columns of nested files are addressed. Addresses are therefore neutral: the column's heading in a
@@ -176,17 +176,6 @@ def ur_rtde_record(folder: Path, run: Run) -> Answer:
     return Answer("robot_data.csv", {"timestamp": "s"}, right=right, draftable=False)
 
 
-@layout(SEVEN, rate=1000.0)
-def libfranka_csv(folder: Path, run: Run) -> Answer:
-    """libfranka's logToCSV: state and command, desired and filtered next to the measured."""
-    specs = "time=t; success_rate=0.99; *state.q[{}]=q; *state.q_d[{}]=q_ref; *state.dq[{}]=dq;"
-    specs += "state.dq_d[{}]=dq_d; *state.tau_J[{}]=tau; state.tau_J_d[{}]=tau_d;"
-    specs += "state.tau_ext_hat_filtered[{}]=ext; cmd.tau_J_d[{}]=tau_d"
-    columns, right = wide(run, specs, range(7), dq_d=1.002 * run.dq, tau_d=0.2 * run.tau)
-    table(folder / "log.csv", columns, float_format="%.7g")
-    return Answer("log.csv", {"time": "s"}, right=right)
-
-
 @layout(SEVEN, rate=200.0)
 def franka_state_jsonl(folder: Path, run: Run) -> Answer:
     """echo_robot_state of libfranka into a file: a JSON object a line, time in ms since boot."""
@@ -299,22 +288,6 @@ def dynamixel_long(folder: Path, run: Run) -> Answer:
     return answer("dxl.tsv", {"time_ms": "ms"}, "Present @[{}]", (1, 2, 5), specs, known=False)
 
 
-@layout(TWO, rate=200.0)
-def odrive_script(folder: Path, run: Run) -> Answer:
-    """ODrive by a Python script: turns of the motor (gear not stated), Iq measured and set."""
-    gear, amps = 9 / (2 * np.pi), current(run)
-    more = {"pos": gear * run.q, "vel": gear * run.dq, "set": gear * run.q_ref, "iq": 1.01 * amps}
-    specs = "t=t; *axis{}.encoder.pos_estimate=pos:q:rev;"
-    specs += "*axis{}.encoder.vel_estimate=vel:dq:rev/s;"
-    specs += "*axis{}.controller.input_pos=set:q_ref:rev;"
-    specs += "axis{}.motor.current_control.Iq_setpoint=iq;"
-    specs += "*axis{}.motor.current_control.Iq_measured=current;"
-    specs += "axis{}.fet_thermistor.temperature=temp;"
-    columns, right = wide(run, specs + "vbus_voltage=24.02", range(2), joint_wise=True, **more)
-    table(folder / "odrive.csv", columns)
-    return Answer("odrive.csv", {"t": "s"}, right=right, draftable=False)
-
-
 @layout(THREE, rate=250.0)
 def moteus_registers(folder: Path, run: Run) -> Answer:
     """moteus registers of three servos: revolutions, rev/s and N m of the output; nan commands."""
@@ -413,21 +386,6 @@ def excel_unicode_text(folder: Path, run: Run) -> Answer:
     how = {"sep": "\t", "decimal": ",", "float_format": "%.5f", "encoding": "utf-16"}
     table(folder / "Versuch 3.txt", columns, "Prüfstand Bein\t\t\t\t\t\t\n\t\t\t\t\t\t\n", **how)
     return Answer("Versuch 3.txt", {"Zeit in ms": "ms"}, right=right)
-
-
-@layout(UR, rate=125.0)
-def rostopic_echo_p(folder: Path, run: Run) -> Answer:
-    """rostopic echo -p /joint_states: ns, joints in alphabetical order, names in every row."""
-    place = np.argsort(np.argsort(run.arm.joints))  # of a joint in the message
-    ns = 1_712_000_000_000_000_000 + values(run)["us"] * 1000
-    specs = "%time=now; field.header.seq=count; field.header.stamp=ns; field.header.frame_id=;"
-    specs += ";".join(f"field.name{k}={j}" for k, j in enumerate(sorted(run.arm.joints)))
-    columns, _ = wide(run, specs, now=ns + 312_000, ns=ns)
-    for name, v in (("position", run.q), ("velocity", run.dq), ("effort", run.tau)):
-        columns |= {f"field.{name}{k}": v[:, list(place).index(k)] for k in range(6)}
-    table(folder / "joint_states.txt", columns)
-    specs, time = "position=q; velocity=dq; effort=tau", {"field.header.stamp": "ns", "%time": "ns"}
-    return answer("joint_states.txt", time, "field.@{}", place, specs)
 
 
 @layout(UR, rate=125.0)

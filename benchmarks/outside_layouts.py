@@ -3,7 +3,7 @@
     python -m benchmarks.outside_layouts [NAME ...] [--set formats] [--keep FOLDER]
 
 Every layout of `outside_formats` (ROS, controllers), `outside_formats_2` (drives, tools, files; its
-last twenty, from abb_test_signals on, made later) and `_5` (forty by a stranger) copies a
+last twenty, from abb_test_signals on, made later), `_5` and `_6` (each by a stranger) copies a
 real export after its documentation or public source code, and states the right answer beside it. A draft is "right"
 where every field that is filled in is true (with no blank it is also imported, and the log compared with
 the simulated motion), "asks" where a field that it cannot know is blank, "refused" with a remedy,
@@ -27,7 +27,8 @@ import numpy as np
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("formats", "formats_2", "formats_5")
+TESTED = ("formats", "formats_2", "formats_5")  # by the suite of tests
+SETS = (*TESTED, "formats_6")
 
 
 @dataclass(frozen=True)
@@ -150,9 +151,30 @@ class Run:
         return self.q.shape[1]
 
 
-def simulate(arm: Arm, seed: int, rate: float = 200.0, seconds: float = 12.0) -> Run:
-    """Move the arm along a Fourier series; Pinocchio's inverse dynamics and friction make its
-    torque."""
+def from_point_to_point(
+    t: np.ndarray, rng: np.random.Generator, n: int, in_turn: bool
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return position, velocity, acceleration of moves by quintics of 1.1 s with rests of 0.4 s,
+    of all joints together or of one after the other."""
+    targets = np.vstack([np.zeros(n), rng.uniform(-1, 1, (int(t[-1] / 1.5) + 2, n))])
+    if in_turn:
+        moving = np.arange(len(targets))[:, None] % n == np.arange(n)
+        targets = np.cumsum(np.where(moving, np.sign(targets) * (0.3 + abs(targets)), 0.0), axis=0)
+    k = np.floor(t / 1.5).astype(int)
+    s = np.clip((t - 1.5 * k) / 1.1, 0.0, 1.0)[:, None]
+    start, step = targets[k], targets[k + 1] - targets[k]
+    return (
+        start + step * s**3 * (10 - 15 * s + 6 * s**2),
+        step * 30 * s**2 * (1 - s) ** 2 / 1.1,
+        step * 60 * s * (1 - s) * (1 - 2 * s) / 1.1**2,
+    )
+
+
+def simulate(
+    arm: Arm, seed: int, rate: float = 200.0, seconds: float = 12.0, how: str = "series"
+) -> Run:
+    """Move the arm along a Fourier series, from point to point ("points") or joint by joint
+    ("turns"); Pinocchio's inverse dynamics and friction make its torque."""
     import pinocchio
 
     model = pinocchio.buildModelFromXML(Arm(arm.name, arm.joints, arm.axes, arm.effort).urdf())
@@ -165,6 +187,8 @@ def simulate(arm: Arm, seed: int, rate: float = 200.0, seconds: float = 12.0) ->
     a, b = rng.normal(size=(2, 5, n)) / np.arange(1, 6)[:, None] ** 0.5
 
     def series(at: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        if how != "series":
+            return from_point_to_point(at, np.random.default_rng(seed), n, how == "turns")
         c, s = np.cos(np.outer(at, w)), np.sin(np.outer(at, w))
         return c @ a + s @ b, (c * w) @ b - (s * w) @ a, -(c * w**2) @ a - (s * w**2) @ b
 
@@ -228,20 +252,29 @@ class Layout:
     robot: str | None
     write: Callable[[Path, Run], Answer]
     rate: float
+    how: str = "series"  # the motion
 
 
 LAYOUTS: list[Layout] = []
 
 
 def layout(
-    arm: Arm, robot: str | None = "arm.urdf", rate: float = 200.0
+    arm: Arm, robot: str | None = "arm.urdf", rate: float = 200.0, how: str = "series"
 ) -> Callable[[Callable[[Path, Run], Answer]], Callable[[Path, Run], Answer]]:
     """Register a function that writes one recording into a folder; its docstring names the
     source."""
 
     def register(write: Callable[[Path, Run], Answer]) -> Callable[[Path, Run], Answer]:
         LAYOUTS.append(
-            Layout(write.__name__, (write.__doc__ or "").splitlines()[0], arm, robot, write, rate)
+            Layout(
+                write.__name__,
+                (write.__doc__ or "").splitlines()[0],
+                arm,
+                robot,
+                write,
+                rate,
+                how,
+            )
         )
         return write
 
@@ -358,8 +391,7 @@ def wrong_values(folder: Path, answer: Answer, run: Run) -> list[str]:
 def _is_motion(name: str, t: np.ndarray, values: np.ndarray, answer: Answer, run: Run) -> bool:
     """Tell whether a signal of a log is what one of the accepted ones holds."""
     accepted = [
-        s.values if s.values is not None else getattr(run, name)
-        for s in answer.right.get(name, ())
+        s.values if s.values is not None else getattr(run, name) for s in answer.right.get(name, ())
     ]
     return any(_same(t, values, run.t - run.t[0], a, name) for a in accepted)
 
@@ -378,7 +410,7 @@ def _same(
 
 def written(lay: Layout, folder: Path, seed: int) -> tuple[Run, Answer]:
     """Write a recording, and the robot beside it, into `folder`."""
-    run = simulate(lay.arm, seed, lay.rate)
+    run = simulate(lay.arm, seed, lay.rate, how=lay.how)
     if lay.robot:
         text = lay.arm.urdf() if lay.robot.endswith("urdf") else lay.arm.toml()
         (folder / lay.robot).write_text(text)

@@ -45,20 +45,19 @@ _FINEST = 4.0  # times the recorded rate
 
 
 def draft_recipe(path: Path, robot: str | None = None) -> Draft:
-    """Return the draft of a recipe for a recording; a robot whose links are known weighs the torques.
+    """Return the draft of a recipe for a recording; the torques are compared with the robot's links.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
-    return guess_recipe(path, robot, _gravity)
+    return guess_recipe(path, robot, _link_torque)
 
 
-def _gravity(robot: RobotDescription, q: Array) -> Array | None:
-    """Return the gravity torques (samples, joints) [N m] at `q` [rad], None where a link of the robot is unknown."""
+def _link_torque(robot: RobotDescription, q: Array, dq: Array, ddq: Array) -> Array | None:
+    """Return the torques (samples, joints) [N m] of a robot's links in motion [rad], None where a link is unknown."""
     body = rigid_body(robot)
     p = body.known_parameters()
-    still = np.zeros_like(q)
-    return None if p is None else body.torque(q, still, still, p)
+    return None if p is None else body.torque(q, dq, ddq, p)
 
 
 @dataclass(frozen=True)

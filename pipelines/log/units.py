@@ -28,7 +28,7 @@ _TURN = 2.0 * math.pi
 
 UNITS: Final[dict[str, Unit]] = {
     # time
-    "s": Unit("time", 1.0), "ms": Unit("time", 1e-3), "us": Unit("time", 1e-6), "µs": Unit("time", 1e-6),
+    "s": Unit("time", 1.0), "ms": Unit("time", 1e-3), "us": Unit("time", 1e-6),
     "ns": Unit("time", 1e-9), "100 ns": Unit("time", 1e-7), "min": Unit("time", 60.0), "d": Unit("time", 86400.0),
     # position, revolute and prismatic
     "rad": Unit("position", 1.0), "mrad": Unit("position", 1e-3), "deg": Unit("position", math.pi / 180.0),
@@ -51,7 +51,8 @@ UNITS: Final[dict[str, Unit]] = {
 }
 
 _SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "²": "^2", "\u03bc": "µ"})
-_ALIASES: Final = {"Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
+_ALIASES: Final = {"µs": "us",
+                   "Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
                    "radian": "rad", "radians": "rad", "seconds": "s", "sec": "s", "rad/s2": "rad/s^2",
                    "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "N-m": "N m", "1/min": "rpm",
                    "rad/sec": "rad/s",

@@ -96,7 +96,9 @@ def read_parquet(data: bytes, source: str) -> dict[str, npt.NDArray[np.generic]]
                 if pa.types.is_timestamp(kind):
                     column = pa.compute.divide(column.cast(pa.timestamp("ns")).cast(pa.int64()).cast(pa.float64(), safe=False), 1e9)
                 if pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind):
-                    found[name] = np.array(column.to_pylist(), dtype=np.float64)
+                    words = pa.types.is_string(kind.value_type)  # the joints' names, again in every row
+                    rows = column.to_pylist()
+                    found[name] = np.array(rows[0], dtype=np.str_) if words and rows else np.array(rows, dtype=np.float64)
                 elif not pa.types.is_nested(kind):
                     found[name] = column.to_numpy()
     except InputRejected:

@@ -57,7 +57,7 @@ _QUANTITIES: dict[str, frozenset[str]] = {
         "gripper finger fingers status mode error errors err deviation lag limit limits flag digital "
         "analog io quat quaternion orientation rpy euler translation rotation dtau dtauj jacobian "
         "power energy pwm duty safety imu gyro camera reward done success rate bus supply battery "
-        "spannung kraft temp_core protective payload mass elbow_config distance schleppfehler"
+        "rel relative delta spannung kraft temp_core protective payload mass elbow_config distance schleppfehler"
     ),
 }
 _COMMANDED = _set(
@@ -82,7 +82,7 @@ _MOTOR = _set("motor mot motors rotor drive antrieb encoder servo")
 _JOINT = _set("joint joints jnt jnts axis axes achse gelenk link actuator actuators arm j a")
 _NOISE = _set(
     "field fields data msg value values val state states robot robots header vector array log record signal "
-    "channel ch info feedback_data raw side of the in and ma"
+    "channel ch info feedback_data raw side of the in and ma active applied control norm normalized normalised scaled"
 )
 _COMPOUND = sorted(
     {word for words in _QUANTITIES.values() for word in words if len(word) > 1}

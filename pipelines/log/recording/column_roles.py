@@ -40,11 +40,17 @@ class Group:
     columns: tuple[str, ...]
     order: Order  # text: as columns of text name them, and no robot has these names
     words: str  # the group in words, for comments
+    unknown: frozenset[str] = frozenset()  # words of all its names that say neither what it is nor which joint
+
+    @property
+    def in_si(self) -> bool:
+        """Tell whether a torque has the symbol of mechanics, not a drive's word for what may be a share of a rated torque."""
+        return bool({"tau", "jtau", "tauj", "qfrc"} & {word.rstrip("0123456789") for word in self.words.split()})
 
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:
         """Return the side of the gear that the names state: q is a joint's by convention; learning may scale its data."""
-        if {"observation", "action"} & set(self.words.split()):
+        if {"observation", "action", "norm", "normalized", "normalised", "scaled"} & set(self.words.split()):
             return "scaled"
         joint = self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
         return "motor" if self.motor else "joint" if joint else ""
@@ -68,8 +74,12 @@ def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     texts = texts_of(table, joints)
     patterns = _patterns(table, joints)
     found: dict[tuple[object, ...], list[tuple[ColumnName, int | None]]] = {}
+    # What all names begin with is the recording's name and says nothing of a column: "payload.joints[0].pos".
+    first, last = min(table.columns), max(table.columns)
+    alike = next((k for k, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
+    shared = re.sub(r"[^./]*$", "", first[:alike])
     for column in table.columns:
-        rest, place = _without_joint(column, patterns)
+        rest, place = _without_joint(column.removeprefix(shared), patterns)
         name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
         if place is None:
             place = _place_by_words(name.label, joints)
@@ -118,6 +128,9 @@ def _place_by_words(label: Sequence[str], joints: Sequence[str]) -> int | None:
 
 def texts_of(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
     """Return the joints that columns of text name, in the order of the file: name[0] is "elbow_joint", or name "['elbow', …]"."""
+    for words in (re.findall(r"[\w./:-]+", note) for note in table.notes if joints):
+        if set(joints) <= set(words):
+            return tuple(word for word in words if word in joints)
     texts = list(table.labels.values())
     for words in (re.findall(r"[\w./:-]+", text) for text in texts if text.strip()[:1] in ("[", "(")):
         if len(words) > 1 and (set(joints) <= set(words) or not joints) and not any(word[0].isdecimal() for word in words):
@@ -173,9 +186,10 @@ def _ordered(members: list[tuple[ColumnName, int | None]], joints: Sequence[str]
         columns, by_text = by_texts(columns, texts, joints)
         order = by_text or order
     first = names[0]
+    unknown = frozenset.intersection(*(frozenset(w for w in name.label if w.isalpha() and len(w) > 1) for name in names))
     words = " ".join(first.role) or " ".join(first.label)
     return Group(first.quantity, first.origin, first.motor, first.partial, first.filtered,
-                 tuple(columns), order, words)
+                 tuple(columns), order, words, unknown if len(names) > 1 else frozenset())
 
 
 def _number(label: Sequence[str]) -> int | None:

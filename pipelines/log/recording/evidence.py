@@ -15,8 +15,24 @@ from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 from pipelines.log.units import UNITS
 
-__all__ = ["Guess", "Slope", "held", "position_unit", "quarter_turns", "rollover", "sign_of",
-           "slide_unit", "slope_of", "torque_unit", "units_of_ratio", "unknown_unit", "velocity_unit"]
+__all__ = [
+    "Guess",
+    "LinkFit",
+    "Slope",
+    "fit_of_links",
+    "held",
+    "motion_of",
+    "position_unit",
+    "quarter_turns",
+    "rollover",
+    "sign_of",
+    "slide_unit",
+    "slope_of",
+    "torque_unit",
+    "units_of_ratio",
+    "unknown_unit",
+    "velocity_unit",
+]
 
 Confidence = Literal["sure", "likely", "unsure"]
 Side = Literal["joint", "motor", "scaled", ""]  # of the gear, as far as names say it
@@ -280,29 +296,98 @@ def velocity_unit(slope: Slope, position: str) -> str:
     return same.get(position, "") if not unit else speed if unit == position else ""
 
 
-def torque_unit(tau: Array, named: str | None, current: bool, limits: Sequence[float] = ()) -> Guess:
-    """The unit of torques, "" where it stays open: by name, by the robot's limits of effort, by size.
+@dataclass(frozen=True)
+class Config:
+    """How a torque is compared with what the robot's own links ask for."""
 
-    `limits` holds the joints' limits of effort [N m], infinite where it has no limit.
+    window: float = 0.1  # [s] of the cubic that is differentiated (Savitzky & Golay 1964): an arm's moves take longer
+    fewest: int = 5  # samples in it: a cubic has four coefficients
+    changes: float = 0.1  # of the links' torque over the motion: else friction and noise are most of what changes
+    explained: float = 0.5  # of the power that friction leaves: most of it, or the torque is not said to follow
+    most: float = 0.8  # of the links' torque is at joints they explain: the light ones of a wrist may be friction alone
+    alone: float = 0.99  # of the torque with its friction, which takes more than a hundredth of any drive's
+    gain: float = 3.0  # a payload as heavy as the links, whose masses are roughly known
+    samples: int = 4000  # of a recording that are compared: ten seconds of a fast one
+
+
+@dataclass(frozen=True)
+class LinkFit:
+    """How a torque follows from the motion by weight and inertia of the robot's own links."""
+
+    gains: Array  # (joints,) recorded torque per N m of the links; nan where they do not explain it
+    followed: bool  # at the joints that have most of the links' torque
+    alone: bool  # without any friction: computed, or simulated
+
+
+def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | None, in_si: bool) -> Guess:
+    """The unit of torques, "" where it stays open: by name, by what the robot's own links ask for.
+
+    `fit` is None where links or motion are unknown; a name `in_si` is then taken at its word.
     """
-    peaks = np.abs(tau).max(axis=0)
-    peak = float(peaks.max())
-    if named is not None and (named in ("A", "mA") or named.endswith("N m") or named.endswith("N")):
-        return Guess(named, "sure", f"named so; up to {peak:.4g} {named}")
-    if named is not None:
+    peak = float(np.abs(tau).max())
+    unit = named or "N m"
+    if named is not None and not (named in ("A", "mA") or named.endswith("N m") or named.endswith("N")):
         return unknown_unit(named)
-    if current:
+    if named is None and current:
         return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or a share of the drive's rated current?")
-    if _whole(tau) and peak > 20.0:
-        return Guess("", "unsure", f"whole numbers up to {peak:.5g}: the drive's own, such as per mille of the rated torque?")
-    use = max((float(p / limit) for p, limit in zip(peaks, limits, strict=False) if math.isfinite(limit)), default=math.nan)
-    if use > 2.0 or use < 0.002:
-        return Guess("", "unsure", f"up to {peak:.4g}, {use:.3g} times the robot's limit of effort: not N m of the joints?")
-    if math.isfinite(use):
-        return Guess("N m", "likely", f"up to {peak:.4g}, {100 * use:.3g} % of the robot's limit of effort at most")
-    if peak > 1000.0:
-        return Guess("", "unsure", f"up to {peak:.5g}: too much for N m of most arms; mN m?")
-    return Guess("N m", "unsure", f"up to {peak:.4g}; or a current in A, or motor side")
+    off = "" if fit is None or unit not in UNITS or current else _unlike_links(fit, UNITS[unit].factor, named is not None)
+    if off:
+        return Guess("", "unsure", f"{'named so, but ' if named else ''}up to {peak:.4g} {unit}: {off}")
+    if named is not None:
+        return Guess(named, "sure", f"named so; up to {peak:.4g} {named}")
+    if fit is None and in_si:
+        return Guess("N m", "likely", f"up to {peak:.4g}, named by the symbol of mechanics")
+    if fit is None:
+        return Guess("", "unsure", f"up to {peak:.4g}, and no links of a robot to compare with: N m of the joint or of the "
+                     "motor, a share of a rated torque, or a current in A?")
+    return Guess("N m", "likely", f"up to {peak:.4g}, and it follows from the motion by weight and inertia of the robot's links")
+
+
+def _unlike_links(fit: LinkFit, factor: float, named: bool, config: Config = Config()) -> str:
+    """Say how torques differ from what the robot's links ask for, "" where they do not; `factor` is the SI value of their unit."""
+    known = factor * fit.gains[np.isfinite(fit.gains)]
+    if not (fit.followed or named):
+        return "they do not follow from the motion by the robot's own links: measured joint torques in N m?"
+    if not known.size:
+        return ""
+    off = float(known[np.argmax(np.abs(np.log(np.abs(known))))])
+    return "" if 1.0 / config.gain <= abs(off) <= config.gain else (
+        f"{off:.3g} times what weight and inertia of the robot's own links ask for at one joint: a share of a rated torque, "
+        "or the motor's side?")
+
+
+def motion_of(q: Array, t: Array, config: Config = Config()) -> tuple[Array, Array, Array]:
+    """Return q, dq, ddq (samples, joints) [rad] of a recording by local cubics, at samples without a gap nearby."""
+    from scipy.signal import savgol_filter
+
+    step = float(np.median(np.diff(t)))
+    width = max(config.fewest, min(round(config.window / step), (len(q) - 1) // 2) | 1)
+    half = width // 2
+    lasts = t[2 * half :] - t[: -2 * half]  # a window over a gap lasts longer
+    some = half + np.flatnonzero(np.abs(lasts - (width - 1) * step) < 0.5 * width * step)
+    some = some[:: max(1, len(some) // config.samples)]
+    q, dq, ddq = (savgol_filter(q, width, 3, deriv=k, delta=step, axis=0)[some] for k in range(3))
+    return q, dq, ddq
+
+
+def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config()) -> LinkFit | None:
+    """Fit the recorded torque by that of the links' model and by friction, joint by joint; None where the model hardly changes.
+
+    tau = a·model + F sign(dq) + B dq + c; the model explains where it takes most of what friction leaves.
+    """
+    gains, power = np.full(tau.shape[1], math.nan), np.zeros(tau.shape[1])
+    for j in range(tau.shape[1]):
+        friction = np.column_stack([np.sign(dq[:, j]), dq[:, j], np.ones(len(dq))])
+        both = np.column_stack([tau[:, j], model[:, j]])
+        rest, links = (both - friction @ np.linalg.lstsq(friction, both, rcond=None)[0]).T
+        inner, power[j] = float(rest @ links), float(links @ links)
+        if inner**2 > config.explained * float(rest @ rest) * power[j]:
+            gains[j] = inner / power[j]
+    if power.sum() < config.changes**2 * float(np.sum(model**2)):
+        return None  # at rest, or one joint at even speeds
+    followed = float(power[np.isfinite(gains)].sum()) > config.most * float(power.sum())
+    left = np.var(tau - np.nan_to_num(gains) * model, axis=0).sum()
+    return LinkFit(gains, followed, bool(left < (1.0 - config.alone) * np.var(tau, axis=0).sum()))
 
 
 def sign_of(q: Array, tau: Array) -> Guess:

@@ -24,8 +24,11 @@ from pipelines.log.recording.clock_guess import SECONDS, unit_of_clock
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
+    LinkFit,
     Slope,
+    fit_of_links,
     held,
+    motion_of,
     position_unit,
     quarter_turns,
     sign_of,
@@ -54,7 +57,6 @@ __all__ = ["Draft", "guess_recipe"]
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _USABLE = 0.8  # of the cells of a column that is looked at
-_HELD_UP = 0.1  # of the arm's own weight: torques in N m of the joints hold up at least its order of magnitude
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
@@ -83,15 +85,15 @@ class Draft:
     blanks: tuple[str, ...]  # what must be filled in before it runs
 
 
-Weight = Callable[[RobotDescription, Array], Array | None]
+Model = Callable[[RobotDescription, Array, Array, Array], Array | None]
 
 
-def guess_recipe(path: Path, robot: str | None = None, weight: Weight | None = None) -> Draft:
+def guess_recipe(path: Path, robot: str | None = None, model: Model | None = None) -> Draft:
     """Return a commented recipe for the recording in `path`; companion files and the robot in its folder are used.
 
     Args:
         robot: description to use instead of the one beside the recording.
-        weight: the gravity torques (samples, joints) [N m] of a robot at positions [rad], None where its links are unknown.
+        model: the torques (samples, joints) [N m] of a robot at q, dq, ddq [rad], None where its links are unknown.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
@@ -107,7 +109,7 @@ def guess_recipe(path: Path, robot: str | None = None, weight: Weight | None = N
     if companion is not None:
         companion = _sound(companion, lost)
         reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
-    return _Drafting(reading, lost, weight).draft()
+    return _Drafting(reading, lost, model).draft()
 
 
 def _lost_numbers(table: RawTable) -> list[float]:
@@ -148,9 +150,9 @@ def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
 class _Drafting:
     """Collects the lines of a draft. Not frozen: it is the pencil, the `Draft` is the result."""
 
-    def __init__(self, reading: Reading, lost: Sequence[float], weight: Weight | None) -> None:
+    def __init__(self, reading: Reading, lost: Sequence[float], model: Model | None) -> None:
         self.reading = reading
-        self.lost, self.weight = lost, weight
+        self.lost, self.model = lost, model
         self.evidence: list[str] = []
         self.blanks: list[str] = []
         q, tau = reading.q.group, reading.tau.group
@@ -169,6 +171,7 @@ class _Drafting:
                 self.t = reading.clock.values * factor
                 self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
         self.current = tau is not None and tau.quantity == "current"
+        self.links = self._links()
         self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
 
     def note(self, what: str, guess: Guess) -> str:
@@ -279,8 +282,9 @@ class _Drafting:
 
     def _position(self) -> list[str]:
         choice = self.reading.q
-        if choice.group is None or self.q is None or self._out_of_order(choice.group):
-            return self._open("q", choice)
+        doubt = self._doubt("q", choice.group, self.reading.tau.group)
+        if choice.group is None or self.q is None or doubt is not None:
+            return self._open("q", choice, doubt)
         units, further, why = self._position_units(choice.group)
         if BLANK in further:
             self.blanks.append("signals.q.counts_per_rev")
@@ -352,23 +356,33 @@ class _Drafting:
         columns = _columns(group.columns, self.reading.table)
         return [f"dq = {{ {columns}, unit = {_quoted(unit)} }}", f"    {self.note('dq unit', guess)}"]
 
+    def _doubt(self, signal: str, group: Group | None, other: Group | None) -> str | None:
+        """Return why the columns of a signal are left open, "" without a reason; None where they are not.
+
+        A word that the other signal's names have not may say more, unless a velocity or the robot's links confirm it.
+        """
+        links = self.links
+        if group is None or self._out_of_order(group):
+            return ""
+        confirmed = links is not None and links.followed and not links.alone
+        words = group.unknown - (other.unknown if other else frozenset())
+        if words and not confirmed and (signal == "tau" or self.slope is None):
+            return f"what does '{clean(min(words), 40)}' say of it?"
+        named = any(unit_of_group(group.columns, self.reading.torque_table))
+        if links is not None and not links.followed and (signal == "q" or not named):
+            return ("torque and motion do not agree by the robot's own links: "
+                    "other torques, or the order, unit or zero of the joints?")
+        if links is not None and links.alone and signal == "tau" and group.origin == "plain":
+            return "it is what the robot's own links ask for, without friction: computed, or simulated?"
+        return None
+
     def _torque(self) -> list[str]:
         choice, table = self.reading.tau, self.reading.torque_table
-        if choice.group is None or self.tau is None or self._out_of_order(choice.group):
-            return self._open("tau", choice)
+        doubt = self._doubt("tau", choice.group, self.reading.q.group)
+        if choice.group is None or self.tau is None or doubt is not None:
+            return self._open("tau", choice, doubt)
         named = unit_of_group(choice.group.columns, table)
-        limits = [joint.torque for joint in self.joints]
-        guess = torque_unit(self.tau, named[0], self.current, limits)
-        peak = f"up to {np.abs(self.tau).max():.4g}"
-        known = UNITS.get(guess.value)
-        if known is not None and known.quantity == "torque" and (problem := self._too_weak(known.factor)):
-            guess = Guess("", "unsure", f"{'named so, but ' if named[0] else ''}{peak} {guess.value}: {problem}")
-        if choice.group.words == WITHOUT_NAME:
-            guess = Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
-        elif guess.value == "N m" and guess.confidence != "sure" and self._inside_limits() is False:
-            guess = Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
-        elif choice.group.words == BY_FILE and guess.confidence != "sure":
-            guess = Guess("", "unsure", f"{peak}, of a file named '{clean(table.source, 60)}': a torque in N m, or a current in A?")
+        guess = self._torque_unit(self.tau, choice.group, named[0])
         self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
         units = [unit if guess.value and unit is not None and unit in UNITS else guess.value for unit in named]
         if guess.value == "N m" and self.joints:
@@ -380,39 +394,52 @@ class _Drafting:
             lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
         return [*lines, *_also(choice, self.reading.table)]
 
-    def _too_weak(self, factor: float) -> str:
-        """Say that torques of a unit (SI per number) would not hold up the arm where it weighs most; "" where they would."""
-        q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
-        if self.weight is None or robot is None or group is None or q is None or self.tau is None:
-            return ""
-        units = self._position_units(group)[0]
-        if not all(joint.revolute for joint in robot.joints) or not set(units) <= UNITS.keys() or self.tau.shape != q.shape:
-            return ""
-        some = slice(None, None, max(1, len(q) // 200))
-        held = self.weight(robot, q[some] * [UNITS[unit].factor for unit in units])
-        if held is None or not np.isfinite(held).all():
-            return ""
-        needed = np.abs(held).max(axis=0)
-        j = int(np.argmax(needed))
-        found = float(np.abs(self.tau[:, j]).max()) * factor
-        return "" if found >= _HELD_UP * needed[j] else (
-            f"joint '{robot.joints[j].name}' has up to {found:.3g} N m, its own weight asks for {needed[j]:.3g}: "
-            "a share of a rated torque, or the motor's side?")
+    def _torque_unit(self, tau: Array, group: Group, named: str | None) -> Guess:
+        """Return the unit of the torques, "" where columns, file or positions leave it open."""
+        guess, peak = torque_unit(tau, named, self.current, self.links, group.in_si), f"up to {np.abs(tau).max():.4g}"
+        if group.words == WITHOUT_NAME:
+            return Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
+        if guess.confidence == "sure":
+            return guess
+        if guess.value == "N m" and self._inside_limits() is False:
+            return Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
+        if group.words == BY_FILE:
+            file = clean(self.reading.torque_table.source, 60)
+            return Guess("", "unsure", f"{peak}, of a file named '{file}': a torque in N m, or a current in A?")
+        return guess
 
-    def _open(self, signal: str, choice: Choice) -> list[str]:
-        """Return a blank line with the candidates."""
+    def _links(self) -> LinkFit | None:
+        """Return how the torque follows from the motion by the robot's links; None where links or motion are unknown."""
+        q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
+        if self.model is None or robot is None or group is None or q is None or self.tau is None or self.t is None:
+            return None
+        units = self._position_units(group)[0]
+        turning = all(joint.revolute for joint in robot.joints)
+        if not turning or not set(units) <= UNITS.keys() or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
+            return None
+        tau = motion_of(self.tau, self.t)[0]
+        motion = motion_of(np.unwrap(q * [UNITS[unit].factor for unit in units], axis=0), self.t)
+        if len(tau) < FEWEST:
+            return None  # the steps of time are too uneven
+        model = self.model(robot, *motion)
+        return None if model is None or not np.isfinite(model).all() else fit_of_links(tau, model, motion[1])
+
+    def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
+        """Return a blank line with the candidates, and why none of them was taken."""
         lines = [f'{signal} = {{ columns = "{self.blank(f"signals.{signal}")}", unit = "{BLANK}" }}']
         found = [*([choice.group] if choice.group else []), *choice.others]
         if not found:
             lines[0] += "   # no column looks like it"
             return lines
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
+        lines += [f"    # {doubt}"] if doubt else []
         if all(group.origin == "commanded" for group in found):
             lines.append("    # named commands, or the points of a plan: what was measured?")
         texts = ", ".join(clean(text, 40) for text in texts_of(self.reading.table, ())) if found[0].order == "text" else ""
         order = f"these are {texts}" if texts else "in the order of the file"
         ask = f"{order}; write them from the base to the tip"
-        return [*lines, *(f"    # {ask if g is choice.group else 'candidate'}: {_columns(g.columns, self.reading.table)}"
+        first = choice.group if not doubt else None
+        return [*lines, *(f"    # {ask if g is first else 'candidate'}: {_columns(g.columns, self.reading.table)}"
                          for g in found[:8])]
 
     def _drive(self) -> list[str]:

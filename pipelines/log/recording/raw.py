@@ -21,6 +21,7 @@ __all__ = ["RawTable", "columns_of_arrays", "expand", "unstacked"]
 
 _MOST_KEYS = 32  # joints, servos or environments in turn
 _SEPARATE = 0.5  # mean step from key to key over that from row to row: 1 for noise, more for one motion
+_ROUNDED = 1e-3  # of a clock's step: what rounding may take
 _WIDEST_MATRIX = 64  # more joints than any arm: what is wider is not "one column a joint"
 
 
@@ -35,6 +36,7 @@ class RawTable:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # matrix -> its columns
     text: Mapping[str, str] = field(default_factory=dict)  # columns that are not numbers -> an example
     labels: Mapping[str, str] = field(default_factory=dict)  # those of them that hold one text throughout -> that text
+    notes: tuple[str, ...] = ()  # lines above the table that name no column
     cycles: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # columns of text that repeat -> their texts
     lines: npt.NDArray[np.int64] | None = None  # (samples,) line numbers, in a text file
     breaks: tuple[int, ...] = ()  # index of the first sample after damage: the clock of a fixed rate is lost there
@@ -122,6 +124,8 @@ def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str
         InputRejected: S11 where arrays can be read both ways, S12 where none holds real numbers.
     """
     text = {name: problem for name, array in arrays.items() if (problem := _not_real(array)) is not None}
+    notes = tuple(" ".join(map(str, array.flat)) for name, array in arrays.items() if name in text and array.dtype.kind == "U"
+                  and array.size <= _MOST_KEYS)  # the joints' names
     usable = {name: array for name, array in arrays.items() if name not in text and array.size > 1}
     samples = _samples_of(usable, source)
     checks: list[Check] = []
@@ -150,7 +154,7 @@ def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str
         found = ", ".join(f"{name} ({what})" for name, what in text.items()) or "nothing"
         raise InputRejected("S12", f"no array of real numbers; there is {found}", where=source,
                             remedy="save plain numeric arrays, one row a sample")
-    return RawTable(source, columns, np.arange(samples), units=units, groups=groups, text=text, checks=tuple(checks))
+    return RawTable(source, columns, np.arange(samples), units=units, groups=groups, text=text, checks=tuple(checks), notes=notes)
 
 
 def _samples_of(arrays: Mapping[str, npt.NDArray[np.generic]], source: str) -> int:
@@ -203,11 +207,17 @@ def _not_real(array: npt.NDArray[np.generic]) -> str | None:
     """Why an array is not a signal, in words; None where it is one."""
     if array.dtype.kind not in "fiub":
         return {"c": "complex numbers", "O": "objects", "U": "text", "S": "text"}.get(array.dtype.kind, str(array.dtype))
-    if array.dtype.kind in "iu" and array.size and max(abs(int(array.max())), abs(int(array.min()))) > 2**53:
+    if array.dtype.kind in "iu" and array.size > 1 and not _exact(array.astype(np.float64).ravel()):
         return f"{array.dtype} beyond 2^53, which a real number of 64 bit cannot hold exactly"
     if array.ndim > 2 or array.ndim == 0:
         return f"an array of {array.ndim} dimensions"
     return None
+
+
+def _exact(values: Array) -> bool:
+    """Tell whether whole numbers are below 2^53, or their rounding is little beside their steps, as of ns since 1970."""
+    rounding = float(np.spacing(np.abs(values).max()))
+    return rounding <= 1.0 or bool(np.median(np.abs(np.diff(values))) > rounding / _ROUNDED)
 
 
 def _either_way(array: npt.NDArray[np.generic]) -> bool:

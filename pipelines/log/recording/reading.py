@@ -129,6 +129,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     ]
     n = arm.robot.n_joints if arm.robot else None
     groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
+    groups = [g for g in groups if g.quantity != "position" or np.ptp(matrix(table, g.columns), axis=0).any()]
     groups = _parts_and_plans(groups, path, used)
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):

@@ -129,7 +129,7 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
     """The table, read where a crash or a flood of memory costs a child process only."""
     def work() -> Answer:
         table = read()
-        about = {"names": list(table.columns), "text": dict(table.text), "units": dict(table.units),
+        about = {"names": list(table.columns), "text": dict(table.text), "units": dict(table.units), "notes": list(table.notes),
                  "groups": {k: list(v) for k, v in table.groups.items()},
                  "checks": [check.as_dict() for check in table.checks]}
         return Answer(about, {str(i): values for i, values in enumerate(table.columns.values())})
@@ -151,5 +151,6 @@ def _told(answer: Answer, source: str) -> RawTable:
     about = answer.about
     columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
     return RawTable(source, columns, np.arange(len(next(iter(columns.values())))), text=about["text"], units=about["units"],
+                    notes=tuple(about["notes"]),
                     groups={key: tuple(names) for key, names in about["groups"].items()},
                     checks=tuple(Check(**check) for check in about["checks"]))

@@ -30,6 +30,7 @@ Line = tuple[int, str]
 _MOST_DAMAGED = 10  # lines
 _DAMAGED_SHARE = 1e-3
 _MOST_JOINTS = 32
+_MOST_NOTES = 40  # lines above a table
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
@@ -71,6 +72,8 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
         raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
     kept, columns, words, labels = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
     columns = without_repeats(columns, header, source)
+    above = list(enumerate(text.split("\n", body[0][0])[: body[0][0] - 1], start=1))[-_MOST_NOTES:]
+    notes = tuple(line for number, line in above if number != header.line)
     lines_kept = np.array([number for number, _ in kept], dtype=np.int64)
     # Counted over the lines of data alone: an empty line or a comment between them loses no sample.
     rows = np.searchsorted(np.array([number for number, _ in body], dtype=np.int64), lines_kept)
@@ -79,7 +82,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
         del columns[name]  # every line ends in a delimiter
     in_cells = {name: labels.pop(name) for name in columns if name in labels}
     return RawTable(source, columns, rows, units={**units, **in_cells}, text=words, lines=lines_kept, breaks=breaks,
-                    checks=tuple(checks), groups=_numbered(names),
+                    checks=tuple(checks), groups=_numbered(names), notes=notes,
                     labels={name: label for name, label in labels.items() if isinstance(label, str)},
                     cycles={name: label for name, label in labels.items() if isinstance(label, tuple)})
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.import_log import STAGE, Result, Settings
+from pipelines.import_log import STAGE, Result, Settings, draft_recipe
 from pipelines.log.files import open_log
-from pipelines.log.recording.guess import Draft, guess_recipe
+from pipelines.log.recording.guess import Draft
 from pipelines.stage import Outcome, Request, run_stage
 
 SIX = range(6)
@@ -24,7 +24,7 @@ def case(shared: Path, number: str) -> Path:
 
 
 def draft_of(shared: Path, number: str) -> tuple[Draft, dict[str, Any]]:
-    draft = guess_recipe(next(case(shared, number).glob("run.*")))
+    draft = draft_recipe(next(case(shared, number).glob("run.*")))
     return draft, tomllib.loads(draft.text)
 
 
@@ -129,5 +129,5 @@ def test_the_tip_of_a_robot_that_branches_is_named_beside_its_file(shared: Path,
 
 
 def test_the_draft_for_a_robot_that_branches_asks_for_its_tip(shared: Path) -> None:
-    draft = guess_recipe(case(shared, "46") / "run1.csv")
+    draft = draft_recipe(case(shared, "46") / "run1.csv")
     assert draft.blanks == ("robot.tip_link",)

@@ -6,9 +6,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from benchmarks.import_layouts import motion, urdf
+from benchmarks.outside_formats import THREE
+from benchmarks.outside_layouts import Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
 from pipelines.log.files import open_log
@@ -149,7 +152,7 @@ def test_a_handful_of_samples_is_refused(tmp_path: Path) -> None:
 
 def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
     columns = good()
-    odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "torque #1": columns["tau_1"]}
+    odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "tau #1": columns["tau_1"]}
     draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
     assert parse_recipe(draft.text).signals["q"].column
 
@@ -220,12 +223,73 @@ def test_a_clock_is_known_by_the_century_it_counts_to(tmp_path: Path, factor: fl
     assert f'unit = "{unit}"   # sure, counted since the year {year},' in draft
 
 
+def _arm(folder: Path, columns: Callable[[Run], dict[str, Array]], arm: Arm = THREE, head: str = "") -> str:
+    """Return the draft for a simulated arm with its description, whose links are known, in the folder."""
+    moved = simulate(arm, seed=3)
+    (folder / "arm.urdf").write_text(arm.urdf())
+    return draft_recipe(write(folder, head + text({"t [s]": moved.t} | columns(moved)))).text
+
+
+def _block(pattern: str, values: Array) -> dict[str, Array]:
+    return {pattern.replace("#", str(j)): column for j, column in enumerate(values.T, start=1)}
+
+
 @pytest.mark.parametrize(("factor", "header", "unit"), [
-    (1.0, "tau#", "N m"), (0.01, "tau#", "FILL IN"), (0.01, "tau# [Nm]", "FILL IN")])
-def test_torques_that_would_not_hold_up_the_arm_are_asked_about(tmp_path: Path, factor: float, header: str, unit: str) -> None:
-    """A share of a rated torque, or the motor's: a hundredth of what carries the links of the robot file."""
-    _table(tmp_path, _scale("tau", factor), {"tau": header})
-    assert f'tau = {{ columns = "tau{{j}}", unit = "{unit}" }}' in draft_recipe(tmp_path / "run.csv").text
+    (1.0, "torque#", "N m"), ([0.3, 1.0, 4.0], "torque#", "FILL IN"), (0.01, "torque# [Nm]", "FILL IN")])
+def test_a_torque_is_compared_with_what_the_robots_links_ask_for(tmp_path: Path, factor: object, header: str, unit: str) -> None:
+    """A share of rated torques is several times the links' at one joint; the motor's is a hundredth of it."""
+    draft = _arm(tmp_path, lambda run: _block("q#", run.q) | _block(header, run.tau * np.asarray(factor)))
+    assert f'tau = {{ columns = "torque{{j}}", unit = "{unit}" }}' in draft
+
+
+@pytest.mark.parametrize("wrong", ["order", "external"])
+def test_motion_and_torque_that_the_robots_links_do_not_join_are_asked_about(tmp_path: Path, wrong: str) -> None:
+    """Joints counted from the tip, or an external torque as the only one."""
+    def columns(run: Run) -> dict[str, Array]:
+        q = run.q[:, ::-1] if wrong == "order" else run.q
+        return _block("q#", q) | _block("tau#", run.tau_ext if wrong == "external" else run.tau)
+
+    assert 'q = { columns = "FILL IN", unit = "FILL IN" }' in _arm(tmp_path, columns)
+
+
+@pytest.mark.parametrize("name", ["tau_dob#", "dstrb torque #", "外力矩# [Nm]"])
+def test_a_torque_with_an_unexplained_word_is_asked_about(tmp_path: Path, name: str) -> None:
+    """Where no links are known, a word that the positions' names have not may make it a part of the torque."""
+    columns = good()
+    named = {"t": columns["t"]} | {f"q{j}": columns[f"q_{j}"] for j in (1, 2, 3)}
+    named |= {name.replace("#", str(j)): columns[f"tau_{j}"] for j in (1, 2, 3)}
+    assert 'tau = { columns = "FILL IN", unit = "FILL IN" }' in drafted(tmp_path, text(named))
+
+
+def test_a_computed_torque_does_not_pass_for_a_measured_one(tmp_path: Path) -> None:
+    """Inverse dynamics follow the links without any friction: a word not known is not confirmed by that."""
+    draft = _arm(tmp_path, lambda run: _block("q#", run.q) | _block("invdyn torque # [Nm]", run.tau_model))
+    assert 'tau = { columns = "FILL IN", unit = "FILL IN" }' in draft
+
+
+def test_joints_named_in_a_comment_give_the_order(tmp_path: Path) -> None:
+    names = ", ".join(reversed(THREE.joints))
+    draft = _arm(tmp_path, lambda run: _block("q#", run.q[:, ::-1]) | _block("tau#", run.tau[:, ::-1]), head=f"# joints: {names}\n")
+    assert 'q = { columns = ["q3", "q2", "q1"], unit = "rad" }' in draft
+
+
+def test_joints_named_in_a_list_of_a_parquet_file_give_the_order(tmp_path: Path) -> None:
+    """Nanoseconds since 1970 are beyond 2^53, and rounded to far less than a step: they are the clock."""
+    moved = simulate(THREE, seed=3)
+    (tmp_path / "arm.urdf").write_text(THREE.urdf())
+    frame = pd.DataFrame({"stamp_ns": 1712143331250000000 + np.round(1e9 * moved.t).astype(np.int64)})
+    frame["name"] = [THREE.joints[::-1]] * len(frame)
+    frame["position"], frame["effort"] = list(moved.q[:, ::-1]), list(moved.tau[:, ::-1])
+    frame.to_parquet(tmp_path / "run.parquet")
+    draft = draft_recipe(tmp_path / "run.parquet").text
+    assert 'column = "stamp_ns"\nunit = "ns"' in draft
+    assert 'columns = ["position_3", "position_2", "position_1"], unit = "rad"' in draft
+
+
+def test_a_position_that_never_moves_is_no_joint(tmp_path: Path) -> None:
+    columns = good()
+    named = {"t": columns["t"], "grippers_angle": 0.0 * columns["t"]} | {f"joint_{j}": columns[f"q_{j}"] for j in (1, 2, 3)}
+    assert 'q = { columns = "FILL IN"' in drafted(tmp_path, text(named))
 
 
 @pytest.mark.parametrize(("name", "clock"), [("planned_motion.csv", "t"), ("run.csv", "time_from_start")])
