@@ -23,7 +23,6 @@ from benchmarks.hidden_effects.score import Score, score
 from benchmarks.hidden_effects.verdict import Said, read_verdict
 from pipelines.errors import RrridError
 from pipelines.log.results import encode
-from pipelines.model.effects import all_effects
 from pipelines.stage import Request, run_stage
 
 __all__ = ["Diagnose", "asked", "by_command", "by_compute", "engine_named", "judge", "scores_in", "tasks"]
@@ -103,14 +102,7 @@ def asked(folder: Path, without: tuple[str, ...] = (), diagnose: Diagnose = by_c
 
 def _scored(sealed: Sealed, line: Mapping[str, Any]) -> Score:
     said = read_verdict(line["answer"]) if "answer" in line else Said("refused" if "refused" in line else "crashed")
-    return score(sealed, said, line["seconds"], line["without"], _twins())
-
-
-def _twins() -> dict[str, frozenset[str]]:
-    """What each cause is declared to be mistaken for, by itself or by the other."""
-    declared = {(effect.name, twin) for effect in all_effects() for twin in effect.twins}
-    both = declared | {(twin, name) for name, twin in declared}
-    return {name: frozenset(twin for this, twin in both if this == name) for name, _ in both}
+    return score(sealed, said, line["seconds"], line["without"])
 
 
 def _lines(kept: Path) -> list[dict[str, Any]]:

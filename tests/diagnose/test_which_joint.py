@@ -58,7 +58,7 @@ def test_reference_logs_tell_at_which_joint_it_is(planar: tuple[ExperimentLog, .
     found = engine.diagnose((*before, *(scaled(log, joint) for log in planar)))
     assert [one.key for one in found.decision.causes] == [("torque_gain", joint)]
     (scale,) = found.look.selection.end.model.effects
-    assert abs(scale.amplitudes[0] - (1.0 / WRONG - 1.0)) < 0.005  # applied is less than logged
+    assert abs(scale.values["gain_error"] - (1.0 / WRONG - 1.0)) < 0.005  # applied is less than logged
 
 
 @pytest.mark.slow

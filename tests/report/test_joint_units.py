@@ -46,7 +46,7 @@ def test_headings_bear_the_units_of_the_arm() -> None:
     """Torque errors and gains of a gantry in N and mm, of an arm in N m and mrad: no heading has the other's."""
     gain = Gain(TorqueGain(np.ones(2), np.ones(2), np.zeros((2, 2))), BeforeAfter(np.ones(2), np.ones(2)), "closed-loop", None)
     for turning, torque, small in (((False, False), "[N]", "[mm]"), ((True, True), "[N m]", "[mrad]")):
-        errors = torque_errors(RMS, NOW, (50.0, 50.0), RMS.floor, "noise", "", Units(turning)).columns
+        errors = torque_errors(RMS, NOW, (50.0, 50.0), RMS.noise_floor, "noise", "", Units(turning)).columns
         gains = gain_table(gain, "", Units(turning)).columns
         assert [head.count(torque) for head in (*errors[1:4], *gains[1:4])] == [1] * 6
         assert [head.count(small) for head in gains[4:]] == [1, 1]

@@ -134,15 +134,6 @@ def test_parameters(kind: type[Effect]) -> None:
 
 
 @every_effect
-def test_twins_exist(kind: type[Effect], shared: Path) -> None:
-    """Twins are other effects, of this folder or of causes.md."""
-    causes = set(re.findall(r"^\| `(\w+)` \|", (shared / "causes.md").read_text(), flags=re.MULTILINE))
-    assert "cogging" in causes
-    assert kind.name not in kind.twins
-    assert set(kind.twins) <= causes | set(effect_names())
-
-
-@every_effect
 def test_place(kind: type[Effect], arm: Arm) -> None:
     """It stands at every joint once, or once for the arm; a wrong place is refused."""
     everywhere = kind.everywhere(arm.robot.revolute)

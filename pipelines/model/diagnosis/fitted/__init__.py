@@ -7,5 +7,4 @@
     slopes         the slopes of that torque by every number
     refit          all numbers at once
     linear         least squares around a solution: steps, and how sure numbers are
-    own_motion     whether what is left follows from a joint's own motion, whatever the cause
 """

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-from typing import Any
-
 import numpy as np
 import pytest
 
@@ -14,7 +11,7 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
-from pipelines.model.diagnosis.worth.numbers import of_amplitudes, of_no_size, parameters, standard_deviations, told, too_slight
+from pipelines.model.diagnosis.worth.numbers import of_amplitudes, parameters, standard_deviations, told
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.gravity_tilt import GravityTilt
@@ -54,60 +51,6 @@ def test_an_inertia_that_is_a_part_of_the_links_is_not_known(joint: int, told: b
     for name, true in (("viscous", VISCOUS), ("coulomb", COULOMB), *((("inertia", INERTIA),) if told else ())):
         assert found[name].value == pytest.approx(true, abs=max(4.0 * found[name].std, 0.02 * true))
         assert 0.0 < found[name].std < 0.2 * true
-
-
-@pytest.mark.parametrize(("size", "small"), [(4.9e-5, [0]), (5.1e-5, []), (-4.9e-5, [0]), (-5.1e-5, [])])
-def test_one_number_within_five_deviations_of_none_is_no_cause(size: float, small: list[int]) -> None:
-    """A delay of some microseconds, as sampling leaves it in an arm in order."""
-    delay = SimpleNamespace(free_amplitudes=True, amplitudes=(size,), log=None)
-    done: Any = SimpleNamespace(covariance=lambda: 1e-10 * np.eye(1), model=SimpleNamespace(effects=(delay,)),
-                                of_effect=lambda place: [0])
-    assert of_no_size(done) == small
-
-
-@pytest.mark.parametrize(("ripple", "together", "small"), [
-    ((1.0, 0.3), 0.0, [1]), ((5.3, 0.0), 0.0, [1]), ((5.8, 0.0), 0.0, []), ((4.2, 4.2), 0.0, []), ((2.0, -2.0), 0.0, [1]),
-    ((2.0, -2.0), 0.95, [])])
-def test_amplitudes_that_are_not_told_from_none_together_are_no_cause(ripple: tuple[float, float], together: float,
-                                                                     small: list[int]) -> None:
-    """A cosine and a sine known to 1 mN m each: each may be poor, and both sure for all that. Its order is no amplitude."""
-    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(80.0,), log=None)
-    cogging = SimpleNamespace(free_amplitudes=True, amplitudes=ripple, log=None)
-    covariance = np.eye(4)
-    covariance[2, 3] = covariance[3, 2] = together
-    names = ((0, 0, "0"), (0, 1, "order"), (0, 1, "0"), (0, 1, "1"))
-    done: Any = SimpleNamespace(covariance=lambda: covariance, unseen=[], names=names,
-                                model=SimpleNamespace(effects=(spring, cogging), beta=()),
-                                of_effect=lambda place: [0] if place == 0 else [1, 2, 3])
-    assert of_no_size(done) == small
-
-
-@pytest.mark.parametrize(("force", "together", "small"), [
-    ((8.0, 1.0, 0.0), 0.0, []), ((3.0, 1.0, 0.0), 0.0, [0]), ((3.0, 3.0, 0.0), 0.0, [0]), ((3.0, -3.0, 0.0), 0.9, [])])
-def test_a_touch_whose_force_is_not_told_from_none_is_no_touch(force: tuple[float, ...], together: float, small: list[int]) -> None:
-    """Three components, known to 1 N each, and so far together; how long it lasts is none of its amplitudes."""
-    touch = SimpleNamespace(free_amplitudes=True, amplitudes=force, log=1)
-    covariance = np.eye(5)
-    covariance[2, 3] = covariance[3, 2] = together
-    names = ((0, 0, "sharpness"), (1, 0, "duration"), (1, 0, "0"), (1, 0, "1"), (1, 0, "2"))
-    done: Any = SimpleNamespace(covariance=lambda: covariance, unseen=[], names=names,
-                                model=SimpleNamespace(effects=(touch,), beta=()), of_effect=lambda place: [1, 2, 3, 4])
-    assert of_no_size(done) == small
-    done.unseen = [2]  # of what logs do not show nobody knows that it is none
-    assert of_no_size(done) == []
-
-
-@pytest.mark.parametrize(("size", "least", "few"), [
-    (0.0019, 0.002, []), (-0.0017, 0.002, [0]), (0.0017, 0.002, [0]), (0.0017, 0.0, [])])
-def test_what_surely_is_less_than_arms_in_order_have_is_slight(size: float, least: float, few: list[int]) -> None:
-    """A deviation of 1e-4: of 0.0019 nobody knows whether it is less than 0.002."""
-    gain = SimpleNamespace(free_amplitudes=True, amplitudes=(size,), effect=SimpleNamespace(slight=least))
-    spring = SimpleNamespace(free_amplitudes=True, amplitudes=(1e-5, 1e-5), effect=SimpleNamespace(slight=1.0))
-    done: Any = SimpleNamespace(covariance=lambda: 1e-8 * np.eye(3), model=SimpleNamespace(effects=(gain, spring)),
-                                of_effect=lambda place: [0] if place == 0 else [1, 2])
-    assert too_slight(done) == few
-    done.covariance = lambda: np.zeros((3, 3))  # of what logs do not show nobody knows whether it is less
-    assert too_slight(done) == []
 
 
 def spread(effect: Effect, amplitudes: Array, covariance: Array, name: str) -> float:

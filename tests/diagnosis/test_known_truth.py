@@ -1,0 +1,213 @@
+"""Logs of which the truth is known: the cause, its place and its numbers; nothing where nothing is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.files import open_log
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.effects import find_effect
+from pipelines.model.rigid.body import Motion
+from tests.diagnose.sessions import but, session
+from tests.faulty import dropped
+from tests.healthy import with_signal
+from tests.model.diagnosis.arms import arm, hidden, wave
+from tests.model.diagnosis.asking import answered, causes, diagnosed, effects
+from tests.model.diagnosis.rotor import turned
+
+Load = Callable[[Motion], Array]  # torque (samples, joints) [N m] that a motion costs beside
+
+FEW = ("cogging", "torque_offset", "spring", "time_delay", "quadratic_drag")
+SHARP = 100.0  # [s/rad] of the dry friction of these arms
+
+
+def logs(load: Load | None = None) -> tuple[ExperimentLog, ...]:
+    """Two logs to fit and one that judges."""
+    roles = ((1, "identify"), (2, "identify"), (3, "validate"))
+    return tuple(hidden(seed, load, role) for seed, role in roles)
+
+
+def test_cogging_is_found_at_its_joint_with_its_numbers() -> None:
+    """And what is left is the noise of the drives, 20, 10 and 5 mN m, as far as the low-pass lets it through."""
+    found = answered(Logs.by_role(logs(wave)), exclude=but(*FEW))
+    assert [(one.cause, one.joint) for one in found.findings] == [("cogging", 2)]
+    values = {name: one.value for name, one in found.findings[0].parameters.items()}
+    assert values["order"] == pytest.approx(11.0, abs=0.01)
+    assert values["amplitude"] == pytest.approx(0.1, rel=0.03)
+    assert values["phase"] == pytest.approx(0.6, abs=0.05)
+    assert (found.after_rms.identify < np.array([0.012, 0.006, 0.004])).all()
+
+
+@pytest.mark.slow
+def test_a_delay_is_fitted_exactly() -> None:
+    """Position 3 ms late at joint 3: to first order the torque is a slope, exactly it is another moment."""
+    late = 3
+
+    def delayed(log: ExperimentLog) -> ExperimentLog:
+        q = log.q.copy()
+        q[late:, 2] = q[:-late, 2]
+        return with_signal(log, q=q)
+
+    found = diagnosed(*map(delayed, logs()), exclude=but(*FEW))
+    assert causes(found) == [("time_delay", 3)]
+    assert effects(found)[0].values["delay"] == pytest.approx(0.003, abs=5e-5)
+
+
+@pytest.mark.slow
+def test_a_drift_that_is_seen_only_at_its_beginning_has_numbers_that_can_be() -> None:
+    """12 mN m s/rad less every second, straight: no end of it is in the logs."""
+
+    def less(motion: Motion) -> Array:
+        out = np.zeros_like(motion.q)
+        out[:, 1] = -0.012 * (motion.t - motion.t[0]) * motion.dq[:, 1]
+        return out
+
+    found = diagnosed(*logs(less), exclude=but(*FEW, "viscous_drift"))
+    assert causes(found) == [("viscous_drift", 2)]
+    model = found.look.selection.end.model
+    values, end = effects(found)[0].values, 8.0
+    friction = find_effect("viscous_drift")(joint=2)._viscous(model.nominal)
+    gone = -values["relative_change"] * -np.expm1(-end / values["time_constant"]) * friction
+    assert gone == pytest.approx(0.012 * end, rel=0.15)
+
+
+def pushed(motion: Motion) -> Array:
+    """A push of 12 N on the tip, three seconds after the start."""
+    since, out = (motion.t - 3.0) / 0.3, np.zeros_like(motion.q)
+    window = np.where((since > 0.0) & (since < 1.0), np.sin(np.pi * since), 0.0)
+    for j in range(3):
+        moved = motion.q.copy()
+        moved[:, j] += 1e-6
+        jacobian = (arm().body.tip(moved) - arm().body.tip(motion.q)) / 1e-6
+        out[:, j] = -window * (jacobian @ np.array([0.0, 6.0, 10.0]))
+    return out
+
+
+@pytest.mark.slow
+def test_a_push_belongs_to_its_log() -> None:
+    """In the second of two logs it is found there, at its time."""
+    found = diagnosed(
+        hidden(1), hidden(2, pushed), hidden(3, None, "validate"), exclude=but(*FEW, "contact")
+    )
+    assert causes(found) == [("contact", None)]
+    push = found.look.selection.end.model.effects[0]
+    assert push.log == 1
+    assert push.values["start"] == pytest.approx(3.0, abs=0.01)
+    assert push.values["force"] == pytest.approx(np.hypot(6.0, 10.0), rel=0.05)
+
+
+def one_sided(motion: Motion) -> Array:
+    """A drag at joint 1, and friction that is larger forwards than backwards."""
+    v, out = motion.dq[:, 0], np.zeros_like(motion.q)
+    out[:, 0] = 0.3 * v * np.abs(v) + 0.15 * np.abs(np.tanh(SHARP * v))
+    return out
+
+
+@pytest.mark.slow
+def test_friction_that_differs_by_direction_is_no_offset() -> None:
+    """Beside a drag, which an offset does not tell from it."""
+    few = but("torque_offset", "asymmetric_friction", "quadratic_drag")
+    assert set(causes(diagnosed(*logs(one_sided), exclude=few))) == {
+        ("asymmetric_friction", 1),
+        ("quadratic_drag", 1),
+    }
+
+
+@pytest.mark.slow
+def test_a_drive_that_hunts_is_unknown() -> None:
+    """A line of 5.3 Hz, whose rate is pulled by a tenth to and fro, follows no signal of the arm."""
+
+    def hunting(motion: Motion) -> Array:
+        out = np.zeros_like(motion.q)
+        phase = 2.0 * np.pi * 5.3 * motion.t + 2.0 * np.sin(2.0 * np.pi * 0.3 * motion.t)
+        out[:, 1] = 0.05 * np.sin(phase)
+        return out
+
+    found = diagnosed(*logs(hunting)).decision
+    assert (found.verdict, found.causes) == ("unknown", ())
+
+
+@pytest.mark.slow
+def test_every_joint_of_three_sigmoids_has_its_hump(samples: Path) -> None:
+    """By Coulomb and viscous friction, which have no hump at low speed."""
+    names = ("excitation-1", "free-1", "excitation-2")
+    found = diagnosed(*(open_log(samples / f"rrr-closed-form/{name}.h5").log for name in names))
+    assert set(causes(found)) == {("stribeck", joint) for joint in (1, 2, 3)}
+
+
+def rotor(waves: dict[float, float], mean: float = 0.65) -> list[float]:
+    """Return the first orders that are found of a rotor with these amplitudes [N m] of each order."""
+    few = but("cogging", "spring", "torque_offset")
+    found = diagnosed(
+        turned(1, waves, 0.0, mean), turned(2, waves, 0.0, mean), exclude=few, cutoff_hz=40.0
+    )
+    return sorted(one.values["order"] for one in effects(found))
+
+
+@pytest.mark.parametrize("mean", [0.65, pytest.param(0.575, marks=pytest.mark.slow)])
+def test_waves_of_a_rotor_have_whole_orders(mean: float) -> None:
+    """Seven waves to a turn and what is four times that, and twelve of another kind; stops at 330° as well."""
+    assert rotor({7.0: 0.05, 12.0: 0.014, 28.0: 0.03}, mean) == [7.0, 12.0, 28.0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("order", [6.8, 8.25, 12.37])
+def test_behind_a_gear_an_order_is_what_it_is(order: float) -> None:
+    """However close to a whole one."""
+    assert rotor({order: 0.04}) == [pytest.approx(order, abs=0.01)]
+
+
+def wandering(seed: int, size: float, ripple: float = 0.0) -> ExperimentLog:
+    """A rotor with a torque of `size` [N m] rms that follows nothing but chance and remembers itself for a sixth of a second, as
+    what a model leaves of a recorded arm does; and a ripple of seven waves a turn."""
+    log = turned(seed, {7.0: ripple}, 0.0)
+    rng, memory = np.random.default_rng(100 + seed), np.exp(-log.sample_time / 0.15)
+    wander = np.zeros(log.n_samples)
+    pushes = rng.normal(0.0, size * np.sqrt(1.0 - memory**2), log.n_samples - 1)
+    for k, push in enumerate(pushes):
+        wander[k + 1] = memory * wander[k] + push
+    return with_signal(log, tau=log.tau + wander[:, None])
+
+
+@pytest.mark.parametrize("seed", [1, *(pytest.param(s, marks=pytest.mark.slow) for s in (11, 21))])
+def test_a_torque_that_follows_nothing_has_no_name(seed: int) -> None:
+    assert causes(diagnosed(wandering(seed, 0.01), cutoff_hz=40.0)) == []
+
+
+@pytest.mark.slow
+def test_a_ripple_is_found_beside_it() -> None:
+    """Of the same power: one of seven waves a turn, 0.014 N m, whose square is twice that of the wander."""
+    found = diagnosed(wandering(1, 0.01, 0.014), wandering(2, 0.01, 0.014), cutoff_hz=40.0)
+    assert causes(found) == [("cogging", 1)]
+    assert effects(found)[0].values["order"] == pytest.approx(7.0, rel=0.01)
+    assert effects(found)[0].values["amplitude"] == pytest.approx(0.014, rel=0.25)
+
+
+@pytest.mark.slow
+def test_a_ripple_that_is_there_for_half_a_log_is_none_of_the_machine() -> None:
+    """Parts of the log do not agree on its size."""
+    whole, without = turned(1, {7.0: 0.04}, 0.0), turned(1, {}, 0.0)
+    first = (np.arange(whole.n_samples) < 0.5 * whole.n_samples)[:, None]
+    half = with_signal(whole, tau=np.where(first, whole.tau, without.tau))
+    assert ("cogging", 1) not in causes(diagnosed(half, exclude=but("cogging"), cutoff_hz=40.0))
+
+
+def test_samples_lost_here_and_there_are_no_fault() -> None:
+    fitted, judging = session()
+    found = diagnosed(dropped(fitted, lambda k: k % 97 != 96), judging)
+    assert found.decision.verdict == "no-fault-found"
+
+
+def test_how_fast_a_drift_is_goes_by_the_logs_and_not_by_the_time_between_them() -> None:
+    """Two logs of eight seconds, five minutes apart: from a fifth to five times eight seconds."""
+    later = with_signal(hidden(2), t=hidden(2).t + 300.0)
+    found = diagnosed(hidden(1), later, exclude=but("viscous_drift"))
+    families = found.look.later.dictionary.families
+    for joint in (1, 2, 3):
+        times = [shape.time_constant for shape in families["viscous_drift", joint].shapes]
+        assert times == pytest.approx([1.6, 4.0, 12.0, 40.0], rel=1e-3)

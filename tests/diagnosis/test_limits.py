@@ -1,0 +1,170 @@
+"""What is said to be detectable is: above its limit a cause that the MuJoCo plant hides is found, well below it is not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import pytest
+
+from pipelines.bench import experiments
+from pipelines.bench.fault import Fault
+from pipelines.bench.faults import make
+from pipelines.bench.machine import Machine, draw_machine
+from pipelines.bench.session import record
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Acting
+from pipelines.model.diagnosis.answered.without_limit import without_limit
+from pipelines.model.diagnosis.asked.inputs import Logs
+from pipelines.model.diagnosis.result import DetectionLimit, Diagnosis, Rejected
+from pipelines.model.effects import effect_names
+from pipelines.model.effects.two_sigmoid import TwoSigmoid
+from tests.diagnose.sessions import but
+from tests.model.diagnosis.asking import answered, causes, diagnosed
+
+FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
+SECONDS, NUMBER = 5.0, 7
+
+
+@lru_cache(maxsize=1)
+def machine() -> Machine:
+    return draw_machine(NUMBER, "fault")
+
+
+@lru_cache(maxsize=4)
+def recorded(first: int, role: str, *faults: Fault) -> tuple[ExperimentLog, ...]:
+    """Two excitations."""
+    plans = [
+        replace(
+            experiments.excitation(machine(), first + k, SECONDS, 1),
+            name=f"excitation-{first + k}",
+            role=role,
+        )
+        for k in range(2)
+    ]
+    return tuple(record(machine(), faults, plans, first))
+
+
+@lru_cache(maxsize=2)
+def healthy(exclude: tuple[str, ...]) -> Diagnosis:
+    """Return the diagnosis of an arm as it was."""
+    logs = (*recorded(11, "reference"), *recorded(1, "identify"))
+    return answered(Logs.by_role(logs), exclude=exclude, whole=True)
+
+
+def limit(cause: str, joint: int, exclude: tuple[str, ...] = FEW) -> DetectionLimit:
+    (found,) = [
+        one for one in healthy(exclude).detection_limits if (one.cause, one.joint) == (cause, joint)
+    ]
+    return found
+
+
+def named(cause: str, joint: int, part: float, exclude: tuple[str, ...] = FEW) -> bool:
+    """Whether the cause is found at `part` of its limit."""
+    there = limit(cause, joint, exclude)
+    full = make(cause, machine(), joint, 1)
+    size = full.parameters()[there.parameter]
+    assert isinstance(size, float)
+    assert isinstance(there.minimum.value, float)
+    fault = full.scaled(part * there.minimum.value / abs(size))
+    logs = (*recorded(11, "reference"), *recorded(1, "identify", fault))
+    return (cause, joint) in causes(diagnosed(*logs, exclude=exclude))
+
+
+@pytest.mark.parametrize(
+    ("cause", "joint", "part"),
+    [
+        pytest.param("torque_offset", 3, 2.0, marks=pytest.mark.slow),
+        pytest.param("torque_offset", 3, -2.0, marks=pytest.mark.slow),
+        ("cogging", 2, 2.0),
+        pytest.param("cogging", 2, -2.0, marks=pytest.mark.slow),
+    ],
+)
+def test_above_its_limit_a_cause_is_found(cause: str, joint: int, part: float) -> None:
+    """At twice the limit, with and against what the healthy arm leaves."""
+    assert named(cause, joint, part)
+
+
+@pytest.mark.slow
+def test_well_below_its_limit_it_is_not() -> None:
+    """The limit covers both signs: at 0.7 of it the worse one is not found."""
+    assert not all(named("torque_offset", 3, part) for part in (0.7, -0.7))
+    assert not named("cogging", 2, 0.4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("cause", "joint"),
+    [
+        ("cogging", 1),
+        ("cogging", 3),
+        ("torque_offset", 2),
+        ("quadratic_drag", 1),
+        ("asymmetric_friction", 2),
+        ("torque_gain", 3),
+        ("encoder_eccentricity", 1),
+    ],
+)
+def test_limits_hold_with_the_whole_library(cause: str, joint: int) -> None:
+    assert named(cause, joint, 2.0, ())
+    assert not named(cause, joint, 0.3, ())
+
+
+def test_nothing_of_the_library_goes_unsaid() -> None:
+    """Of each cause there is a finding, a smallest size, a record that would show it, or what was seen of it."""
+    found = healthy(FEW)
+    lists = (found.findings, found.baseline_effects, found.detection_limits, found.not_identifiable)
+    every = {one.cause for some in (*lists, found.without_limit) for one in some}
+    assert every == set(effect_names()) - set(FEW) - {"two_sigmoid"}
+
+
+def test_a_law_that_only_stands_in_for_another_is_said_where_the_model_has_it() -> None:
+    """Nobody is told that fit-friction chooses two sigmoids: it does not know them."""
+    found = healthy(FEW)
+    assert found.nominal is not None
+    assert "two_sigmoid" not in {one.cause for one in without_limit(found, False)}
+    two = Acting.of(TwoSigmoid(1), {"f1": 1.0, "f2": 0.1, "w1": 60.0, "w2": 12.0, "b": 0.1})
+    told = replace(found, nominal=replace(found.nominal, friction=(two, *found.nominal.friction)))
+    said = next(one.reason for one in without_limit(told, False) if one.cause == "two_sigmoid")
+    assert "part of the nominal model" in said
+
+
+@pytest.mark.parametrize(
+    ("cause", "frf", "refused", "said"),
+    [
+        ("coulomb", False, "", "part of the nominal model"),
+        ("three_sigmoid", False, "", "another law of friction"),
+        ("joint_elasticity", True, "", "frequency responses show none"),
+        ("joint_elasticity", False, "", "was looked for"),
+        ("payload", False, "", "not found to have moved"),
+        ("cogging", False, "", "was looked for"),
+        (
+            "payload",
+            False,
+            "the base parameters have moved as link_length or payload moves them",
+            "have moved as link_length",
+        ),
+    ],
+)
+def test_what_has_no_limit_is_said_as_it_was_seen(
+    cause: str, frf: bool, refused: str, said: str
+) -> None:
+    """A law of the model, a spring that responses deny, what did not move; what was refused, by the words it was refused with."""
+    rejected = (Rejected(cause, None, refused),) if refused else ()
+    nothing = replace(
+        healthy(FEW),
+        rejected=rejected,
+        findings=(),
+        baseline_effects=(),
+        detection_limits=(),
+        not_identifiable=(),
+    )
+    (reason,) = (one.reason for one in without_limit(nothing, frf) if one.cause == cause)
+    assert said in reason
+
+
+def test_a_cogging_limit_says_at_which_order() -> None:
+    there = limit("cogging", 2)
+    assert set(there.at) == {"order"}
+    assert there.minimum.unit == "N m"
+    assert 0.0 < there.identifiability <= 1.0
