@@ -127,7 +127,11 @@ def _doubt(worth: Worth, place: int) -> str:
 def _numbers(done: Candidate) -> str:
     """Return ": order = 6.02 1/rev, …" of a cause whose numbers are none that it can have."""
     one = done.state.model.effects[-1]
-    units = {q.name: "" if q.unit == "1" else f" {q.unit}" for q in one.effect.parameters}
+    joint, revolute = one.effect.joint, done.state.model.arm.robot.revolute
+    turning = joint is None or revolute[joint - 1]
+    units = {
+        q.name: "" if q.unit == "1" else f" {q.unit_at(turning)}" for q in one.effect.parameters
+    }
     shown = one.effect.reported(one.values).items()
     told = [
         f"{name} = {plain_number(value, 3)}{units[name]}"
