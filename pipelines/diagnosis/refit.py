@@ -145,8 +145,9 @@ class Later:
                 way, more = share * step[: len(theta)], share * step[len(theta) :] / size
                 own = way[: self.prior.n_nominal] / self.prior.scale
                 tried = model.moved(np.r_[own, more], names)
-                left = self._residual(tried, theta + way)
-                cost = self._cost(left, theta + way, info, moment)
+                with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
+                    left = self._residual(tried, theta + way)
+                    cost = self._cost(left, theta + way, info, moment)
                 if np.isfinite(cost) and cost <= now:
                     model, theta, residual, now = tried, theta + way, left, cost
                     break
