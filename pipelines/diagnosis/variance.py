@@ -104,14 +104,21 @@ def settle(
 ) -> tuple[Dataset, Dictionary]:
     """Return the rows of each session whitened, in units of its own noise, and their columns.
 
+    Sessions that are compared use the same columns, the first shapes: what is left of them is alike.
+    Rows alone use the best shape of each cause, or a fault of another shape would be noise.
+
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
     """
 
+    alone = dataset.reference is None
+    first = tuple(group for group in dictionary.groups if group.shape == 0)
+
     def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
         white, columns = rows, table
-        for _ in range(_ROUNDS):
-            numbers = _imitated(white, columns, dictionary.groups, config)
+        for _ in range(_ROUNDS if alone else 1):
+            groups = _best_shapes(white, columns, dictionary.groups) if alone else first
+            numbers = _imitated(white, columns, groups, config)
             both = Table.stacked([rows.nominal, table])
             left = [y - t for y, t in zip(rows.y, both.times(numbers), strict=True)]
             white, through = rows.whitened(left, config.noise_bins)
@@ -129,23 +136,25 @@ def settle(
     )
 
 
-def _imitated(
-    rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
-) -> Array:
-    """Return the numbers (nominal + candidates,) that fit the rows best; of shapes without use 0.
-
-    Of each cause at each joint the shape is used that explains most beside the nominal columns.
-    """
-    scale = rows.nominal.norms
-    unit = 1.0 / np.where(scale > 0.0, scale, 1.0)
-    nominal = rows.nominal.scaled(unit)
+def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tuple[Group, ...]:
+    """Return of each cause at each joint the shape that explains most beside the nominal columns."""
+    nominal = rows.nominal.scaled(_unit(rows.nominal))
     known = Arrow.of(nominal.gram(nominal) + _FLAT * np.eye(nominal.width), Structure.of(nominal))
     cross = nominal.gram(candidates)
     moments = candidates.moments(rows.y) - cross.T @ known.solve(nominal.moments(rows.y))
     squares = [own.gram(own) for own in (candidates.take(g.columns) for g in groups)]
-    best = [one.group for one in best_of(screen(groups, known, cross, squares, moments)).values()]
-    of = [g for g in best for _ in range(g.width)]
-    columns = np.concatenate([g.columns for g in best])
+    best = best_of(screen(groups, known, cross, squares, moments))
+    return tuple(one.group for one in best.values())
+
+
+def _imitated(
+    rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
+) -> Array:
+    """Return the numbers (nominal + candidates,) that fit the rows best; 0 of all but `groups`."""
+    unit = _unit(rows.nominal)
+    nominal = rows.nominal.scaled(unit)
+    of = [g for g in groups for _ in range(g.width)]
+    columns = np.concatenate([g.columns for g in groups])
     table = Table.stacked([nominal, candidates.take(columns)])
     power = sum(float(y @ y) for y in rows.y)
     gram, moment, structure = table.gram(table), table.moments(rows.y), Structure.of(table)
@@ -154,3 +163,8 @@ def _imitated(
     out[: nominal.width] = found.mean[: nominal.width] * unit
     out[nominal.width + columns] = found.mean[nominal.width :]
     return out
+
+
+def _unit(table: Table) -> Array:
+    """(k,) one over the length of each column."""
+    return np.asarray(1.0 / np.where(table.norms > 0.0, table.norms, 1.0))
