@@ -17,6 +17,8 @@ from benchmarks.hidden_effects.make import make_cases
 from benchmarks.hidden_effects.score import Score
 from benchmarks.hidden_effects.table import rows, table
 
+pytestmark = pytest.mark.slow  # the short dozen takes two minutes, the campaign two hours
+
 SEED = 30
 DOZEN = {"single": 2, "healthy": 1, "outside": 1, "payload": 1, "standing": 1}  # cases of each family
 

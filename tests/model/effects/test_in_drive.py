@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -13,7 +12,6 @@ from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.effects.spring import Spring
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_gain import TorqueGain
-from pipelines.model.effects.torque_saturation import TorqueSaturation
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 from tests.model.rigid.rrr_arms import random_states
@@ -67,13 +65,3 @@ def test_a_weak_drive_needs_more_command_for_a_spring_too(motion: Motion) -> Non
     weak = Acting.of(TorqueGain(2), {"gain_error": _GAIN})
     for order in permutations((spring(), weak)):
         np.testing.assert_allclose(synthetic_arm().extended(*order).torque(motion), wanted, atol=1e-9)
-
-
-@pytest.mark.parametrize(("limit", "believed"), [(20.0, True), (12.0, True), (6.0, False)])
-def test_a_joint_that_is_clipped_most_of_the_time_could_not_have_followed(limit: float, believed: bool, motion: Motion) -> None:
-    """A weight of 10 N m with a swing of 5: above 20 never, above 12 a third of the time, above 6 nearly always. What was commanded
-    there says nothing of what came out, and a limit so low would explain whatever there is."""
-    tau = np.zeros_like(motion.q)
-    tau[:, 1] = -10.0 - 5.0 * np.sin(60.0 * motion.t)
-    logged = replace(motion, tau=tau)
-    assert TorqueSaturation(2, limit).believable((logged, logged), synthetic_arm()) is believed
