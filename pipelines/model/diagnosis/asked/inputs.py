@@ -131,7 +131,7 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
         first += len(part)
     rows = _all_rows(parts, columns, recipe, held)
     motions = (*fitted, *judging, *referring)
-    if not any(log.controlled for log, _ in motions):  # a twin rests as its arm does
+    if not any(log.controlled for log, _ in motions):  # with a known controller rests count
         rows = _without_rests(parts, columns, recipe, held, rests(motions, recipe.cutoff_hz, np.max(fastest, axis=0)), rows)
     data, judge, reference = rows
     assert data is not None  # prepare refuses logs without any to fit
