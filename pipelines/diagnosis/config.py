@@ -38,3 +38,6 @@ class DiagnosisConfig:
     excess: float = (
         2.0  # mean square residual of a joint over the baseline's, from which it is too large
     )
+    misfit: float = (
+        0.01  # share of a joint's torque that repeats, and no cause explains, which is a fault
+    )

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+from scipy.stats import f as f_law
+
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.refit import Later
+from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.selection import Cause, Selection
+from pipelines.diagnosis.table import Array
+from pipelines.model.diagnosis.rows.repeated import Repeated
 
 __all__ = ["Decision", "decide"]
 
@@ -44,13 +49,41 @@ def decide(
         return Decision("unknown", "several causes explain it", causes, explained)
     if causes:
         return Decision("cause", "", causes, explained)
-    if not fits and selection.stopped:
+    missing = _missing(later, selection.end, config)
+    if selection.stopped and (missing.any() or not fits):
         return Decision("unknown", selection.stopped, (), explained)
+    more = f"; it follows {selection.follows}" if selection.follows else ""
+    if missing.any():
+        reason = (
+            f"{missing.max():.1%} of the torque of joint {int(missing.argmax()) + 1} comes again "
+            f"with the motion, and no cause explains it{more}"
+        )
+        return Decision("unknown", reason, (), explained)
     if not fits:
-        more = f"; it follows {selection.follows}" if selection.follows else ""
         reason = (
             f"the mean square residual is {left.max():.2f} of the noise at joint "
             f"{int(left.argmax()) + 1}, where {bound:.2f} is usual at most{more}"
         )
         return Decision("unknown", reason, (), explained)
     return Decision("no-fault-found", "", (), explained)
+
+
+def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
+    """Return the share of each joint's torque (joints,) that no noise is and the model leaves.
+
+    With reference logs it may have been there before, and their residual is what is usual. Without
+    them the noise is what differs between rows of one state. Where both parts of a pair are noise,
+    common over differing has an F distribution; 0 below its bound and below `config.misfit`.
+    """
+    rows = later.rows
+    if later.dataset.reference is not None:
+        return np.zeros(rows.n_joints)
+    left = np.empty(rows.count)
+    for j, own in enumerate(state.residual):
+        left[rows.joint == j] = own
+    pairs = Repeated.of(rows.data)
+    common, differing = pairs.parts(left)
+    bound = f_law.isf(config.alpha / rows.n_joints, pairs.count, pairs.count)
+    torque = np.array([float(np.mean(y**2)) for y in rows.y])
+    share = np.sqrt(np.maximum(common - differing, 0.0) / torque)
+    return np.where((common > bound * differing) & (share > config.misfit), share, 0.0)

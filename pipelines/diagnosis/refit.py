@@ -183,10 +183,11 @@ class Later:
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
     def possible(self, state: State, config: DiagnosisConfig) -> bool:
-        """Return whether the last effect can have its numbers, each as uncertain as it is.
+        """Return whether the last effect can be a cause with its numbers, each as uncertain as it is.
 
-        An amplitude outside its range may be within it by its standard deviation; a number of a
-        shape that is held at the end of its range has its best value outside.
+        An amplitude outside its range may be within it by its standard deviation, and one that surely
+        is as slight as in any arm is no cause; a number of a shape that is held at the end of its
+        range has its best value outside.
         """
         slopes, names = self._slopes(state.model)
         factor, first = self._factor(state.info, state.effects), self.base.width
@@ -204,6 +205,8 @@ class Later:
                 if abs(by) > reach and last.effect.at_end(name, float(by)):
                     return False
                 continue
+            if abs(last.amplitudes[int(name)]) + abs(reach) < last.effect.slight:
+                return False
             for way in (-reach, reach):
                 amplitudes = np.array(last.amplitudes)
                 amplitudes[int(name)] += way

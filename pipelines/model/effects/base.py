@@ -106,7 +106,7 @@ class Effect(Placed, ABC):
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
-    slight: ClassVar[float] = 0.0  # of its amplitude, if it has one alone: what surely is less, instruments in order have as well
+    slight: ClassVar[float] = 0.0  # of its only amplitude: what surely is less, arms in order have as well
     turns: ClassVar[bool] = False  # only a joint that turns can have it
     healthy: ClassVar[Literal["first shape", "every shape", "never"]] = "first shape"  # that healthy machines have in small
     ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken

@@ -34,6 +34,7 @@ class TimeDelay(Effect):
     remedy = "Stamp positions where they are taken, or move this joint's signal by the delay before it is used; lower the gains."
     experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
     size = "delay"
+    slight = 1e-4  # [s] a control program under Linux stamps its samples no better
     from_own_joint = True
     misread = True
 

@@ -16,7 +16,7 @@ from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.diagnosis.rows.repeated import unrepeated
+from pipelines.model.diagnosis.rows.repeated import Repeated
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.judgeable import Facts, cannot_judge, predicted_std, unresolved
 from pipelines.model.estimation.negative_viscous import negative_viscous
@@ -24,7 +24,7 @@ from pipelines.model.estimation.regression import Columns, LogEquations
 
 __all__ = ["facts", "limited_by_estimate", "nominal_estimate"]
 
-_ABOVE = 1.6  # times the noise between periods, up to which a residual is explained by it
+_ABOVE = 1.6  # times the noise between rows of one state, up to which a residual is explained by it
 
 
 def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
@@ -62,9 +62,9 @@ def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
 
 
 def _noise(prepared: Prepared) -> Array:
-    """Return the noise (joints,) [N m] of the residual by repeated periods; 0 without any."""
+    """Return the noise (joints,) [N m] of the residual by rows of one state; 0 without any."""
     _, fit = fit_nominal(prepared.data, prepared.columns)
-    return np.sqrt(np.nan_to_num(unrepeated(prepared.data, fit.left)))
+    return np.sqrt(np.nan_to_num(Repeated.of(prepared.data).noise(fit.left)))
 
 
 def _equations(data: Data, columns: Columns) -> list[LogEquations]:

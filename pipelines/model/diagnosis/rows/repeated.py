@@ -1,54 +1,87 @@
-"""What differs from one period to the next of a motion that comes again: nothing else of a residual can be noise.
+"""Pairs of rows at which an arm is in the same state: what differs between them is noise.
 
-    power = unrepeated(data, left)        (joints,) [N m^2] mean square; NaN where no log repeats its motion
+    pairs = Repeated.of(data)
+    common, differing = pairs.parts(left)       (joints,) mean squares of ½ (r₁ + r₂) and ½ (r₁ - r₂)
+    noise = pairs.noise(left)                   (joints,) variance, whatever the residual holds beside it
 
-Friction that bends before it slides, where no law has that, leaves a residual without a quiet moment, whose spectrum passes for
-that of a drive; but in each period it leaves the same. Of noise r with r(t + T) independent of r(t)
+A residual r = f(q, dq, ddq) + e of a model error f and noise e, independent in two rows of one state:
 
-    ½ mean (r(t + T) - r(t))² = mean r²
+    E ¼ (r₁ - r₂)² = ½ σ²        E ¼ (r₁ + r₂)² = ½ σ² + f²
 
-and what repeats is not in it, whatever it is. An arm that starts from rest has not settled at first: then there is more.
+(Rice 1984, difference-based variance). Rows of periods that come again are such pairs, declared or
+not, within a log or between two. Where states differ a little σ² comes out too large, not too small.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.rows.data import Data, LogData
+from pipelines.model.diagnosis.rows.data import Data
 
-__all__ = ["unrepeated"]
+__all__ = ["Repeated"]
 
-_FEWEST = 100  # pairs of rows of a joint: fewer say little
-_OFF = 0.1  # of the spacing of rows, by which four of them may be unevenly apart
-_SHORTEST = 1.0  # [s] of a period: after less, what wanders is still where it was
-
-
-def unrepeated(data: Data, left: Array) -> Array:
-    """Of a residual `left` (rows,) [N m]."""
-    square, count = np.zeros(data.n_joints), np.zeros(data.n_joints)
-    for one, x in zip(data.logs, data.split(left), strict=True):
-        if one.log.period is None or one.log.period < _SHORTEST:
-            continue
-        here, there = _a_period_later(one, x, one.log.period)
-        square += 0.5 * np.square(here - there).sum(axis=1, where=np.isfinite(here - there))
-        count += np.isfinite(here - there).sum(axis=1)
-    return np.where(count >= _FEWEST, square / np.maximum(count, 1.0), np.nan)
+_NEAR = 0.1  # of the standard deviation of each coordinate: rows of one state
+_APART = 1.0  # [s] in a log, at least: after less, what wanders is still where it was
+_NEIGHBOURS = 32  # numerics: that are looked at; slow motion has many next to it in time
+_FEWEST = 100  # numerics: pairs of a joint; fewer say little
 
 
-def _a_period_later(one: LogData, x: Array, period: float) -> tuple[Array, Array]:
-    """(joints, pairs) of `x` (joints, rows), and of the cubic through four rows a period [s] later; NaN of what does not count."""
-    known = np.where(one.weighed, x, np.nan)
-    if len(one.t) < 4:
-        return known[:, :0], known[:, :0]
-    step = float(np.median(np.diff(one.t)))
-    at = np.searchsorted(one.t, one.t + period + _OFF * step, side="right") - 1  # the row before, or at that time
-    inside = (at >= 1) & (at <= len(one.t) - 3)
-    at = np.clip(at, 1, len(one.t) - 3)
-    inside &= np.abs(one.t[at + 2] - one.t[at - 1] - 3.0 * step) < _OFF * step
-    part = np.maximum((one.t + period - one.t[at]) / step, 0.0)
-    inside &= part < 1.0
-    four = (-part * (part - 1.0) * (part - 2.0) / 6.0, (part + 1.0) * (part - 1.0) * (part - 2.0) / 2.0,
-            -(part + 1.0) * part * (part - 2.0) / 2.0, (part + 1.0) * part * (part - 1.0) / 6.0)
-    there = sum((weight * known[:, at + k] for k, weight in enumerate(four, -1)), np.zeros_like(known))
-    return known[:, inside], np.asarray(there[:, inside])
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """Pairs of rows of one state; no row is in two of them."""
+
+    data: Data
+    first: npt.NDArray[np.intp]  # (pairs,) among the rows of all logs, one joint
+    second: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, data: Data) -> Repeated:
+        """Return the pairs, nearest first."""
+        logs = [(one.at_rows(one.motion.q), one.at_rows(one.motion.dq), one.at_rows(one.motion.ddq))
+                for one in data.logs]
+        state = np.vstack([np.hstack(own) for own in logs])
+        log = np.repeat(np.arange(len(data.logs)), [one.rows for one in data.logs])
+        time = np.concatenate([one.t for one in data.logs]) + 1e9 * log  # other logs are far away
+        scaled = state / np.maximum(state.std(axis=0), 1e-300)
+        distance, other = cKDTree(scaled).query(scaled, min(_NEIGHBOURS, len(scaled)), p=np.inf,
+                                                distance_upper_bound=_NEAR)
+        here, place = np.nonzero(np.isfinite(distance))
+        there = other[here, place]
+        apart = np.abs(time[here] - time[there]) >= _APART
+        here, there = here[apart], there[apart]
+        free, chosen = np.ones(len(scaled), dtype=bool), []
+        for k in np.argsort(distance[np.isfinite(distance)][apart], kind="stable"):
+            if free[here[k]] and free[there[k]]:
+                free[[here[k], there[k]]] = False
+                chosen.append(k)
+        return cls(data, here[chosen], there[chosen])
+
+    @property
+    def count(self) -> Array:
+        """(joints,) pairs that count."""
+        return np.asarray(self._counts.sum(axis=1), dtype=np.float64)
+
+    def parts(self, left: Array) -> tuple[Array, Array]:
+        """Return what the pairs of a residual (rows,) have in common and what differs: mean squares."""
+        one, other = (self._laid(left)[:, at] for at in (self.first, self.second))
+        counts, number = self._counts, np.where(self.count < _FEWEST, np.nan, self.count)
+        return tuple(np.square(0.5 * x).sum(axis=1, where=counts) / number for x in (one + other, one - other))
+
+    def noise(self, left: Array) -> Array:
+        """Return the variance (joints,) of the noise of a residual (rows,); NaN of too few pairs."""
+        return 2.0 * self.parts(left)[1]
+
+    @property
+    def _counts(self) -> npt.NDArray[np.bool_]:
+        """(joints, pairs)"""
+        weighed = np.concatenate([one.weighed for one in self.data.logs], axis=1)
+        return np.asarray(weighed[:, self.first] & weighed[:, self.second])
+
+    def _laid(self, x: Array) -> Array:
+        """(rows,) -> (joints, rows of one joint)"""
+        return np.concatenate(list(self.data.split(x)), axis=1)
