@@ -17,19 +17,13 @@ from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.score import chi2_bound, upper_point
 from pipelines.diagnosis.screening import Screened, best_of, screen
 from pipelines.diagnosis.table import Array, Parts, Table
 
-__all__ = ["Baseline", "baseline", "upper_point"]
+__all__ = ["Baseline", "baseline"]
 
 _SPLITS = 6  # of the reference into two
-
-
-def chi2_bound(alpha: float, freedom: int) -> float:
-    """Return the value that χ² of as many degrees of freedom exceeds with probability `alpha`."""
-    from scipy.stats import chi2
-
-    return float(chi2.isf(alpha, max(freedom, 1)))
 
 
 @dataclass(frozen=True)
@@ -136,10 +130,3 @@ def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     ]
     step = max(1, len(out) // _SPLITS)
     return out[::step][:_SPLITS]
-
-
-def upper_point(values: Sequence[float], alpha: float) -> float:
-    """Return the upper `alpha` point of a Gumbel law fitted to maxima by its moments."""
-    x = np.asarray(values)
-    scale = max(float(x.std(ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12) if len(x) > 1 else 1e-12
-    return float(x.mean() - np.euler_gamma * scale - scale * np.log(-np.log1p(-alpha)))

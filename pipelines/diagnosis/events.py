@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.diagnosis.baseline import upper_point
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
+from pipelines.diagnosis.score import chi2_bound, upper_point
 from pipelines.diagnosis.table import Array, Indices, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
@@ -33,6 +33,8 @@ class Window:
     amplitudes: Array
     log: int
     touched: Indices  # of the rows of each joint, those within it
+    rows: slice  # of each joint, those of its log
+    push: Array  # (joints, rows of its log) what it explains there, in units of the noise
 
 
 def standing_out(
@@ -49,8 +51,6 @@ def standing_out(
     it by is measured, by the largest of each half of a log without its best window (`upper_point`).
     No model of a torque is exact: a push has to be more than a share of the torque at its moment.
     """
-    from scipy.stats import chi2
-
     best, gains = None, list[float]()
     for log in range(len(rows.data.logs)):
         there = best_window(rows, dictionary, arm, residual, log)
@@ -63,7 +63,7 @@ def standing_out(
             gains.append(0.0 if own is None else own.gain)
     if best is None or best.gain < config.relevance**2 * _power(rows, best.touched):
         return None
-    bound = float(chi2.isf(config.alpha / config.event_candidates, _DIRECTIONS))
+    bound = chi2_bound(config.alpha / config.event_candidates, _DIRECTIONS)
     return best if best.gain > max(bound, upper_point(gains, config.alpha)) else None
 
 
@@ -101,5 +101,7 @@ def best_window(
         gain = float((x @ own.ravel()) @ amplitudes)
         size = np.abs(columns).max(axis=(0, 1))
         touched = np.flatnonzero(size > _TOUCHED * size.max()) + first
-        found.append(Window(gain, shape, amplitudes, data.first + log, touched))
+        push = np.tensordot(amplitudes, columns, 1)
+        place = slice(first, first + one.rows)
+        found.append(Window(gain, shape, amplitudes, data.first + log, touched, place, push))
     return max(found, key=lambda window: window.gain, default=None)

@@ -1,4 +1,4 @@
-"""Exact fits to the later rows: Gauss-Newton under the prior, and the block-wise predictive score.
+"""Exact fits to the later rows: Levenberg-Marquardt under the prior, and the block-wise predictive score.
 
 later = Later.of(dataset, dictionary, prior)
 state = later.start(config)
@@ -26,8 +26,9 @@ from pipelines.model.effects.base import Effect
 __all__ = ["Later", "State"]
 
 _RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
-_STEPS = 7  # numerics: of Gauss-Newton
-_SHARES = (1.0, 0.4, 0.1)  # numerics: of a step that is tried
+_STEPS = 20  # numerics: of Levenberg-Marquardt, at most
+_DAMPING = (_RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
+_TRIED = 81  # numerics: amplitudes that may be possible
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
 _FREE = 1e-6  # numerics: of the information along a direction that is freed, or not held
 
@@ -139,10 +140,10 @@ class Later:
             unit = slopes.scaled(1.0 / size)
             base, gram = self._exact(model)
             gradient = np.r_[moment - info @ theta + base.moments(residual), unit.moments(residual)]
-            step = self._factor(info, unit, base, gram).solve(gradient)
             before = now
-            for share in _SHARES:
-                way, more = share * step[: len(theta)], share * step[len(theta) :] / size
+            for damping in _DAMPING if names else _DAMPING[:1]:
+                step = self._factor(info, unit, base, gram, damping).solve(gradient)
+                way, more = step[: len(theta)], step[len(theta) :] / size
                 own = way[: self.prior.n_nominal] / self.prior.scale
                 tried = model.moved(np.r_[own, more], names)
                 with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
@@ -182,22 +183,27 @@ class Later:
         moments = self.candidates.moments(state.residual) - cross.T @ info.solve(slope)
         return screen(self.dictionary.groups, info, cross, self.squares, moments)
 
-    def possible(self, state: State, config: DiagnosisConfig) -> bool:
+    def possible(self, state: State, explained: float, config: DiagnosisConfig) -> bool:
         """Return whether the last effect can be a cause with its numbers, each as uncertain as it is.
 
         An amplitude outside its range may be within it by its standard deviation, and one that surely
         is as slight as in any arm is no cause; a number of a shape that is held at the end of its
-        range has its best value outside.
+        range has its best value outside. What it costs to be in its range, (distance / std)², may be
+        a share of what the effect explains, for no law is exact.
+
+        Args:
+            explained: cost that the effect saves.
         """
         slopes, names = self._slopes(state.model)
         factor, first = self._factor(state.info, state.effects), self.base.width
         std = np.sqrt(factor.inverse_diagonal[first:]) / _unit(slopes.norms)
         gradient = np.r_[self._slope(state), state.effects.moments(state.residual)]
         step = factor.solve(gradient)[first:] / _unit(slopes.norms)
+        deviations = np.sqrt(max(config.deviations**2, config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within = last.possible
         for (of_effect, which, name), by, reach in zip(
-            names, step, config.deviations * std, strict=True
+            names, step, deviations * std, strict=True
         ):
             if not of_effect or which != place:
                 continue
@@ -205,9 +211,9 @@ class Later:
                 if abs(by) > reach and last.effect.at_end(name, float(by)):
                     return False
                 continue
-            if abs(last.amplitudes[int(name)]) + abs(reach) < last.effect.slight:
+            if abs(last.amplitudes[int(name)]) + reach < last.effect.slight:
                 return False
-            for way in (-reach, reach):
+            for way in np.linspace(-reach, reach, _TRIED):
                 amplitudes = np.array(last.amplitudes)
                 amplitudes[int(name)] += way
                 within |= last.effect.possible(last.effect.values(amplitudes))
@@ -347,17 +353,27 @@ class Later:
         return base, gram
 
     def _information(
-        self, info: Array, effects: Table, base: Table | None = None, gram: Array | None = None
+        self,
+        info: Array,
+        effects: Table,
+        base: Table | None = None,
+        gram: Array | None = None,
+        damping: float = _RIDGE,
     ) -> Array:
         across = (self.base if base is None else base).gram(effects)
-        own = effects.gram(effects) + _RIDGE * np.eye(effects.width)
+        own = effects.gram(effects) + damping * np.eye(effects.width)
         return np.block([[info + (self.gram if gram is None else gram), across], [across.T, own]])
 
     def _factor(
-        self, info: Array, effects: Table, base: Table | None = None, gram: Array | None = None
+        self,
+        info: Array,
+        effects: Table,
+        base: Table | None = None,
+        gram: Array | None = None,
+        damping: float = _RIDGE,
     ) -> Arrow:
         wider = self.prior.structure.wider(effects.width)
-        return Arrow.of(self._information(info, effects, base, gram), wider)
+        return Arrow.of(self._information(info, effects, base, gram, damping), wider)
 
     @property
     def _none(self) -> tuple[Table, list[tuple[int, int, str]]]:

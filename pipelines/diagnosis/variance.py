@@ -20,8 +20,10 @@ from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
+from pipelines.diagnosis.events import best_window
 from pipelines.diagnosis.screening import best_of, screen
 from pipelines.diagnosis.table import Array, Indices, Table
+from pipelines.model.arm import Arm
 
 __all__ = ["Components", "components", "settle"]
 
@@ -105,7 +107,8 @@ def settle(
     """Return the rows of each session whitened, in units of its own noise, and their columns.
 
     Sessions that are compared use the same columns, the first shapes: what is left of them is alike.
-    Rows alone use the best shape of each cause, or a fault of another shape would be noise.
+    Rows alone use the best shape of each cause, and the best window of each log, or a fault of another
+    shape would be noise.
 
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
@@ -121,6 +124,7 @@ def settle(
             numbers = _imitated(white, columns, groups, config)
             both = Table.stacked([rows.nominal, table])
             left = [y - t for y, t in zip(rows.y, both.times(numbers), strict=True)]
+            left = _less_events(rows, dictionary, dataset.arm, left) if alone else left
             white, through = rows.whitened(left, config.noise_bins)
             columns = through(table)
         return white, columns
@@ -145,6 +149,20 @@ def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tupl
     squares = [own.gram(own) for own in (candidates.take(g.columns) for g in groups)]
     best = best_of(screen(groups, known, cross, squares, moments))
     return tuple(one.group for one in best.values())
+
+
+def _less_events(
+    rows: Rows, dictionary: Dictionary, arm: Arm, left: Sequence[Array]
+) -> list[Array]:
+    """Return a residual (rows of each joint) less the push that explains most of each log."""
+    out = [r.copy() for r in left]
+    for log in range(len(rows.data.logs)):
+        window = best_window(rows, dictionary, arm, left, log)
+        if window is None:
+            continue
+        for own, push in zip(out, window.push, strict=True):
+            own[window.rows] -= push
+    return out
 
 
 def _imitated(
