@@ -202,9 +202,7 @@ class Later:
         deviations = np.sqrt(max(config.deviations**2, config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within = last.possible
-        for (of_effect, which, name), by, reach in zip(
-            names, step, deviations * std, strict=True
-        ):
+        for (of_effect, which, name), by, reach in zip(names, step, deviations * std, strict=True):
             if not of_effect or which != place:
                 continue
             if not name.isdigit():

@@ -295,7 +295,9 @@ def _candidate(
     except np.linalg.LinAlgError:
         return None
     fitted = min(fits, key=lambda one: one.cost)
-    possible = later.possible(fitted, state.cost - fitted.cost, config) and bool(np.isfinite(fitted.losses).all())
+    possible = later.possible(fitted, state.cost - fitted.cost, config) and bool(
+        np.isfinite(fitted.losses).all()
+    )
     return Candidate(key, gain, fitted, possible)
 
 
