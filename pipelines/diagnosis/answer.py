@@ -58,6 +58,7 @@ _UNNAMED = {
     r"spline of dq:(\d+)": r"a curve over the speed of joint \1",
     r"spline of tau:(\d+)": r"a curve over the torque of joint \1",
     r"friction form:(\d+)": r"another law of friction at joint \1",
+    r"drift of friction:(\d+)": r"friction of joint \1 that drifts",
 }
 _ACCEPTED = "accepted"
 _ALIKE = "these logs do not tell it from the cause that is named"

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 
-from pipelines.diagnosis.arrow import Arrow
+from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
@@ -24,6 +24,8 @@ from pipelines.diagnosis.table import Array, Parts, Table
 __all__ = ["Baseline", "baseline"]
 
 _SPLITS = 6  # of the reference into two
+_HALF = 0.5  # numerics: of a fault's power, what a family explains that is like its own
+_RIDGE = 1e-9  # numerics: of unit nominal columns, which may be dependent
 
 
 @dataclass(frozen=True)
@@ -48,22 +50,63 @@ def baseline(
     parts = _Parts.of(dataset, dictionary, prior)
     families = len({group.key for group in dictionary.groups})
     excess: dict[str, list[float]] = {}
+    largest: dict[str, Screened] = {}
     fits: list[float] = []
     for before, after in _splits(len(prior.parts)):
         found, fit, rows = parts.compared(before, list(after))
         fits.append(fit)
         for one in best_of(found).values():
+            family = one.group.family
+            if family not in largest or one.gain > largest[family].gain:
+                largest[family] = one
             bound = chi2_bound(config.alpha / families, one.freedom)
-            excess.setdefault(one.group.family, []).append((one.gain - bound) / rows)
+            excess.setdefault(family, []).append((one.gain - bound) / rows)
     bias = {
         family: max(0.0, upper_point(values, config.alpha)) for family, values in excess.items()
     }
-    if dataset.reference is None:  # a fault is part of what its own family leaves
-        second = sorted(bias.values())[-2]
-        bias = {family: min(value, second) for family, value in bias.items()}
+    if dataset.reference is None:
+        bias = _unlike(bias, largest, parts, dictionary.known)
     return Baseline(
         config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits))
     )
+
+
+def _unlike(
+    bias: dict[str, float], best: dict[str, Screened], parts: _Parts, candidates: Table
+) -> dict[str, float]:
+    """Return each family's bias, at most the largest of those that are not like it.
+
+    Without reference logs a fault is part of what its own family leaves, and of what those leave
+    that imitate more than half of it beside the nominal columns.
+
+    Args:
+        best: of each family, what explains most of a part.
+    """
+    columns = np.concatenate([one.group.columns for one in best.values()])
+    n, table = parts.prior.n_nominal, candidates.take(columns)
+    nominal = Arrow.of(
+        np.sum(parts.prior.grams, axis=0)[:n, :n] + _RIDGE * np.eye(n),
+        Structure.all_shared(n, len(parts.prior.structure.own)),
+    )
+    half = nominal.half(parts.cross.sum(axis=0)[:n, columns])
+    gram = table.gram(table) - half.T @ half
+    ends = np.cumsum([one.group.width for one in best.values()])
+    place = {f: slice(e - o.group.width, e) for (f, o), e in zip(best.items(), ends, strict=True)}
+
+    def imitated(family: str, other: str) -> float:
+        own, its = place[family], place[other]
+        power = float(best[family].amplitudes @ gram[own, own] @ best[family].amplitudes)
+        if power <= 0.0:  # nominal columns imitate all of it
+            return 1.0
+        across = gram[its, own] @ best[family].amplitudes
+        return float(across @ np.linalg.pinv(gram[its, its], 1e-6, True) @ across / power)
+
+    return {
+        family: min(
+            value, max((bias[o] for o in best if imitated(family, o) < _HALF), default=value)
+        )
+        for family, value in bias.items()
+    }
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,8 +5,9 @@
     dictionary.table(rows)                 the columns over some rows
 
 A group is what is screened at once: one shape of one cause at one joint. Groups without a name are
-splines of the position, speed and torque of a joint, ripple of its drive, of any order, and the form
-of its friction law: where one of these predicts better than every cause, the cause is not known.
+splines of the position, speed and torque of a joint, ripple of its drive, of any order, the form of
+its friction law, and dry and viscous friction that drift: where one of these predicts better than
+every cause, the cause is not known.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
@@ -192,15 +194,34 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
 
         return make
 
-    def form(j: int) -> Make:
+    def widths_of(j: int) -> Array:
         top = max(float(np.abs(motion.dq[:, j]).max()) for motion in motions)
         own = [law for law in dataset.model.columns.laws if law.joint == j + 1]
         sharp = next((law.sharpness for law in own if hasattr(law, "sharpness")), 1.0 / top)
-        widths = np.geomspace(0.5 / sharp, top, config.form_widths)
+        return np.asarray(np.geomspace(0.5 / sharp, top, config.form_widths))
+
+    def form(j: int) -> Make:
+        widths = widths_of(j)
         return lambda motion: np.asarray(np.tanh(motion.dq[:, j, None] / widths))
+
+    clocks = [one.motion.t for one in dataset.later.data.logs]
+    start, span = dataset.session_start, max(float(np.ptp(np.concatenate(clocks))), 1e-9)
+    if start is None:
+        span = max(float(np.ptp(t)) for t in clocks)
+
+    def drift(j: int) -> Make:
+        def make(motion: Motion) -> Array:
+            since = (motion.t - (motion.t[0] if start is None else start)) / span
+            course = legvander(2.0 * since - 1.0, config.drift_order)[:, 1:]
+            dq = motion.dq[:, j]
+            sharp = widths_of(j)[0]
+            return np.concatenate([course * np.tanh(dq / sharp)[:, None], course * dq[:, None]], 1)
+
+        return make
 
     for j in range(dataset.later.n_joints):
         found[FORM, j + 1] = form(j)
+        found["drift of friction", j + 1] = drift(j)
         for kind in ("q", "dq", "tau"):
             found[f"spline of {kind}", j + 1] = spline(kind, j)
         for order in range(1, config.ripple_orders + 1):

@@ -28,6 +28,7 @@ class DiagnosisConfig:
     causes: int = 4  # most causes in one session
     ripple_orders: int = 24  # [1/rev] of torque-proportional ripple in the standing dictionary
     form_widths: int = 7  # sigmoids that make the form of a friction law
+    drift_order: int = 3  # of the polynomial of time by which friction without a name drifts
     noise_bins: int = 8  # of speed, in each of which the noise of a joint has its own level
     knots: int = 10  # of the splines without a name
     event_candidates: int = 600  # windows that a search for a contact compares

@@ -49,8 +49,8 @@ def decide(
         return Decision("unknown", "several causes explain it", causes, explained)
     if causes:
         return Decision("cause", "", causes, explained)
-    missing = _missing(later, selection.end, config)
-    if selection.stopped and (missing.any() or not fits):
+    missing, followed = _missing(later, selection.end, config), _followed(later, selection, config)
+    if selection.stopped and (missing.any() or followed or not fits):
         return Decision("unknown", selection.stopped, (), explained)
     more = f"; it follows {selection.follows}" if selection.follows else ""
     if missing.any():
@@ -59,6 +59,8 @@ def decide(
             f"with the motion, and no cause explains it{more}"
         )
         return Decision("unknown", reason, (), explained)
+    if followed:
+        return Decision("unknown", followed, (), explained)
     if not fits:
         reason = (
             f"the mean square residual is {left.max():.2f} of the noise at joint "
@@ -87,3 +89,21 @@ def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
     torque = np.array([float(np.mean(y**2)) for y in rows.y])
     share = np.sqrt(np.maximum(common - differing, 0.0) / torque)
     return np.where((common > bound * differing) & (share > config.misfit), share, 0.0)
+
+
+def _followed(later: Later, selection: Selection, config: DiagnosisConfig) -> str:
+    """Return which shape without a name a relevant part of a joint's torque follows; "" if none.
+
+    Without reference logs; with them it may have been there before.
+    """
+    if later.dataset.reference is not None or not selection.rounds:
+        return ""
+    power = [float(y @ y) for y in later.rows.y]
+    for one in sorted(selection.rounds[-1].significant, key=lambda s: -s.gain):
+        name, joint = one.group.key
+        if one.group.kind != "unnamed" or joint is None:
+            continue
+        share = np.sqrt(one.gain / power[joint - 1])
+        if share > config.misfit:
+            return f"{share:.1%} of the torque of joint {joint} follows {name}:{joint}"
+    return ""
