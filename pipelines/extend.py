@@ -61,10 +61,10 @@ class Settings:
     reference: tuple[str, ...] = ()  # of the arm as it was before
     model: str | None = None  # a model file: its friction laws and its effects are fitted anew
     blocks: int = BLOCKS  # held out in turn where no log is
-    filter: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
+    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
     decimate: int | None = None  # every so-manieth sample; None: from the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
-    allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
+    skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
 
 
 @dataclass(frozen=True)
@@ -120,11 +120,11 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was not done", where=inputs.label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     before = inputs.material if isinstance(inputs.material, Diagnosed) else None
-    said = examined(chosen.every, settings.allow_mismatch)[0] if before is None else before.data_quality
+    said = examined(chosen.every, settings.skip_sanity_checks)[0] if before is None else before.data_quality
     found = before.extension if before is not None and not settings.causes else None
     if found is None:
         usual = DiagnosisConfig()
-        config = replace(usual, cutoff_hz=settings.filter or usual.cutoff_hz)
+        config = replace(usual, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
         rows = DiagnosisSettings(config.cutoff_hz, settings.decimate, settings.min_speed)
         prepared = with_terms_told_apart(prepare(chosen, rows, given.arm), settings.blocks)
         given.tell(f"fitting {', '.join(dict.fromkeys(one.place for one in wanted))}")

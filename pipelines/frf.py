@@ -44,8 +44,8 @@ from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
-_RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans "
-           "one, at home or where --home says")
+_RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --experiment frf "
+           "plans one, at home or where --home says")
 _UNFOLDED = "log all signals by one clock at the controller's own rate; or thin them out behind the same low-pass"
 
 
@@ -86,7 +86,7 @@ class Result:
     classification: tuple[Classified, ...]
     undecided: tuple[Undecided, ...]
     drawn: tuple[int, ...]
-    doctor: tuple[Check, ...]
+    data_quality: tuple[Check, ...]
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -198,9 +198,10 @@ def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Che
 
 def report(result: Result) -> Report:
     """The verdict, Fig. 17's Bode plots with coherence, modes, rigid body, grouping."""
-    return frf_report(result.responses, result.postures, result.classification, result.undecided, result.doctor, result.drawn)
+    return frf_report(result.responses, result.postures, result.classification, result.undecided, result.data_quality, result.drawn)
 
 
 STAGE = Stage("frf", "Measure frequency responses and what gives way", Settings, compute, report, read, None,
-              lambda result, check: int(check and any(found.gate for found in result.doctor)), lambda result: result.doctor,
+              lambda result, check: int(check and any(found.gate for found in result.data_quality)),
+              lambda result: result.data_quality,
               uses=Uses(lambda log, settings: log.experiment == "frf", before=True), sessions="one")

@@ -41,11 +41,11 @@ _TRUST = "--trust-units"
 
 @dataclass(frozen=True)
 class Settings:
-    """`trust_units`: units are what the log says, however large the numbers (S05, S07). `allow_same`: one recording may have two
+    """`trust_units`: units are what the log says, however large the numbers (S05, S07). `allow_overlap`: one recording may have two
     roles (D14)."""
 
     trust_units: bool = False
-    allow_same: bool = False
+    allow_overlap: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         logs.append(summary_of(opened, subject, (*opened.checks, *mine)))
         if len(previews) < _PREVIEWS and subject.sampled:
             previews.append(log_preview(subject))
-    found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
+    found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_overlap and check.code == "RRID-D14")]
     boundary, of_torque = _torque(inputs, subjects, logs)
     found = [*of_torque, *without_followers(found, of_torque)]
     if len({log.robot for log in logs}) == 1:

@@ -32,7 +32,7 @@ from pipelines.batch.work import undone
 from pipelines.errors import Check, EnvironmentFault, NothingMatched, UsageError
 from pipelines.log.model_file import ModelFile, read_model
 from pipelines.log.places import keep_apart, slug, tilde
-from pipelines.log.results import encode
+from pipelines.log.results import encode, headed
 from pipelines.stage import Outcome
 
 __all__ = ["Wanted", "run_batch"]
@@ -99,7 +99,7 @@ def _written(folder: BatchFolder, summary: Summary, done: _Done, started: float)
     """Write the summary. Where the disk was full before, it may be full still: the first fault is told then."""
     wanted, named = done.wanted, None if summary.baseline is None else summary.baseline.name
     result = result_of(summary.stage, summary.records, summary.drifts, named, summary.checks)
-    json_ = tilde({"command": "batch", **encode(result)[0]})
+    json_ = tilde(headed("batch", encode(result)[0]))
     report = tilde(summary_report(summary, figures=not (wanted.no_report or summary.interrupted or done.fault)))
     try:
         folder.finish(summary, json_, None if wanted.no_report else report, wanted.check, _about(done, started))

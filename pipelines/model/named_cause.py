@@ -19,7 +19,7 @@ from pipelines.model.effects.base import Effect, Quantity
 __all__ = ["acting_cause", "refuse_unknown", "wanted_cause"]
 
 
-_LISTED_BY = {"--with": "extend", "--without": "diagnose", "--tell-apart": "design-excitation"}  # whose option it is
+_LISTED_BY = {"--with": "extend", "--exclude": "diagnose", "--discriminate": "design-excitation"}  # whose option it is
 
 
 def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault", command: str = "simulate") -> Acting:

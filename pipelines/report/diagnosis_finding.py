@@ -70,7 +70,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.alternatives)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
         pair = " ".join(cause_at(some.cause, some.joint) for some in (one, one.alternatives[0]))
-        text.append(f"Or let \"rrrid design-excitation LOG --tell-apart {pair}\" design the motion")
+        text.append(f"Or let \"rrrid design-excitation LOG --discriminate {pair}\" design the motion")
     return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
                    figures=(*answer_figures(number, one), *proof_figures(number, one, units)))
 

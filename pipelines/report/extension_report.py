@@ -77,7 +77,7 @@ def _basis(result: Extension, units: Units) -> Section:
     if result.baseline_effects:
         text.append(f"The reference logs show as well, and the model has: {', '.join(map(without_keys, result.baseline_effects))}.")
     if result.model is not None:
-        text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --like LOG\" "
+        text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --replay LOG\" "
                     "simulates it.")
     tables = (gain_table(result.gain, "Gain of all accepted causes together, on held-out time, root mean square.",
                          units),) \

@@ -28,7 +28,7 @@ __all__ = ["frf", "simulate", "validate_writing"]
 def simulate(
     common: Common,
     model: Annotated[str, typer.Argument(help="The model.json of estimate-bps, or the shipped 'rrr'.", show_default=False)],
-    like: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to imitate, or a folder. Repeatable.")] = None,
+    replay: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to replay, or a folder. Repeatable.")] = None,
     fault: Annotated[list[str] | None, typer.Option(
         help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes stand below; a "
              "wrong NAME is refused with a list of the right ones.")] = None,
@@ -43,7 +43,7 @@ def simulate(
     """Simulate a model as a log's experiment would have it, optionally with a fault."""
     from pipelines.simulate import STAGE
 
-    go(STAGE, tuple(like or ()), common, {
+    go(STAGE, tuple(replay or ()), common, {
         "model": model, "fault": tuple(fault or ()) or None, "replicas": replicas, "seed": seed,
         "noise": numbers(noise, "--noise"), "windowed": windowed, "window": window, "steps": steps})
 

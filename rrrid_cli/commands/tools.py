@@ -82,9 +82,9 @@ def doctor(
             print(f"  {_SIGNS[one.level]} {one.name}: {one.found}{remedy}", flush=True)
     bad = [one for one in found if one.level == "bad"]
     if json:
-        from pipelines.log.results import encode, json_text
+        from pipelines.log.results import encode, headed, json_text
 
-        sys.stdout.write(json_text({"command": "doctor", "works": not bad, "findings": encode(found)[0]}))
+        sys.stdout.write(json_text(headed("doctor", {"works": not bad, "findings": encode(found)[0]})))
     else:
         print("rrrid cannot work here: see x above." if bad else "rrrid can work here.")
     raise typer.Exit(EnvironmentFault.exit_code if bad else 0)

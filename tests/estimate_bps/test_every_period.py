@@ -84,7 +84,7 @@ def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float]
     none = estimated(replace(log, period=None))
     for period, average in product(periods, averages):
         found = estimated(replace(log, period=period), average=average)
-        said = [check for check in found.doctor if check.message.startswith("its periods are not averaged")]
+        said = [check for check in found.data_quality if check.message.startswith("its periods are not averaged")]
         assert [check.code for check in said] == ["RRID-T10"] * average
         np.testing.assert_allclose(std_of(found), std_of(none), rtol=1e-9)
 
@@ -95,7 +95,7 @@ def test_a_touch_that_is_kept_is_named() -> None:
         tau[24_000:24_500, 2] += 0.3
 
     found = estimated(periodic(0, 5, spoil=touched), average=False)
-    assert [check.message for check in found.doctor if check.code == "RRID-T10"] == [
+    assert [check.message for check in found.data_quality if check.code == "RRID-T10"] == [
         "period 3 differs from the 4 others and is kept, for its periods are not averaged"]
     assert "period 3 differs and is kept" in str(bps_report(found).sections)
     assert max(found.equations) > 4.5 * max(of_periods(0, 1).equations)

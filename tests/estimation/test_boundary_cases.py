@@ -100,7 +100,7 @@ def test_a_field_case_is_named_and_refused_with_its_repair(
             # type: ignore[arg-type]
             run_stage(stage, Request((logs,), tmp_path / stage.name, no_report=True), settings)
         assert refused.value.code == code
-        assert "--allow-mismatch" in refused.value.remedy
+        assert "--skip-sanity-checks" in refused.value.remedy
 
 
 def test_the_remedy_for_a_wall_mounted_arm_is_the_gravity_that_it_feels(

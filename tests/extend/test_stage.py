@@ -164,7 +164,7 @@ def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_sa
 
 @pytest.mark.parametrize(("settings", "words"), [
     ({"blocks": 0}, "--blocks"), ({"min_speed": (-1.0,)}, "--min-speed"), ({"min_speed": (0.1, 0.2)}, "2 values for 3 joints"),
-    ({"decimate": 0}, "--decimate"), ({"filter": -3.0}, "--filter"), ({"filter": 450.0}, "sampled at 1000 Hz")])
+    ({"decimate": 0}, "--decimate"), ({"cutoff_hz": -3.0}, "--cutoff-hz"), ({"cutoff_hz": 450.0}, "sampled at 1000 Hz")])
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """C02, by the option's name, before any log is examined."""

@@ -64,8 +64,8 @@ def test_the_fields_of_the_contract(outcome: Outcome[Result]) -> None:
     for number in (*joint["parameters"].values(), joint["inertia"], *joint["gravity"].values()):
         assert set(number) == {"value", "std", "unit"}
     assert set(joint["gravity"]) == {"sine", "cosine"}
-    assert set(joint["ladder"][0]) >= {"law", "identify_rms", "validate_rms", "chosen"}
-    assert [rung["law"] for rung in joint["ladder"] if rung["chosen"]] == ["three_sigmoid"]
+    assert set(joint["candidate_laws"][0]) >= {"law", "identify_rms", "validate_rms", "chosen"}
+    assert [rung["law"] for rung in joint["candidate_laws"] if rung["chosen"]] == ["three_sigmoid"]
     assert joint["judged_by"] == "logs"
     assert joint["parameters"]["w1"]["value"] > joint["parameters"]["w2"]["value"] > joint["parameters"]["w3"]["value"]
 
@@ -129,7 +129,7 @@ def test_three_methods(method: str) -> None:
 def test_a_given_law_may_join_several(good: ExperimentLog) -> None:
     (joint,) = computed(good, settings=Settings(law="stribeck+asymmetric_friction")).joints
     assert joint.law == "stribeck+asymmetric_friction"
-    assert [rung.law for rung in joint.ladder] == [joint.law]
+    assert [rung.law for rung in joint.candidate_laws] == [joint.law]
 
 
 def ramps(seed: int = 6) -> ExperimentLog:

@@ -133,7 +133,7 @@ def test_a_model_of_friction_alone_expects_nothing(samples: Path) -> None:
 
 def test_no_frf_log(samples: Path) -> None:
     """Nothing matched: exit 5, with what to record."""
-    with pytest.raises(NothingMatched, match="design-excitation --for frf"):
+    with pytest.raises(NothingMatched, match="design-excitation --experiment frf"):
         computed(open_log(samples / "rrr-closed-form/hold-1.h5").log)
 
 
@@ -224,4 +224,4 @@ def test_noise_alone_names_nothing() -> None:
     noise = 1e-6 * np.random.default_rng(5).standard_normal(log.q.shape)
     result = computed(replace(log, signals={**log.signals, "q": Signal(log["q_ref"] + noise, "rad", "position")}))
     assert [one.kind for one in result.classification] == []
-    assert any(check.gate for check in result.doctor)
+    assert any(check.gate for check in result.data_quality)

@@ -150,7 +150,7 @@ def test_each_refusal_is_told_once_and_nothing_that_follows_from_it() -> None:
     """The headline names the stages that one reason stopped, with one thing to do; the table of stages has the rest."""
     steps = (Step("inspect", 1, object(), Report("Log doctor", "All should be looked at.", "attention"), ()),
              Step("fit-friction", 0, object(), Report("Friction", "A law. " * 20, "bad"), ()),
-             *(refused(name, f"correct the map; if it is right, say --set {name}.allow_mismatch=true") for name in
+             *(refused(name, f"correct the map; if it is right, say --set {name}.skip_sanity_checks=true") for name in
                ("estimate-bps", "diagnose")),
              Step("frf", 5, None, Report("Responses", "Passed over: no frf log. Record one.", "neutral"),
                   (Check.of("C06", "warn", "no frf log", remedy="record one"),)))
