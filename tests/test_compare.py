@@ -132,7 +132,7 @@ def extended(folder: Path, seed: int, **effects: dict[str, tuple[float, float]])
     """A result of extend: the effects as findings, and again in its model; the torque error before and after."""
     held = model(**effects)
     findings = [{"cause": one["effect"], "joint": one["joint"], "parameters": one["parameters"]} for one in held["effects"]]
-    rms = {name: {"validate": [error * seed], "floor": [0.01]} for name, error in (("residual_rms", 0.3), ("after_rms", 0.1))}
+    rms = {name: {"validate": [error * seed], "noise_floor": [0.01]} for name, error in (("residual_rms", 0.3), ("after_rms", 0.1))}
     return written(folder, seed, command="extend", parameters=[], findings=findings, model=held, **rms)
 
 

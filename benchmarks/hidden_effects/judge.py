@@ -29,7 +29,7 @@ __all__ = ["Diagnose", "asked", "by_command", "by_compute", "engine_named", "jud
 
 Diagnose = Callable[[Path, tuple[str, ...]], Any]
 Task = tuple[Sealed, tuple[str, ...]]
-_KEPT = ("verdict", "findings", "baseline_effects", "rejected", "not_identifiable", "residual_rms", "reason", "floor_origin")
+_KEPT = ("verdict", "findings", "baseline_effects", "rejected", "not_identifiable", "residual_rms", "reason", "noise_floor_origin")
 
 
 def by_command(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:

@@ -47,12 +47,13 @@ WORDS: Final[dict[str, str]] = {
     "noise_floor": "[N m] residual of a healthy model, joint by joint",
     "question": "what was asked: what is wrong, or what has changed since the reference logs",
     "held_out": "what judged: logs of role validate, or blocks of time held out in turn, of all logs where those alone show it",
-    "Validation.held_out": "whether the logs were held out of the fit", "ledger": "every hypothesis that was tried, step by step",
-    "thresholds": "what each cause has to exceed", "evidence": "the picture of what is wrong, log by log, before any name",
+    "Validation.held_out": "whether the logs were held out of the fit",
+    "candidate_causes": "every candidate that was fitted, step by step",
+    "thresholds": "what each cause has to exceed", "evidence": "residual analysis of each log",
     "Classified.evidence": "what it is seen by, in words", "Undecided.evidence": "what is seen, in words",
-    "Diagnosis.findings": "accepted causes", "Extension.findings": "the causes that were named", "Diagnosis.floor_origin":
-    "where the floor comes from", "Diagnosis.after_rms":
-    "[N m] torque error of the extended model",
+    "Diagnosis.findings": "accepted causes", "Extension.findings": "the causes that were named",
+    "Diagnosis.noise_floor_origin": "where the noise floor comes from",
+    "Diagnosis.after_rms": "[N m] torque error of the extended model",
     "Extension.residual_rms": "[N m] torque error of the nominal model",
     "Extension.gain": "what it gains on held-out logs", "Finding.of_rated": "size of its torque", "Result.joints": "the joints",
     "alternatives": "other causes that explain nearly as much of the same",

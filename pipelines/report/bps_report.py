@@ -148,7 +148,7 @@ def _noise_section(result: Result) -> Section:
     text, rows = [], []
     for log in result.noise_floor:
         text.append(_periods_of(log))
-        rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.floor[j],
+        rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.noise_floor[j],
                   log.residual[j], log.ratio[j]) for j, name in enumerate(result.joints)]
     unit, position = _torque_unit(result), " or ".join(dict.fromkeys("m" if own == "N" else "rad" for own in result.torque_units))
     columns = ("log", "joint", f"position, one sample [{position}]", f"torque, one sample [{unit}]",

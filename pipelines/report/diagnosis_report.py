@@ -150,7 +150,7 @@ def _hundredths(x: float) -> float | None:
 def _unknown(result: Result) -> list[Section]:
     if result.verdict != "unknown":
         return []
-    near = sorted(_nearest(result.ledger).items(), key=lambda one: -one[1])[:5]
+    near = sorted(_nearest(result.candidate_causes).items(), key=lambda one: -one[1])[:5]
     names = ", ".join(f"{named(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
     tried = f" The nearest explanations, none of which is named: {names}." if near else ""
     return [Section("Why there is no name", (
@@ -161,7 +161,7 @@ def _unknown(result: Result) -> list[Section]:
 def _follows(result: Result) -> Iterator[str]:
     """Which signals the joint that is farthest above its floor goes with most."""
     for one in result.evidence[:1]:
-        joint = int(np.argmax(np.nan_to_num(one.above_floor))) + 1
+        joint = int(np.argmax(np.nan_to_num(one.above_noise_floor))) + 1
         curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:3]
         if curves:
             said = ", ".join(f"{c.against} ({format_number(100.0 * c.explained, 2)} % of its power)" for c in curves)
@@ -192,15 +192,15 @@ def _others(result: Result) -> list[Section]:
     sections = []
     if result.rejected:
         sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("causes", "why"), _folded(result.rejected)),)))
-    shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
-    shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
+    shown = [t for t in result.candidate_causes if t.accepted or math.isfinite(t.exact_gain)]
+    shown += [t for t in sorted(result.candidate_causes, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
         rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _reachable(t.threshold),
                       _hundredths(100.0 * t.exact_gain), _hundredths(t.identifiability),
                       _outcome(t, result))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
-        more = len(result.ledger) - len(rows)
+        more = len(result.candidate_causes) - len(rows)
         text = (f"{more} more, all weaker, stand in result.json.",) if more > 0 else ()
         sections.append(Section("Ledger of hypotheses", text, (Table(
             ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]",

@@ -96,8 +96,8 @@ def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> Non
 
 def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagnose.Result]) -> None:
     """Where nothing exceeded its threshold nothing was fitted, and first order tells: cogging, most of what joint 2 leaves."""
-    ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.ledger)
-    result = replace(rippled.result, verdict="unknown", reason="it is far above its floor", findings=(), ledger=ledger)
+    ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.candidate_causes)
+    result = replace(rippled.result, verdict="unknown", reason="it is far above its floor", findings=(), candidate_causes=ledger)
     section = next(one for one in diagnose.report(result).sections if one.title == "Why there is no name")
     assert "The nearest explanations, none of which is named: cogging at joint 2 (" in section.text[0]
     assert section.text[0].count("cogging at joint 2 (") == 1
@@ -118,7 +118,7 @@ def test_an_arm_in_order_has_nothing_wrong(tmp_path: Path) -> None:
     outcome = asked(written(tmp_path / "logs", session()), tmp_path / "out")
     assert (outcome.result.verdict, outcome.result.findings, outcome.exit_code) == ("no-fault-found", (), 0)
     assert {one.cause for one in outcome.result.detection_limits} >= {"cogging", "torque_offset"}
-    assert outcome.result.floor_origin == "blocks"
+    assert outcome.result.noise_floor_origin == "blocks"
 
 
 def test_what_the_user_excludes_is_not_named(tmp_path: Path) -> None:

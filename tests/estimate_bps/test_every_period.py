@@ -70,7 +70,7 @@ def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     mean, every = map(only, both)
     assert (mean.averaged, every.averaged) == (True, False)
     assert every.residual[0] == pytest.approx(0.1, rel=0.3)
-    np.testing.assert_allclose(every.floor, mean.floor, rtol=0.02)
+    np.testing.assert_allclose(every.noise_floor, mean.noise_floor, rtol=0.02)
     np.testing.assert_allclose(every.ratio, mean.ratio, rtol=0.02)
     said = [bps_report(found).verdict.partition("the residual of the fitted logs is ")[2].partition(" times")[0] for found in both]
     assert said[0] == said[1] != ""

@@ -54,7 +54,7 @@ def test_what_stays_above_the_floor_is_said(
 ) -> None:
     floor = np.array([0.05, 0.04])
     rms = ResidualRms(np.array(left), np.array(left), floor)
-    found: Any = SimpleNamespace(floor_origin=origin, after_rms=rms, residual_rms=rms)
+    found: Any = SimpleNamespace(noise_floor_origin=origin, after_rms=rms, residual_rms=rms)
     assert what_stays(found) == said
 
 

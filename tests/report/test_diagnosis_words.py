@@ -38,8 +38,8 @@ COMMAND = re.compile(r'"rrrid [^"]*"')
 
 NOTHING: Any = {field.name: () for field in fields(Result)} | {
     "boundary": None,
-    "verdict": "no-fault-found", "question": "what is wrong", "reason": "", "floor_origin": "reference logs", "held_out": "logs",
-    "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
+    "verdict": "no-fault-found", "question": "what is wrong", "reason": "", "noise_floor_origin": "reference logs",
+    "held_out": "logs", "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
     "after_rms": ResidualRms(*(np.ones(3),) * 3), "rated": (50.0,) * 3}
 
 
@@ -165,7 +165,7 @@ def test_a_threshold_that_nothing_can_exceed_is_no_figure() -> None:
     trials = tuple(Trial(1, "cogging", joint, 0.02, threshold, 0.95, float("nan"), False, "below its threshold")
                    for joint, threshold in ((1, 0.05), (2, 6.04)))
     bounds = tuple(Threshold("cogging", joint, threshold, "blocks") for joint, threshold in ((1, 0.05), (2, 6.04)))
-    page = diagnosis_report(Result(**(NOTHING | {"ledger": trials, "thresholds": bounds})))
+    page = diagnosis_report(Result(**(NOTHING | {"candidate_causes": trials, "thresholds": bounds})))
     tables = {section.title: section.tables[0] for section in page.sections if section.tables}
     for title, heading in (("Ledger of hypotheses", "threshold [%]"), ("What this rests on",
                                                                        "share of the squared residual to exceed [%]")):
