@@ -115,7 +115,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     """
     named, why = (given, "") if (given := settings.robot or request.robot) else robot_at_hand()
     if why:
-        request.tell(f"taking a robot that nobody named: {why}")
+        request.tell(f"no robot was named, taking: {why}")
     robot = load_robot(named)
     sources = [path for path in robot_sources(named) if path.is_file()]
     arm = _arm(settings.model, robot)
@@ -215,7 +215,7 @@ def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
     if not settings.discriminate:
         return None
     if len(settings.discriminate) != 2 or settings.experiment != "excitation":
-        raise UsageError("C02", "two causes are told apart, by an excitation", where="--discriminate",
+        raise UsageError("C02", "two causes are needed, and an excitation", where="--discriminate",
                          remedy="write --discriminate spring:2 cogging:2")
     if not settings.rest:
         raise UsageError("C02", "a motion that tells causes apart starts and ends at rest", where="--no-rest",

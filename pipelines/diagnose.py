@@ -48,7 +48,7 @@ class Settings:
     max_causes: int = DiagnosisConfig.causes  # findings
     blocks: int = BLOCKS  # held out in turn where no log is
     cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
-    decimate: int | None = None  # every so-manieth sample; None: from the filter
+    decimate: int | None = None  # every Nth sample; None: from the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
     skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion is diagnosed
 
@@ -87,7 +87,7 @@ def beside(settings: Settings, request: Request) -> Beside:
     if settings.model is None:
         return Beside(Material(None, request.tell), (), ())
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     return Beside(Material(Arm.from_model(read_model(settings.model), path), request.tell), sources, ())
 
 

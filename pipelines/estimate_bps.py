@@ -64,7 +64,7 @@ class Settings:
     bandwidth: tuple[float, ...] | None = None  # [Hz]
     average: bool = True  # periods of periodic logs, where they differ by noise alone
     cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: five times the motion's highest frequency
-    decimate: int | None = None  # every so-manieth sample; None: four a period of the filter
+    decimate: int | None = None  # every Nth sample; None: four a period of the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
     symmetric: bool = False  # p4 = p15 = 0
     weighted: bool = True  # joints by their own residual; False: all alike
@@ -88,7 +88,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is None:
         return inputs
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
 
 

@@ -62,7 +62,7 @@ class Settings:
     model: str | None = None  # a model file: its friction laws and its effects are fitted anew
     blocks: int = BLOCKS  # held out in turn where no log is
     cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
-    decimate: int | None = None  # every so-manieth sample; None: from the filter
+    decimate: int | None = None  # every Nth sample; None: from the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
     skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
 
@@ -91,7 +91,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is None:
         return replace(inputs, material=Material(None, request.tell))
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     arm = Arm.from_model(read_model(settings.model), path)
     return replace(inputs, sources=(*inputs.sources, *sources), material=Material(arm, request.tell))
 
@@ -182,7 +182,7 @@ def _found_instead(diagnosed: Diagnosed) -> str:
 
 
 def _once(kind: type[Effect]) -> bool:
-    """Whether it happens at a moment of one log."""
+    """Return whether it happens at a moment of one log."""
     return any(q.shape and q.name in kind.per_log for q in kind.parameters)
 
 

@@ -1,4 +1,4 @@
-"""Measure frequency responses, and say what gives way beside the rigid body.
+"""Measure frequency responses and classify compliance beside the rigid body.
 
 Reads    logs with experiment "frf": a joint turning slowly under an injected excitation v, with r (computed torque) or PD
 Writes   result.json, result.h5 (every response), report.html
@@ -95,7 +95,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is None:
         return inputs
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
 
 
@@ -201,7 +201,7 @@ def report(result: Result) -> Report:
     return frf_report(result.responses, result.postures, result.classification, result.undecided, result.data_quality, result.drawn)
 
 
-STAGE = Stage("frf", "Measure frequency responses and what gives way", Settings, compute, report, read, None,
+STAGE = Stage("frf", "Measure frequency responses and classify compliance", Settings, compute, report, read, None,
               lambda result, check: int(check and any(found.gate for found in result.data_quality)),
               lambda result: result.data_quality,
               uses=Uses(lambda log, settings: log.experiment == "frf", before=True), sessions="one")

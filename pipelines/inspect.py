@@ -193,7 +193,7 @@ def _verdict(result: Result, found: list[Check]) -> str:
     mended = sum(log.verdict == "repair" for log in result.logs)
     warned = sum(log.verdict == "warn" for log in result.logs)
     counted = [(count, words) for count, words in
-               ((bad, "cannot be used"), (mended, "can be used after mending"), (warned, "should be looked at")) if count]
+               ((bad, "cannot be used"), (mended, "can be used after repair"), (warned, "should be looked at")) if count]
     if total == 1:
         said = f"The log {counted[0][1] if counted else 'is not bad in itself'}"
     else:
@@ -218,8 +218,8 @@ def _key_figures(result: Result) -> Table:
 
 def _found_section(found: list[Check]) -> Section:
     more = len(found) - _FINDINGS_SHOWN
-    text = (f"{more} more stand in result.json.",) if more > 0 else ()
-    return Section("What was found", text, (checks_table(found[:_FINDINGS_SHOWN], as_given=True),))
+    text = (f"{more} more are in result.json.",) if more > 0 else ()
+    return Section("Findings", text, (checks_table(found[:_FINDINGS_SHOWN], as_given=True),))
 
 
 def _passed_section(result: Result) -> Section:

@@ -76,7 +76,7 @@ def read(request: Request, settings: Settings) -> Inputs:
         raise UsageError("C02", "no log to imitate", where="simulate", remedy="name one: --replay LOG")
     inputs = read_logs(request, settings)
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     arm = Arm.from_model(read_model(settings.model), path)
     if not arm.p.any() and not arm.effects:
         raise UsageError("C02", f"the model {path.name} holds friction alone, no inertia", where="simulate",

@@ -129,7 +129,7 @@ def _left_in(paths: Sequence[Path]) -> str | None:
 
 
 def _of(model: ModelFile, inputs: Inputs) -> bool:
-    """Whether a model was fitted to some of these logs."""
+    """Return whether a model was fitted to some of these logs."""
     ours = {digest_of(recording(opened.log)) for opened in inputs.logs}
     return any(source.sha256 in ours for source in model.sources)
 
@@ -198,7 +198,7 @@ def _drawn_from(arm: Arm) -> str:
 
 
 def _friction_held(arm: Arm) -> bool:
-    """Whether the fit took friction as known: its covariance then has no number of it."""
+    """Return whether the fit took friction as known: its covariance then has no number of it."""
     numbers = {f"{law.place}:{p.name}" for law in arm.friction for p in law.parameters}
     return bool(numbers) and arm.uncertainty is not None and numbers.isdisjoint(arm.uncertainty.names)
 

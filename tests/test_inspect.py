@@ -126,7 +126,7 @@ def test_every_fault_has_a_report() -> None:
         result = inspect.compute(Inputs((opened,)), inspect.Settings())
         report = inspect.report(result)
         assert report.verdict.startswith("The log "), fault.row
-        assert "What was found" in [section.title for section in report.sections[:2]]  # behind what the torque is
+        assert "Findings" in [section.title for section in report.sections[:2]]  # behind what the torque is
 
 
 def test_another_robot_must_have_as_many_joints(tmp_path: Path) -> None:

@@ -188,7 +188,7 @@ class _Done:
         return cluster(self.wanted.backend, self.plan, self.key, items, self.stopped)
 
     def _keep(self, item: Item) -> bool:
-        """Whether the item's earlier result still stands (P07), whole (P10)."""
+        """Return whether the item's earlier result still stands (P07), whole (P10)."""
         if self.listener.number:
             return True  # it will be told as missing
         record = self.folder.ledger.get(item)

@@ -104,7 +104,7 @@ class _Watch:
 
 
 def _there(process: int | None) -> bool:
-    """Whether the process still runs; one that has not said its number has not begun."""
+    """Return whether the process still runs; one that has not said its number has not begun."""
     try:
         if process is not None:
             os.kill(process, 0)

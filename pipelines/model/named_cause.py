@@ -66,7 +66,7 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
 
 
 def refuse_unknown(text: str, where: str, command: str = "extend") -> None:
-    """Whether `text` begins with the name of a cause.
+    """Return whether `text` begins with the name of a cause.
 
     Raises:
         UsageError: C01, it does not; with the nearest names, and where all of them stand.

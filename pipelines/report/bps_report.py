@@ -211,7 +211,7 @@ def _rotor_words(result: Result) -> tuple[str, ...]:
     """Where the inertia of a rotor has gone that has no row of its own beside others that have one."""
     own = {int(p.name.split(":")[1]) for p in result.parameters if p.name.startswith("rotor_inertia:")}
     rest = [str(j) for j in range(1, len(result.joints) + 1) if own and j not in own]
-    return (f"The rotor inertia of joint {', '.join(rest)} cannot be told from that of the links: it is contained in their "
+    return (f"The rotor inertia of joint {', '.join(rest)} cannot be separated from that of the links: it is contained in their "
             "parameters, and not in the described values.",) if rest else ()
 
 
@@ -269,7 +269,7 @@ def _settling(result: Result) -> tuple[float, str]:
 
 
 def _settling_words(result: Result) -> tuple[str, ...]:
-    """Whether the second half of the samples moved the estimates more than noise does."""
+    """Return whether the second half of the samples moved the estimates more than noise does."""
     moved, most = _settling(result)
     if not moved > 0.0:
         return ()
@@ -279,7 +279,7 @@ def _settling_words(result: Result) -> tuple[str, ...]:
 
 
 def _winner(comparison: tuple[Compared, ...]) -> str:
-    """Whether another way explains measurably better what was held out, and by how much."""
+    """Return whether another way explains measurably better what was held out, and by how much."""
     ranked = sorted((c for c in comparison if c.value), key=lambda c: c.validate)
     if len(ranked) < 2:
         return "Only one way gives an estimate." if ranked else "No way gives an estimate."

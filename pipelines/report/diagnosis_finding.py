@@ -37,7 +37,7 @@ _TURNING = Units()
 _HIDDEN = 2.0  # times the share of the whole, from which the share at its own joint says something else
 
 
-def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool = True, floor: str = "the floor",
+def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool = True, floor: str = "the noise floor",
                     units: Units = _TURNING, beside: Sequence[Finding] = (), left: Array | None = None) -> Section:
     """What it is, what to check, what it is worth, and the figure that proves it.
 
@@ -50,8 +50,8 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     """
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
-            f"{_share(one, nominal, floor)}; the refitted model could hide "
-            f"{format_number(100.0 * (1.0 - one.identifiability), 2)} % of it.{tip_worth(one.gain)}"]
+            f"{_share(one, nominal, floor)}; {format_number(100.0 * (1.0 - one.identifiability), 2)} % of it is confounded with model "
+            f"parameters.{tip_worth(one.gain)}"]
     if of_any_size(one):
         text.append("How large its torque is these logs do not tell: rigid body and friction can take in any amount of it, and the "
                     "size given below is one of many: fed forward, it holds on motion like that of these logs alone")
@@ -126,8 +126,8 @@ def _happens_once(one: Finding) -> bool:
 
 
 def _share(one: Finding, nominal: ResidualRms, floor: str) -> str:
-    """Of what all joints leave above the floor; and of its own joint, where a larger one beside it hides the share."""
-    whole = f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above {floor}"
+    """Return its share of the residual above the floor of all joints; and of its own joint, where a larger one hides the share."""
+    whole = f"It accounts for {format_number(100.0 * one.explained, 3)} % of the residual above {floor}"
     own = _own_share(one, nominal)
     if len(nominal.identify) == 1 or not own > _HIDDEN * one.explained:
         return whole

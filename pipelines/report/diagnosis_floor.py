@@ -54,10 +54,10 @@ def floor_words(found: Diagnosis) -> str:
     """Return where the noise floor comes from."""
     if found.noise_floor_origin == "blocks":
         return (
-            "The noise floor is what the final model leaves of the identification logs; there are "
+            "The noise floor is the residual of the final model on the identification logs; there are "
             "no reference logs to compare with."
         )
-    return "The noise floor is what the healthy model leaves of the reference logs."
+    return "The noise floor is the residual of the healthy model on the reference logs."
 
 
 def judge_words(held_out: str) -> str:

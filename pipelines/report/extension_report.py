@@ -38,7 +38,7 @@ def extension_report(result: Extension) -> Report:
                                    (Table(("cause", "joint", "why"), rows),)))
     sections.append(_basis(result, units))
     if result.data_quality:
-        sections.append(Section("What the log doctor remarks", (), (checks_table(result.data_quality),)))
+        sections.append(Section("Data quality", (), (checks_table(result.data_quality),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
                   torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.noise_floor, _NOISE[0],
                                 f"{_now(result)}{_NOISE[1]}", units),

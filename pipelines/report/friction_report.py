@@ -30,7 +30,7 @@ def friction_report(result: Result) -> Report:
     """The verdict first; then every joint's law, figures and ladder."""
     sections = [_summary(result), *(section for joint in result.joints for section in _joint_sections(joint))]
     if result.checks:
-        sections.append(Section("What the logs say of themselves", (), (checks_table(result.checks),)))
+        sections.append(Section("Data quality", (), (checks_table(result.checks),)))
     return Report("Friction", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
 
 
@@ -276,4 +276,4 @@ def _ladder(joint: JointResult) -> Table:
         rows.append((_plain(rung.law), rung.size, 1e3 * rung.identify_rms, 1e3 * rung.validate_rms, verdict))
         tones.append("good" if rung.chosen else "neutral")
     return Table(("law", "numbers", "left, fitted [mN m]", "left, held out [mN m]", ""), tuple(rows),
-                 "Root mean square of what is left of mean torques over windows.", tuple(tones))
+                 "Root mean square of the residual of mean torques over windows.", tuple(tones))

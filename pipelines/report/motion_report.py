@@ -39,7 +39,7 @@ def motion_report(logs: Sequence[LogResult]) -> Report:
     tone: Tone = "attention" if far or doubtful else "good" if known else "neutral"
     sections = [_explanation(logs), *(_log_section(log, log.series, i) for i, log in enumerate(logs) if log.series is not None)]
     if more := [log.name for log in logs if log.series is None]:
-        sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
+        sections.append(Section("Further logs", (f"Their figures are in result.json alone: {', '.join(more[:40])}.",)))
     verdict = " ".join(f"{words[0].upper()}{words[1:]}." for words in said)
     return Report("Reconstructed motion", verdict, tone, _key_figures(logs), tuple(sections))
 

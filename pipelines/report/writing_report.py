@@ -214,7 +214,7 @@ def _simulation_section(result: Result) -> Section:
         return Section("The task simulated", (f"Left out: {result.simulation_left_out}.",))
     how = ("in closed loop: the controller, the references and the encoders of the log" if found.simulation == "closed-loop" else
            f"in windows of {format_number((found.window or 0.0) * 1e3, 3)} ms under the logged torque ({found.reason})")
-    text = (f"The model in the experiment of {found.name}, {how}. It is not told what the arm did.",)
+    text = (f"The model in the experiment of {found.name}, {how}. The log does not say what the arm did.",)
     rows = tuple((name, *(None if x is None else three_digits(x[j]) for x in (
         found.position_rms, found.position_max, found.speed_rms, found.torque_rms)))
                  for j, name in enumerate(result.joints))

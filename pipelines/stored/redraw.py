@@ -124,7 +124,7 @@ def _series(stored: StoredResult) -> dict[str, Any]:
 
 
 def _refers(value: Any) -> bool:
-    """Whether a JSON object names a series."""
+    """Return whether a JSON object names a series."""
     if isinstance(value, dict):
         return "$series" in value or any(map(_refers, value.values()))
     return isinstance(value, list) and any(map(_refers, value))

@@ -1,4 +1,4 @@
-"""What the simulation gets wrong, why, and the model that has it."""
+"""Diagnose what the simulation gets wrong, and extend the model."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def diagnose(
     skip_sanity_checks: Annotated[bool | None, typer.Option("--skip-sanity-checks",
                                                             help="Diagnose torque that fails its checks.")] = None,
 ) -> None:
-    """Say what the simulation gets wrong, why, what to check, and how much better the model becomes.
+    """Find what the simulation gets wrong, why, what to check, and how much better the model becomes.
 
     Takes some 30 s for three joints and two minutes of motion. Logs of role reference, recorded while the arm was
     healthy, turn the question into what has changed since.
@@ -47,9 +47,9 @@ def extend(
     common: Common, roles: Roles,
     logs: SomeLogs = None,
     with_: Annotated[list[str] | None, typer.Option("--with", help="CAUSE:JOINT, or CAUSE:JOINT:NAME=VALUE with a start for a "
-                                                    "non-linear number: cogging:2:order=18; all causes stand below. "
+                                                    "non-linear number: cogging:2:order=18; all causes are listed below. "
                                                     "What may act more than once at a joint, waves of several orders say, "
-                                                    "does so as held-out logs bear it out. Repeatable.")] = None,
+                                                    "does so as held-out logs confirm. Repeatable.")] = None,
     model: Annotated[str | None, typer.Option(help="model.json to extend: its effects are kept, and fitted anew.")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
     cutoff_hz: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,

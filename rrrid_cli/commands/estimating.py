@@ -1,4 +1,4 @@
-"""What a motion was, and the numbers of the nominal model: friction and base parameters."""
+"""Reconstruct motion; fit friction and base parameters."""
 
 from __future__ import annotations
 

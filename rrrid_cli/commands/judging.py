@@ -1,4 +1,4 @@
-"""Hold a model against logs: simulate it, validate it, measure what gives way."""
+"""Compare a model with logs: simulate, validate, measure compliance."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def simulate(
     model: Annotated[str, typer.Argument(help="The model.json of estimate-bps, or the shipped 'rrr'.", show_default=False)],
     replay: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to replay, or a folder. Repeatable.")] = None,
     fault: Annotated[list[str] | None, typer.Option(
-        help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes stand below; a "
+        help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes are listed below; a "
              "wrong NAME is refused with a list of the right ones.")] = None,
     replicas: Annotated[int | None, typer.Option(help="Simulations that differ in their noise; windows have one. [1]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first one's noise. [1]")] = None,
@@ -94,7 +94,7 @@ def frf(
     posture: Annotated[list[str] | None, typer.Option(help="Postures to draw, by their numbers: 1,3. "
                                                              "[nearest to the two of Kostić et al. 2004]")] = None,
 ) -> None:
-    """Measure frequency responses, and say what gives way: base, joint, delay, or nothing."""
+    """Measure frequency responses and classify compliance: base, joint, delay or none."""
     from pipelines.frf import STAGE
 
     go(STAGE, tuple(logs or ()), common, {

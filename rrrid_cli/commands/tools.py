@@ -38,7 +38,7 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a command has left.", show_default=False,
                                            readable=False)],
     out: Annotated[Path | None, typer.Option(
-        readable=False, help="Folder for the report; another command's result there is kept beside it. [DIR itself]")] = None,
+        readable=False, help="Folder for the report; an earlier result of another command is kept. [DIR itself]")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what was changed as well, and keep none.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,

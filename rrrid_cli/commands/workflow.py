@@ -21,7 +21,7 @@ __all__ = ["batch", "demo", "run"]
 def run(
     common: Common, roles: Roles, logs: SomeLogs = None,
     skip: Annotated[list[str] | None, typer.Option(help="Stage to leave out, such as diagnose. Repeatable.")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be computed, and why; compute nothing.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Report what would be computed, and why; compute nothing.")] = False,
     no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute everything, also what has not changed.")] = False,
 ) -> None:
     """Do the whole workflow on a folder of logs; one report. What has not changed is not computed again.
@@ -46,7 +46,7 @@ def run(
         from rrrid_cli.console import say_table
 
         say_table(("logs", "stage", "would be", "because"),
-                  [(one.logs, one.stage, "computed" if one.computed else "taken back", one.why) for one in planned])
+                  [(one.logs, one.stage, "computed" if one.computed else "cached", one.why) for one in planned])
 
 
 app.command(cls=BatchCommand)(batch)

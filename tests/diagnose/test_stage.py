@@ -99,7 +99,7 @@ def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagn
     ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.candidate_causes)
     result = replace(rippled.result, verdict="unknown", reason="it is far above its floor", findings=(), candidate_causes=ledger)
     section = next(one for one in diagnose.report(result).sections if one.title == "Why there is no name")
-    assert "The nearest explanations, none of which is named: cogging at joint 2 (" in section.text[0]
+    assert "The nearest explanations, not named: cogging at joint 2 (" in section.text[0]
     assert section.text[0].count("cogging at joint 2 (") == 1
     assert section.text[1].startswith("The residual of joint 2 goes most with position (")  # cogging follows the joint's angle
     assert section.text[0].count("% of the residual") == min(5, len({(one.cause, one.joint) for one in ledger if one.gain > 0.0}))

@@ -198,6 +198,7 @@ def test_a_ripple_that_is_there_for_half_a_log_is_none_of_the_machine() -> None:
     assert ("cogging", 1) not in causes(diagnosed(half, exclude=but("cogging"), cutoff_hz=40.0))
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(strict=True, reason="a delay of 0.07 ms is named where 1 % of 3 s is lost")
 def test_samples_lost_here_and_there_are_no_fault() -> None:
     fitted, judging = session()

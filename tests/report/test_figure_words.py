@@ -25,7 +25,7 @@ from pipelines.report.figure_words import figure_in_words
     ("fit-friction waist stribeck joint 1 varpro stribeck.speed", "fit-friction waist: Stribeck friction at joint 1, speed"),
     ("fit-friction waist three_sigmoid joint 1 varpro three sigmoid.f1",
      "fit-friction waist: friction of three sigmoids at joint 1, f1"),
-    ("payload mass", "A load at the tip, mass"),
+    ("payload mass", "Payload at the tip, mass"),
     ("diagnose cogging joint 2 torque rms", "diagnose: cogging at joint 2, torque rms"),
     ("estimate-bps p3", "estimate-bps p3"), ("torque rms validate joint 2", "torque rms validate joint 2"), ("", "")])
 def test_causes_are_told_in_words(name: str, words: str) -> None:

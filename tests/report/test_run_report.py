@@ -89,7 +89,7 @@ def test_every_gain_counts_from_a_line_above_it() -> None:
 def test_a_load_alone_is_told_beside_the_arm_without_it() -> None:
     """The model fitted to the loaded arm is no step towards the load: it does not stand in the ledger."""
     bare, load, extended = ledger_lines(told(LOAD, was=BARE))
-    assert bare.step.endswith("without a load at the tip")
+    assert bare.step.endswith("without payload at the tip")
     assert (bare.rms, load.before, extended.before) == (tuple(BARE),) * 3
 
 

@@ -243,7 +243,7 @@ def quarter_turns(q: Array) -> dict[int, int]:
 
 
 def held(tau: Array, q: Array) -> Guess:
-    """Whether a torque is a command that is held: then it stands still over samples in which the position moves."""
+    """Return whether a torque is a command that is held: then it stands still over samples in which the position moves."""
     moving = np.abs(np.diff(q, axis=0)) > 0
     both = np.diff(tau, axis=0)[moving[:, :tau.shape[1]]] if tau.shape == q.shape else np.diff(tau, axis=0).ravel()
     share = float(np.mean(both == 0)) if both.size else 0.0

@@ -241,7 +241,7 @@ def _accepted(one: Explained, config: GroupingConfig) -> bool:
 
 
 def _moves(inertia: Sequence[float], config: GroupingConfig) -> bool:
-    """Whether postures differ enough in inertia to tell by."""
+    """Return whether postures differ enough in inertia to tell by."""
     return max(inertia) > config.moves * min(inertia)
 
 
@@ -419,7 +419,7 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open],
 
 
 def _absorbed(base: Finding, spring: Finding, config: GroupingConfig) -> bool:
-    """Whether all that stands still for the base does so where the link behind the spring would swing."""
+    """Return whether all that stands still for the base does so where the link behind the spring would swing."""
     own = spring.frequency
     return own is not None and bool(base.stands) and \
         all(abs(one.value - own.value) < config.locked * own.value for one in base.stands)

@@ -177,7 +177,7 @@ class JointResult:
 
     @property
     def revolute(self) -> bool:
-        """Whether it turns; else it slides."""
+        """Return whether it turns; else it slides."""
         return self.inertia.unit == "kg m^2"
 
 
