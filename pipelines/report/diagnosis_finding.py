@@ -50,8 +50,8 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     """
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
-            f"{_share(one, nominal, floor)}; {format_number(100.0 * (1.0 - one.identifiability), 2)} % of it is confounded with model "
-            f"parameters.{tip_worth(one.gain)}"]
+            f"{_share(one, nominal, floor)}; {format_number(100.0 * (1.0 - one.identifiability), 2)} % of it is confounded with "
+            f"model parameters.{tip_worth(one.gain)}"]
     if of_any_size(one):
         text.append("How large its torque is these logs do not tell: rigid body and friction can take in any amount of it, and the "
                     "size given below is one of many: fed forward, it holds on motion like that of these logs alone")
