@@ -96,7 +96,8 @@ def test_one_recording_does_not_judge_itself(good: ExperimentLog, tmp_path: Path
     assert allowed.relative_error["validate"] == pytest.approx(allowed.relative_error["identify"])
 
 
-@pytest.mark.parametrize("row", [fault.row for fault in FAULTS])
+@pytest.mark.parametrize("row", [pytest.param(fault.row, marks=pytest.mark.slow if k % 3 else ())
+                                 for k, fault in enumerate(FAULTS)])
 def test_every_fault_ends_in_words(row: str, tmp_path: Path) -> None:
     """Whatever the doctor can meet: an estimate, a gate under --check, or a rejection; never a crash."""
     fault = next(fault for fault in FAULTS if fault.row == row)
@@ -116,7 +117,7 @@ def test_every_fault_ends_in_words(row: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("row", ["S13 tau", "S13 q", "S14", "S14 all", "S15 torque", "S15 encoder", "T06 drift"])
-@pytest.mark.parametrize("role", ["identify", "validate"])
+@pytest.mark.parametrize("role", ["identify", pytest.param("validate", marks=pytest.mark.slow)])
 def test_torque_of_another_motion_gives_no_parameters(role: str, row: str, tmp_path: Path) -> None:
     """Swapped joints, a flipped sign, a wrong scale, a clock apart: said before any number, in a log that judges as well."""
     fault = next(fault for fault in FAULTS if fault.row == row)

@@ -40,7 +40,7 @@ def spread(found: list[Result]) -> Array:
 
 
 @pytest.mark.parametrize(("spoil", "arms"), [
-    pytest.param(cogging, FEW, id="cogging"),
+    pytest.param(cogging, FEW, id="cogging", marks=pytest.mark.slow),
     pytest.param(cogging, REPLICAS, id="cogging, eight arms", marks=pytest.mark.slow),
     pytest.param(lambda seed: None, REPLICAS, id="noise alone, eight arms", marks=pytest.mark.slow)])
 def test_the_scatter_is_what_is_told(spoil: Callable[[int], Spoil | None], arms: int) -> None:

@@ -65,7 +65,7 @@ def test_five_periods_are_worth_the_root_of_five() -> None:
 
 
 @pytest.mark.parametrize("average", [True, False])
-@pytest.mark.parametrize("encoder", [3e-6, 3e-5])
+@pytest.mark.parametrize("encoder", [3e-6, pytest.param(3e-5, marks=pytest.mark.slow)])
 def test_the_floor_is_the_noise_that_was_put_in(encoder: float, average: bool) -> None:
     """Position and torque of one sample within 5 %; the model being right, the residual is what noise leaves, within 25 %."""
     beside = only(of_periods(0, 5, encoder, average))

@@ -48,6 +48,7 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
     assert "Now: fitted without what it is extended by." in outcome.report.key_figures.caption
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(strict=True, reason="accepted on logs of 3 s")
 def test_a_hump_that_is_not_there_is_refused_beside_a_ripple(
     rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path
@@ -57,6 +58,7 @@ def test_a_hump_that_is_not_there_is_refused_beside_a_ripple(
     assert [(one.cause, one.joint) for one in result.rejected] == [("stribeck", 2)]
 
 
+@pytest.mark.slow
 def test_an_order_of_which_only_a_harmonic_is_there_is_refused_with_what_was_fitted(
         rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path) -> None:
     """Asked for a third of the waves that there are, the third harmonic takes all: the first wave would be a made-up one."""
