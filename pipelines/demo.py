@@ -141,7 +141,7 @@ def _beyond(result: Result, found: Diagnosis) -> Iterator[tuple[str, NotIdentifi
 
 def _found(result: Result, found: Diagnosis | None) -> str:
     if found is None:
-        return "nobody has looked, for diagnose was not done"
+        return "unknown, for diagnose was not done"
     if found.verdict == "no-fault-found":
         return "nothing"
     if found.verdict == "cannot-judge":

@@ -155,7 +155,7 @@ def _complaints(found: Findings, settings: Settings) -> list[Check]:
     for one in found.unusable:
         if one.aliased:
             said.append(Check.of("T09", "warn", f"torque of joint {one.joint} was sampled, and v has power up to half the rate: "
-                                 "what is faster has folded back (aliasing), and no mode can be told", where=_logs_of(one),
+                                 "what is faster has folded back (aliasing), and no mode can be identified", where=_logs_of(one),
                                  gate=True, remedy=_UNFOLDED))
             continue
         said.append(Check.of("D13", "warn", f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: "
@@ -187,7 +187,7 @@ def _logs_of(measured: Measured) -> str:
 
 def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Check]:
     if speed == 0.0:
-        return [Check.of("D09", "warn", f"joint {joint} did not turn: friction sticks, and stands in the response like a spring",
+        return [Check.of("D09", "warn", f"joint {joint} did not turn: friction sticks, and looks like a spring in the response",
                          where=where, remedy="let it turn slowly while it is excited")]
     if swing > _CONFIG.swing * speed:
         return [Check.of("D09", "warn", f"the excitation swings the speed of joint {joint} by {swing:.2g} about {speed:.2g} rad/s: "

@@ -196,7 +196,7 @@ class _Done:
             return False
         if not intact(record, self.folder.items / item.slug):
             self.notices.append(Check.of("P10", "warn", "its stored result is not what was written; done again", where=record.name,
-                                         remedy="look after the disk, if nobody changed it"))
+                                         remedy="check the disk, if you have not changed it"))
             return False
         self.records[item.slug] = record
         return True

@@ -209,7 +209,7 @@ def _figures(drift: Drift, ranked: Sequence[Course], baseline: ModelFile | None)
     drawn = []
     before = {} if baseline is None else known_figures(baseline, [course.name for course in ranked])
     for name, courses, words in (("drift", ranked, "The figures that moved most, with one std; those beyond three are red."),
-                                 ("residuals", drift.residuals, "What is left of torque or motion, item by item.")):
+                                 ("residuals", drift.residuals, "Residual of torque or motion, item by item.")):
         whole = [c for c in courses if courses and len(c.items) == max(len(one.items) for one in courses)]
         same = [c for c in whole if c.items == whole[0].items][:_DRAWN]
         if same:

@@ -25,7 +25,7 @@ WORDS: Final[dict[str, str]] = {
     "LogSummary.joints": "number of joints", "ImportedLog.joints": "number of joints", "Converted.joints": "number of joints",
     "torque_units": "unit of torque of each joint: N m, or N where it slides",
     # numbers
-    "value": "the number, in the unit beside it", "std": "its standard deviation, in the same unit; null: unknown",
+    "value": "the number, in its unit", "std": "its standard deviation, in the same unit; null: unknown",
     "unit": "unit of the number; 1: a pure number", "before": "without the finding, joint by joint",
     "after": "with the finding, joint by joint", "TipError.before": "[m] without the finding", "TipError.after": "[m] with it",
     "TorqueGain.after": "[N m] with the finding, joint by joint", "parameters": "the parameters by their names",
@@ -67,7 +67,7 @@ WORDS: Final[dict[str, str]] = {
     "spectra": "the residual over frequency, and over the order of the angle", "against": "the signal on the axis",
     "over": "what it is spread over: frequency, or order of the joint's angle",
     # the log doctor
-    "code": "code of the finding, RRID-F02 for example", "level": "ok, warn, repair or reject", "message": "what was found",
+    "code": "code of the finding, RRID-F02 for example", "level": "ok, warn, repair or reject", "message": "the finding",
     "where": "file or place it was found in", "remedy": "what to do about it",
     "gate": "whether nothing may be concluded before it is settled", "moving_joint": "the one joint that moves; null: all do",
     "signals": "the signals that the log holds", "dropped_samples": "samples that are missing from the clock",
@@ -136,7 +136,7 @@ WORDS: Final[dict[str, str]] = {
     "torque_share": "share of the torque limit that may be used", "Result.after": "earlier logs and models that are known",
     "rehearsal": "the whole experiment simulated and estimated", "rehearsal_failed": "why it could not be simulated",
     "words": "what to do, in words", "seconds": "[s] how long it takes", "quantity": "position, speed, acceleration or torque",
-    "peak": "largest value, in the unit beside it", "limit": "its limit, in the unit beside it",
+    "peak": "largest value, in its unit", "limit": "its limit, in its unit",
     "rigid": "whether it is one of the rigid body", "count": "how many", "condition_median": "median of their condition numbers",
     "condition_best": "the best of their condition numbers",
     "relative_std_median": "median of their predicted relative standard deviations", "causes": "the causes, as they were named",
@@ -158,7 +158,7 @@ WORDS: Final[dict[str, str]] = {
     "wanted": "[m] (points, 3) where the tip should be", "executed": "[m] (points, 3) where the tip was",
     "text": "what is written", "dq": "[rad/s] speed", "ddq": "[rad/s^2] acceleration", "share": "share of the limit that is used",
     # frf
-    "responses": "every frequency response", "classification": "what gives way, where it is sure",
+    "responses": "every frequency response", "classification": "compliance that is certain",
     "undecided": "what is there and could be more than one thing", "drawn": "numbers of the responses that are drawn",
     "estimator": "how the response was estimated", "averages": "effective number of averages",
     "coherence_below_0_7_hz": "[Hz] bands in which the coherence is too low", "modes": "resonances and antiresonances",

@@ -59,7 +59,7 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
     given = [part.partition("=")[0].strip() for part in numbers.split(",") if part.strip()]
     shapes = [q.name for q in kind.parameters if q.shape and not q.derived]
     if linear := [one for one in given if one not in shapes]:
-        raise UsageError("C02", f"'{text}': {', '.join(linear)} is fitted, whatever it is said to be", where=where,
+        raise UsageError("C02", f"'{text}': {', '.join(linear)} is fitted and takes no value", where=where,
                          remedy=f"a start can be given to {', '.join(shapes)}" if shapes else f"write {text.split(':')[0]}"
                                 f"{'' if joint is None else f':{joint}'}")
     return effect, {one: values[one] for one in given}

@@ -224,7 +224,7 @@ def _course_section(result: Result) -> Section:
                    "relative [%]"), rows, "Root mean squares, after the low-pass.")
     passed = "" if result.filter_hz is None else f", all after the low-pass of {result.filter_hz:.3g} Hz"
     figures = [torque_figure(f"torque-{c.name}", f"{c.name} ({c.role}): measured torque, the model's, its friction, "
-                                                 f"and what is left{passed}.",
+                                                 f"and the residual{passed}.",
                              c.t, c.measured, c.model, c.friction, c.left, result.joints, unit) for c in result.courses]
     worst = ", ".join(f"{name} ({format_number(left['validate'][result.joints.index(name)], 2)} "
                       f"{result.torque_units[result.joints.index(name)]} rms)" for name, _ in _worst_joints(result))

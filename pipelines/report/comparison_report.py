@@ -111,7 +111,7 @@ def _verdict(result: Comparison) -> str:
     told = [f"{one.what} ({_spoken(one.a)} in {a}, {_spoken(one.b)} in {b})" for one in result.answers
             if one.differs and not _said_by(one, result)]
     if told:
-        words.append(f"what they say differs: {'; '.join(told[:2])}")
+        words.append(f"their conclusions differ: {'; '.join(told[:2])}")
     rest = "; ".join(words)
     return " ".join(filter(None, (f"{a} and {b} differ.", apart, *has, f"{rest[:1].upper()}{rest[1:]}." if rest else "")))
 

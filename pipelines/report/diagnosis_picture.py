@@ -76,7 +76,7 @@ def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:
                             f"{one.simulated_t[-1]:.0f} s.",
                             lambda drawing: _simulated(joint_axes(drawing, joints), one, units.thousandths), joint_size(joints)))
     for over, words in (("order", "Orders of the joint's angle, from those on "
-                         "that its range tells apart: a peak at k is a torque that repeats k times a turn."),
+                         "that its range resolves: a peak at k is a torque that repeats k times a turn."),
                         ("frequency", "Spectrum of the residual.")):
         spectra = [s for s in one.spectra if s.over == over]
         if spectra:

@@ -103,7 +103,7 @@ def _said(result: Result) -> str:
     alone = whole is first.gain
     change = tip_change(whole) if not (alone and more) else ""  # of the first alone it says nothing of them all
     moved = f"; with {'it' if alone else 'them'} {change}" if change else ""
-    rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
+    rest = f" In addition, {without_keys(result.reason)}." if result.reason else ""
     cause = f"{first.title}{how_much(first)}{where(first)}"
     return f"{changed}{cause}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
 

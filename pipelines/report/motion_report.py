@@ -152,7 +152,7 @@ def _log_section(log: LogResult, series: Series, number: int) -> Section:
         without += [f"the first {floor.settling_time:.2g} s, in which the motion settled"] if floor.settling_time else []
         left_out = f" (left out: {'; '.join(without)})" if without else ""
         mean = ("The motion in the derived log is that of every sample; an estimate takes its equations from the mean of the "
-                "periods, whose deviations stand in the table as well." if log.mean is not None else
+                "periods, whose deviations are in the table as well." if log.mean is not None else
                 f"They are not averaged: {floor.unlike}." if floor.unlike else "They are not averaged, as asked for.")
         compared = f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
         text.append(f"{compared if floor.periods else ''}{mean}"

@@ -223,7 +223,7 @@ def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit:
     if _accepted(spring, config) and all(own[0].rise > config.heavy for own in pairs):
         assert spring.joint is not None
         words = (f"{told}. The postures do not tell base and joint apart, but the level above the resonance is {rise:.3g} times "
-                 f"that below: what drops out there outweighs what is left, {spring.joint[1]:.3g} {unit}. That is a link behind a "
+                 f"that below: what drops out there outweighs the rest, {spring.joint[1]:.3g} {unit}. That is a link behind a "
                  "spring, not a base lighter than its arm.")
         return [_as_joint(joint, spring, pairs, inertia, words)], []
     why = "one posture only" if len(pairs) == 1 else \
