@@ -15,7 +15,7 @@ from pipelines.model.tuned import Reconstruction
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import experiment, truth
 
-SEEDS = range(3)
+SEEDS = range(1)
 SMOOTHER = Reconstruction()
 
 
