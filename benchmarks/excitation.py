@@ -89,7 +89,7 @@ def paper(seconds: float, bar: float, seeds: int) -> None:
     found, cpu = [], []
     for seed in range(1, seeds + 1):
         # start-up, finishing and files take their share of the time
-        result, _, used = command(bare_robot(), *PAPER, "--no-report", "--seconds", str(seconds - 2.0), "--seed", str(seed))
+        result, _, used = command(bare_robot(), *PAPER, "--no-report", "--time-limit", str(seconds - 2.0), "--seed", str(seed))
         found.append(figure(result, "condition_number"))
         cpu.append(used)
     row(f"the paper's problem, {seconds:.0f} s", statistics.median(found), bar, f"{np.round(found, 4)}, CPU {np.round(cpu, 1)} s")
@@ -98,7 +98,7 @@ def paper(seconds: float, bar: float, seeds: int) -> None:
 @cache
 def designed(criterion: str, seed: int, parameters: int = 15) -> tuple[dict[str, object], Path]:
     symmetric = ("--symmetric",) if parameters == 13 else ()
-    result, folder, _ = command("rrr", "--criterion", criterion, *symmetric, "--seconds", "28", "--seed", str(seed))
+    result, folder, _ = command("rrr", "--criterion", criterion, *symmetric, "--time-limit", "28", "--seed", str(seed))
     return result, folder
 
 
@@ -176,7 +176,7 @@ def six_axes(seeds: int) -> None:
     found, ratio = [], []
     median = _random_six_axes()
     for seed in range(1, seeds + 1):
-        result, _, _ = command(str(TX40), "--criterion", "condition", "--harmonics", "20", "--seconds", "55", "--no-report",
+        result, _, _ = command(str(TX40), "--criterion", "condition", "--harmonics", "20", "--time-limit", "55", "--no-report",
                                "--set", "design-excitation.rehearse=false", "--seed", str(seed))
         found.append(figure(result, "condition_number"))
         ratio.append(found[-1] / median)

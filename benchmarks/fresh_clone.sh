@@ -40,7 +40,7 @@ without_network "$place/home" rw rrrid run sample_logs/rrr-changed >"$place/said
 head -n 1 "$place/said"
 told "rrrid run sample_logs/rrr-changed, empty HOME"
 began=$SECONDS
-without_network "$place/locked" ro rrrid run sample_logs/rrr-changed --fresh --out "$place/again" >/dev/null
+without_network "$place/locked" ro rrrid run sample_logs/rrr-changed --no-cache --out "$place/again" >/dev/null
 told "the same, HOME read-only"
 began=$SECONDS
 bare "$place/home" pip install --quiet --disable-pip-version-check -e '.[test]'

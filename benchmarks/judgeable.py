@@ -51,7 +51,7 @@ def main() -> None:
 
 def asked(folder: Path) -> dict[str, Any]:
     """Return verdict, origin of the floor, and facts of one diagnosis; or why it was refused."""
-    settings = diagnose.Settings(allow_mismatch=True)
+    settings = diagnose.Settings(skip_sanity_checks=True)
     try:
         inputs = diagnose.read(Request((folder,)), settings)
         found = diagnose.compute(inputs, settings, whole=False)
@@ -61,7 +61,7 @@ def asked(folder: Path) -> dict[str, Any]:
     rows = DiagnosisSettings(cutoff_hz=DiagnosisConfig.cutoff_hz)
     prepared = with_terms_told_apart(prepare(chosen, rows), settings.blocks)
     known = facts(found, prepared, nominal_estimate(prepared))
-    return {"verdict": found.verdict, "origin": found.floor_origin,
+    return {"verdict": found.verdict, "origin": found.noise_floor_origin,
             "findings": [f"{one.cause}:{one.joint}" for one in found.findings],
             "left": known.left.tolist(), "torque": known.torque.tolist(),
             "std": known.std.tolist(), "unresolved": known.unresolved,

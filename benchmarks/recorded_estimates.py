@@ -66,7 +66,7 @@ def _estimated(paths: list[Path], settings: Settings | None, held_out: str) -> R
 def main(real: Path) -> None:
     """Print a line for each set and setting."""
     for label, settings in (("defaults", Settings(compare=False)),
-                            ("--filter 10", Settings(compare=False, filter=_CUTOFF_HZ))):
+                            ("--cutoff-hz 10", Settings(compare=False, cutoff_hz=_CUTOFF_HZ))):
         for name, results in (("panda", [panda(real, settings)]), ("kr300", kr300(real, settings))):
             own = [100 * one.relative_error["validate"] for one in results]
             fixed = [100 * fixed_row_error(one, _CUT[name]) for one in results]

@@ -4,7 +4,7 @@ Reads    nothing
 Writes   logs/, result.json with what was hidden in them, report.html
 Source   Kostić et al. 2004, eq. (22) for the motion, Section III for the arm; causes.md for what can be hidden
 
-`rrrid demo` runs the whole workflow on these logs, and ends in what was hidden beside what was found.
+`rrrid demo` runs the whole workflow on these logs, and ends in what was hidden and what was found.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def _given(fault: str) -> dict[str, str]:
 
 
 def ending(result: Result, found: Diagnosis | None) -> tuple[str, ...]:
-    """What was hidden beside what was found, a line each; and what would show that of which such logs say nothing.
+    """What was hidden and what was found, a line each; and what would show that of which such logs say nothing.
 
     Args:
         found: the diagnosis of the logs, None where none was made.
@@ -141,7 +141,7 @@ def _beyond(result: Result, found: Diagnosis) -> Iterator[tuple[str, NotIdentifi
 
 def _found(result: Result, found: Diagnosis | None) -> str:
     if found is None:
-        return "nobody has looked, for diagnose was not done"
+        return "unknown, for diagnose was not done"
     if found.verdict == "no-fault-found":
         return "nothing"
     if found.verdict == "cannot-judge":

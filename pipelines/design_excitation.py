@@ -57,13 +57,13 @@ class Settings:
     """What to design for which robot, and how long to search."""
 
     robot: str | None = None  # a description, a URDF or a shipped name; None: robot.toml here, else the shipped rrr
-    purpose: str = "excitation"
+    experiment: str = "excitation"
     criterion: str = "default"  # A-optimal with a condition number of 3 at most; or condition, frobenius, E, D, A
     cond_max: float | None = None
     harmonics: tuple[int, ...] | None = None  # one, or one a joint
     frequency: tuple[float, ...] = (0.1,)  # [Hz] fundamental: one, or one a joint
-    keep_out: tuple[float, ...] = ()  # [Hz] bands without harmonics: from, to, from, to, …
-    seconds: float = 30.0  # of computing
+    stop_band: tuple[float, ...] = ()  # [Hz] bands without harmonics: from, to, from, to, …
+    time_limit: float = 30.0  # of computing
     evaluations: int | None = None  # instead of seconds: the same number and seed give the same design again
     seed: int = 1
     symmetric: bool = False  # p4 = p15 = 0
@@ -81,14 +81,14 @@ class Settings:
     tip_speed: float | None = None  # [m/s]
     tip_box: tuple[float, ...] | None = None  # [m]
     recipe: str | None = None  # whose inverse writes controller.csv
-    mode_factor: float = 3.0  # the top harmonic stays so many times below the first mode that --after knows
+    mode_factor: float = 3.0  # the top harmonic stays so many times below the first mode that --prior-logs knows
     rehearse: bool = True
-    tell_apart: tuple[str, ...] = ()  # two causes, CAUSE[:JOINT[:NAME=VALUE]], that the motion shall tell apart
+    discriminate: tuple[str, ...] = ()  # two causes, CAUSE[:JOINT[:NAME=VALUE]], that the motion shall tell apart
 
     @property
     def wishes(self) -> Wishes:
-        bands = tuple(zip(self.keep_out[::2], self.keep_out[1::2], strict=False))
-        harmonics = self.harmonics if self.harmonics or not self.tell_apart else _APART_HARMONICS
+        bands = tuple(zip(self.stop_band[::2], self.stop_band[1::2], strict=False))
+        harmonics = self.harmonics if self.harmonics or not self.discriminate else _APART_HARMONICS
         return Wishes(self.criterion, self.cond_max, harmonics, self.frequency, bands, None, self.rest, self.home,
                       self.symmetric, self.friction, self.noise, self.torque_share, self.speed_share, self.tip_speed,
                       self.tip_box, self.sample_time, self.periods)
@@ -115,7 +115,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     """
     named, why = (given, "") if (given := settings.robot or request.robot) else robot_at_hand()
     if why:
-        request.tell(f"taking a robot that nobody named: {why}")
+        request.tell(f"no robot was named, taking: {why}")
     robot = load_robot(named)
     sources = [path for path in robot_sources(named) if path.is_file()]
     arm = _arm(settings.model, robot)
@@ -145,7 +145,7 @@ def read(request: Request, settings: Settings) -> Inputs:
 
 def _label(settings: Settings) -> str:
     """What the design is for, in the name of its default folder: a plan for another purpose is another plan."""
-    return "-".join((settings.purpose, *settings.tell_apart)).replace(":", "-")
+    return "-".join((settings.experiment, *settings.discriminate)).replace(":", "-")
 
 
 def _arm(model: str | None, robot: RobotDescription) -> Arm | None:
@@ -173,7 +173,7 @@ def _earlier(request: Request, settings: Settings, robot: RobotDescription) -> I
     for opened in found.logs:
         if opened.log.n_joints != robot.n_joints:
             raise UsageError("C02", f"{opened.path.name} has {opened.log.n_joints} joints, the robot {robot.n_joints}",
-                             where="--after", remedy="name logs of this robot")
+                             where="--prior-logs", remedy="name logs of this robot")
     return found
 
 
@@ -184,45 +184,45 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         UsageError: C02, settings that do not fit; C08, limits that no motion keeps: says which.
     """
     given: Material = inputs.material
-    if settings.purpose not in PURPOSES:
-        raise UsageError("C02", f"'{settings.purpose}' is no experiment to design", where="--for",
+    if settings.experiment not in PURPOSES:
+        raise UsageError("C02", f"'{settings.experiment}' is no experiment to design", where="--experiment",
                          remedy=f"one of: {', '.join(PURPOSES)}; the writing task comes with its own command")
-    if len(settings.keep_out) % 2:
-        raise UsageError("C02", "bands to stay out of are pairs of frequencies", where="--keep-out", remedy="write 5,8 [Hz]")
+    if len(settings.stop_band) % 2:
+        raise UsageError("C02", "bands to stay out of are pairs of frequencies", where="--stop-band", remedy="write 5,8 [Hz]")
     refuse_strange(settings)
     pair = _pair(settings, given.robot)
     mode = first_mode(given.modes)
     wishes = replace(settings.wishes, top_hz=None if mode is None else mode / settings.mode_factor)
     logs = [o.log for o in inputs.logs if o.log.origin != "planned" and o.log.experiment in USED and o.log.role == "identify"]
     told = bounds = None
-    earlier = logs and settings.purpose == "excitation"
+    earlier = logs and settings.experiment == "excitation"
     if earlier or given.bounds is not None:
         columns = plan_task(given.robot, given.arm, wishes).problem.columns
         told = information_of(logs, columns) if earlier else None
         bounds = None if given.bounds is None else parse_bounds(given.bounds, columns, str(settings.bounds))
     task = plan_task(given.robot, given.arm, wishes, told, bounds)
-    if settings.purpose != "excitation":
+    if settings.experiment != "excitation":
         return replace(_plans(task, settings, given), robot_from=given.why)
     if pair is not None:
         refuse_hidden(task, pair, settings.seed)
-    found = best(task, pair, Effort(settings.seconds, settings.evaluations, given.tell), settings.seed, settings.rehearse)
+    found = best(task, pair, Effort(settings.time_limit, settings.evaluations, given.tell), settings.seed, settings.rehearse)
     result = _result(task, found.design, settings, given, tuple(log.name for log in logs), mode)
     return replace(result, rehearsal=found.rehearsal, rehearsal_failed=found.failed, apart=found.apart, robot_from=given.why)
 
 
 def _pair(settings: Settings, robot: RobotDescription) -> Pair | None:
     """The two causes to tell apart."""
-    if not settings.tell_apart:
+    if not settings.discriminate:
         return None
-    if len(settings.tell_apart) != 2 or settings.purpose != "excitation":
-        raise UsageError("C02", "two causes are told apart, by an excitation", where="--tell-apart",
-                         remedy="write --tell-apart spring:2 cogging:2")
+    if len(settings.discriminate) != 2 or settings.experiment != "excitation":
+        raise UsageError("C02", "two causes are needed, and an excitation", where="--discriminate",
+                         remedy="write --discriminate spring:2 cogging:2")
     if not settings.rest:
         raise UsageError("C02", "a motion that tells causes apart starts and ends at rest", where="--no-rest",
                          remedy="leave it out")
-    (a, first), (b, second) = (wanted_cause(text, robot.revolute, "--tell-apart") for text in settings.tell_apart)
+    (a, first), (b, second) = (wanted_cause(text, robot.revolute, "--discriminate") for text in settings.discriminate)
     pair = Pair(a, b, (first, second))
-    refuse_one(pair, settings.tell_apart)
+    refuse_one(pair, settings.discriminate)
     return pair
 
 
@@ -261,9 +261,9 @@ def _result(task: Task, found: Design, settings: Settings, given: Material, afte
 def _plans(task: Task, settings: Settings, given: Material) -> Result:
     """The other experiments of the workflow."""
     plans = {"friction": lambda: friction_plans(task), "frf": lambda: frf_plans(task, settings.seed, settings.random),
-             "hold": lambda: hold_plans(task, settings.seed)}[settings.purpose]()
+             "hold": lambda: hold_plans(task, settings.seed)}[settings.experiment]()
     rehearsals, failed = rehearsed(task, plans, settings.seed, given.tell) if settings.rehearse else ((), "")
-    return Result.of_plans(task, settings.purpose, settings.seed, settings.sample_time, plans,
+    return Result.of_plans(task, settings.experiment, settings.seed, settings.sample_time, plans,
                            tuple((plan.name, log_of_plan(plan, task)) for plan in plans), rehearsals, failed)
 
 

@@ -44,13 +44,13 @@ class Settings:
     validate: tuple[str, ...] = ()  # that judge
     reference: tuple[str, ...] = ()  # of the arm as it was before
     model: str | None = field(default=None, metadata={"in_run": True})  # a model file: the nominal model takes its friction laws
-    without: tuple[str, ...] = ()  # causes that it cannot be, the user says
-    most: int = DiagnosisConfig.causes  # findings
+    exclude: tuple[str, ...] = ()  # causes that are not looked for
+    max_causes: int = DiagnosisConfig.causes  # findings
     blocks: int = BLOCKS  # held out in turn where no log is
-    filter: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
-    decimate: int | None = None  # every so-manieth sample; None: from the filter
+    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
+    decimate: int | None = None  # every Nth sample; None: from the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
-    allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion is diagnosed
+    skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion is diagnosed
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def beside(settings: Settings, request: Request) -> Beside:
     if settings.model is None:
         return Beside(Material(None, request.tell), (), ())
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     return Beside(Material(Arm.from_model(read_model(settings.model), path), request.tell), sources, ())
 
 
@@ -116,25 +116,25 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
         raise UsageError("C02", f"the model has {given.arm.n_joints} joints, {chosen.identify[0].name} has "
                          f"{chosen.identify[0].n_joints}", where="--model", remedy="give a model of this robot")
     given.tell("examining the logs")
-    said, boundary = examined(chosen.every, settings.allow_mismatch)
+    said, boundary = examined(chosen.every, settings.skip_sanity_checks)
     found, extension = _diagnosed(chosen, settings, given, whole)
     found = replace(_beside_clocks(found, said), boundary=boundary)
     robot = chosen.identify[0].robot
     return Result(**{f.name: getattr(found, f.name) for f in fields(found)}, robot=chosen.identify[0].robot_name,
                   joints=tuple(joint.name for joint in robot.joints), rated=tuple(joint.torque for joint in robot.joints),
-                  without=settings.without, data_quality=(*said, *found.checks), extension=extension,
+                  without=settings.exclude, data_quality=(*said, *found.checks), extension=extension,
                   laws_of="" if given.arm is None or not given.arm.friction else Path(settings.model or "").name)
 
 
 def _diagnosed(logs: Logs, settings: Settings, given: Material, whole: bool) -> tuple[Diagnosis, Extended | None]:
     """Return the causes, each joint and cause in one Gaussian model of reference logs and later ones."""
     usual = DiagnosisConfig()
-    config = replace(usual, causes=settings.most, cutoff_hz=settings.filter or usual.cutoff_hz)
+    config = replace(usual, causes=settings.max_causes, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
     rows = DiagnosisSettings(config.cutoff_hz, settings.decimate, settings.min_speed)
     prepared = with_terms_told_apart(prepare(logs, rows, given.arm), settings.blocks)
     given.tell("comparing with the reference logs" if logs.reference else "looking for causes")
-    found = diagnose_prepared(prepared, config, settings.without)
-    return answer(prepared, found, given.tell, settings.blocks, whole, settings.without)
+    found = diagnose_prepared(prepared, config, settings.exclude)
+    return answer(prepared, found, given.tell, settings.blocks, whole, settings.exclude)
 
 
 def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
@@ -149,14 +149,14 @@ def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:
 
 def _refuse_strange(settings: Settings) -> None:
     """C01, C02 for a setting that makes no sense."""
-    for cause in settings.without:
-        refuse_unknown(cause, "--without")
+    for cause in settings.exclude:
+        refuse_unknown(cause, "--exclude")
         if ":" in cause:
-            raise UsageError("C02", f"'{cause}': a cause is left out as a whole, at every joint", where="--without",
+            raise UsageError("C02", f"'{cause}': a cause is left out as a whole, at every joint", where="--exclude",
                              remedy=f"write {cause.split(':')[0]}")
     refuse_strange(settings)
-    if settings.most < 1:
-        raise UsageError("C02", f"{settings.most} findings at most", where="--most", remedy="give 1 or more")
+    if settings.max_causes < 1:
+        raise UsageError("C02", f"{settings.max_causes} findings at most", where="--max-causes", remedy="give 1 or more")
 
 
 def _exit_code(result: Result, check: bool) -> int:

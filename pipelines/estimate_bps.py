@@ -63,8 +63,8 @@ class Settings:
     jerk_std: tuple[float, ...] | None = None  # [rad/s^order]
     bandwidth: tuple[float, ...] | None = None  # [Hz]
     average: bool = True  # periods of periodic logs, where they differ by noise alone
-    filter: float | None = None  # [Hz] low-pass over torque and columns; None: five times the motion's highest frequency
-    decimate: int | None = None  # every so-manieth sample; None: four a period of the filter
+    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: five times the motion's highest frequency
+    decimate: int | None = None  # every Nth sample; None: four a period of the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
     symmetric: bool = False  # p4 = p15 = 0
     weighted: bool = True  # joints by their own residual; False: all alike
@@ -73,8 +73,8 @@ class Settings:
     blocks: int = 10  # held out in turn where no log is
     compare: bool = True  # the four ways to reconstruct, side by side
     model: str | None = None  # a model file; its friction is subtracted instead of fitted
-    allow_same: bool = False  # one recording may be fitted and judged by
-    allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
+    allow_overlap: bool = False  # one recording may be fitted and judged by
+    skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
 
     @property
     def reconstruction(self) -> Reconstruction:
@@ -88,7 +88,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is None:
         return inputs
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
 
 
@@ -104,11 +104,11 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
             equations are left; D14, a log that is fitted shall judge as well.
     """
     refuse_strange(settings)
-    identify, validate = _chosen(inputs, settings.allow_same)
+    identify, validate = _chosen(inputs, settings.allow_overlap)
     given = _friction_of(inputs.material, identify[0])
     columns = nominal_columns(identify[0].robot, friction=given is None, offset=settings.offset,
                               rotor_inertia=settings.rotor_inertia, symmetric=settings.symmetric)
-    recipe = Recipe(settings.reconstruction, settings.filter, settings.decimate, settings.min_speed,
+    recipe = Recipe(settings.reconstruction, settings.cutoff_hz, settings.decimate, settings.min_speed,
                     None if given is None else given.friction_torque)
     for log in (*identify, *validate):
         settings.reconstruction.check(log.n_joints)
@@ -129,7 +129,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                        for check in doubts(own.floor, log.source or log.name, settings.average)]
     said += negative_viscous(fitted.estimate, arm.name)
     result = replace(_result(fitted, judged, (*motions, *judges), arm, settings), boundary=boundary,
-                     doctor=(*said_of_torque, *said, *said_too, *said_of_periods),
+                     data_quality=(*said_of_torque, *said, *said_too, *said_of_periods),
                      noise_floor=residuals(scatter, fitted, judged, logs, settings.average))
     return result if not settings.compare else replace(
         result, comparison=compare(fitted, judged, settings.blocks, settings.weighted),
@@ -165,13 +165,13 @@ def _boundary(logs: list[ExperimentLog], settings: Settings) -> tuple[Boundary |
     """What the torque of the logs is, and what of it is told, where a mismatch is allowed."""
     boundary = torque_boundary([recording(log) for log in logs])
     findings = boundary_findings(boundary, logs[0].source or logs[0].name)
-    if findings and not settings.allow_mismatch:
+    if findings and not settings.skip_sanity_checks:
         raise _with_way_out(findings[0]).as_error()
     return boundary, findings
 
 
 def _with_way_out(gate: Check) -> Check:
-    return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --allow-mismatch")
+    return replace(gate, remedy=f"{gate.remedy}; if it is right as it is, say --skip-sanity-checks")
 
 
 def _examined(logs: list[ExperimentLog], subjects: list[tuple[Subject, list[Check]]], settings: Settings,
@@ -180,7 +180,7 @@ def _examined(logs: list[ExperimentLog], subjects: list[tuple[Subject, list[Chec
     motions, said = [], []
     for log, (subject, checks) in zip(logs, subjects, strict=True):
         against = without_followers(mismatches(subject), findings)
-        if not settings.allow_mismatch and (gate := next((check for check in against if check.gate), None)):
+        if not settings.skip_sanity_checks and (gate := next((check for check in against if check.gate), None)):
             raise _with_way_out(gate).as_error()
         motions.append((log, reconstruct(log, settings.reconstruction, subject.good)))
         said += [*checks, *against]
@@ -221,7 +221,7 @@ def _result(fitted: Fitted, judged: Judged, motions: Motions, arm: Arm, settings
         derived=tuple(_derived(log, motion, parts, settings) for log, motion, parts in torques))
 
 
-def _chosen(inputs: Inputs, allow_same: bool) -> tuple[list[ExperimentLog], list[ExperimentLog]]:
+def _chosen(inputs: Inputs, allow_overlap: bool) -> tuple[list[ExperimentLog], list[ExperimentLog]]:
     logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
     identify = [log for log in logs if log.role == "identify" and log.experiment in FITTED]
     if not identify:
@@ -232,7 +232,7 @@ def _chosen(inputs: Inputs, allow_same: bool) -> tuple[list[ExperimentLog], list
         raise UsageError("C02", "logs of several robots", where=inputs.label,
                          remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
     validate = [log for log in logs if log.role == "validate"]
-    if not allow_same:
+    if not allow_overlap:
         _refuse_leak(identify, validate)
     return identify, validate
 
@@ -244,7 +244,7 @@ def _refuse_leak(identify: list[ExperimentLog], validate: list[ExperimentLog]) -
         if (same := seen.get(log.q.tobytes() + log.tau.tobytes())) is not None:
             raise InputRejected("D14", f"leak: {same.name} and {log.name} hold the same samples with roles identify and validate",
                                 where=log.source or log.name,
-                                remedy="judge on another recording, or say --allow-same")
+                                remedy="judge on another recording, or say --allow-overlap")
 
 
 def _derived(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque, settings: Settings) -> tuple[str, ExperimentLog]:
@@ -262,7 +262,7 @@ def _sources(motions: Motions) -> tuple[Source, ...]:
 
 
 def _checks(result: Result) -> tuple[Check, ...]:
-    found = list(result.doctor)
+    found = list(result.data_quality)
     if result.unresolved:
         found.append(Check.of("D09", "warn", result.unresolved, where=result.robot, gate=True, remedy=REMEDY))
     if result.consistency is not None and not result.consistency.consistent:

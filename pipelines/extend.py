@@ -61,10 +61,10 @@ class Settings:
     reference: tuple[str, ...] = ()  # of the arm as it was before
     model: str | None = None  # a model file: its friction laws and its effects are fitted anew
     blocks: int = BLOCKS  # held out in turn where no log is
-    filter: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
-    decimate: int | None = None  # every so-manieth sample; None: from the filter
+    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
+    decimate: int | None = None  # every Nth sample; None: from the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
-    allow_mismatch: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
+    skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
 
 
 @dataclass(frozen=True)
@@ -91,7 +91,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is None:
         return replace(inputs, material=Material(None, request.tell))
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     arm = Arm.from_model(read_model(settings.model), path)
     return replace(inputs, sources=(*inputs.sources, *sources), material=Material(arm, request.tell))
 
@@ -120,11 +120,11 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
         raise NothingMatched("C06", "no cause is named, and diagnose, which would name one, was not done", where=inputs.label,
                              remedy="name a cause: rrrid extend LOGS --with CAUSE:JOINT")
     before = inputs.material if isinstance(inputs.material, Diagnosed) else None
-    said = examined(chosen.every, settings.allow_mismatch)[0] if before is None else before.data_quality
+    said = examined(chosen.every, settings.skip_sanity_checks)[0] if before is None else before.data_quality
     found = before.extension if before is not None and not settings.causes else None
     if found is None:
         usual = DiagnosisConfig()
-        config = replace(usual, cutoff_hz=settings.filter or usual.cutoff_hz)
+        config = replace(usual, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
         rows = DiagnosisSettings(config.cutoff_hz, settings.decimate, settings.min_speed)
         prepared = with_terms_told_apart(prepare(chosen, rows, given.arm), settings.blocks)
         given.tell(f"fitting {', '.join(dict.fromkeys(one.place for one in wanted))}")
@@ -182,7 +182,7 @@ def _found_instead(diagnosed: Diagnosed) -> str:
 
 
 def _once(kind: type[Effect]) -> bool:
-    """Whether it happens at a moment of one log."""
+    """Return whether it happens at a moment of one log."""
     return any(q.shape and q.name in kind.per_log for q in kind.parameters)
 
 

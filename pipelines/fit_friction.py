@@ -51,7 +51,7 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "report"]
 class Settings:
     """Which law, fitted how, over which windows."""
 
-    law: str | None = None  # a law of the ladder, or several joined by "+"; None: the simplest that is not measurably worse
+    law: str | None = None  # a friction law, or several joined by "+"; None: the simplest that is not measurably worse
     method: str = "varpro"  # how its numbers are found in the end: varpro, output-error or ekf
     window: float = 0.02  # [s] of the equations, the shortest: a coarse encoder takes longer ones
     order: int = Reconstruction.order  # of the smoother that motion begins with
@@ -203,7 +203,7 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 
 def report(result: Result) -> Report:
-    """The verdict, Table III, Figs. 5 and 6, the curve with its band, the ladder."""
+    """The verdict, Table III, Figs. 5 and 6, the curve with its band, the candidate laws."""
     return friction_report(result)
 
 

@@ -1,4 +1,4 @@
-"""Measure frequency responses, and say what gives way beside the rigid body.
+"""Measure frequency responses and classify compliance beside the rigid body.
 
 Reads    logs with experiment "frf": a joint turning slowly under an injected excitation v, with r (computed torque) or PD
 Writes   result.json, result.h5 (every response), report.html
@@ -44,8 +44,8 @@ from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
-_RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --for frf plans "
-           "one, at home or where --home says")
+_RECORD = ("let one joint turn slowly there and back with v injected, in two postures or more; design-excitation --experiment frf "
+           "plans one, at home or where --home says")
 _UNFOLDED = "log all signals by one clock at the controller's own rate; or thin them out behind the same low-pass"
 
 
@@ -86,7 +86,7 @@ class Result:
     classification: tuple[Classified, ...]
     undecided: tuple[Undecided, ...]
     drawn: tuple[int, ...]
-    doctor: tuple[Check, ...]
+    data_quality: tuple[Check, ...]
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -95,7 +95,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is None:
         return inputs
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     return replace(inputs, sources=(*inputs.sources, *sources), material=Arm.from_model(read_model(settings.model), path))
 
 
@@ -155,7 +155,7 @@ def _complaints(found: Findings, settings: Settings) -> list[Check]:
     for one in found.unusable:
         if one.aliased:
             said.append(Check.of("T09", "warn", f"torque of joint {one.joint} was sampled, and v has power up to half the rate: "
-                                 "what is faster has folded back (aliasing), and no mode can be told", where=_logs_of(one),
+                                 "what is faster has folded back (aliasing), and no mode can be identified", where=_logs_of(one),
                                  gate=True, remedy=_UNFOLDED))
             continue
         said.append(Check.of("D13", "warn", f"v tells nothing of joint {one.joint} from {settings.low:g} to {settings.high:g} Hz: "
@@ -187,7 +187,7 @@ def _logs_of(measured: Measured) -> str:
 
 def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Check]:
     if speed == 0.0:
-        return [Check.of("D09", "warn", f"joint {joint} did not turn: friction sticks, and stands in the response like a spring",
+        return [Check.of("D09", "warn", f"joint {joint} did not turn: friction sticks, and looks like a spring in the response",
                          where=where, remedy="let it turn slowly while it is excited")]
     if swing > _CONFIG.swing * speed:
         return [Check.of("D09", "warn", f"the excitation swings the speed of joint {joint} by {swing:.2g} about {speed:.2g} rad/s: "
@@ -198,9 +198,10 @@ def _turning(joint: int, speed: float, swing: float, where: str) -> Sequence[Che
 
 def report(result: Result) -> Report:
     """The verdict, Fig. 17's Bode plots with coherence, modes, rigid body, grouping."""
-    return frf_report(result.responses, result.postures, result.classification, result.undecided, result.doctor, result.drawn)
+    return frf_report(result.responses, result.postures, result.classification, result.undecided, result.data_quality, result.drawn)
 
 
-STAGE = Stage("frf", "Measure frequency responses and what gives way", Settings, compute, report, read, None,
-              lambda result, check: int(check and any(found.gate for found in result.doctor)), lambda result: result.doctor,
+STAGE = Stage("frf", "Measure frequency responses and classify compliance", Settings, compute, report, read, None,
+              lambda result, check: int(check and any(found.gate for found in result.data_quality)),
+              lambda result: result.data_quality,
               uses=Uses(lambda log, settings: log.experiment == "frf", before=True), sessions="one")

@@ -74,7 +74,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Preview:
-    """Every so-manieth sample of a log, for the report's figure: numbers as one short text a column.
+    """Every Nth sample of a log, for the report's figure: numbers as one short text a column.
 
     A result.h5 for them would lie among logs of the same ending, and one line a number would make most of result.json.
     """

@@ -41,11 +41,11 @@ _TRUST = "--trust-units"
 
 @dataclass(frozen=True)
 class Settings:
-    """`trust_units`: units are what the log says, however large the numbers (S05, S07). `allow_same`: one recording may have two
+    """`trust_units`: units are what the log says, however large the numbers (S05, S07). `allow_overlap`: one recording may have two
     roles (D14)."""
 
     trust_units: bool = False
-    allow_same: bool = False
+    allow_overlap: bool = False
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         logs.append(summary_of(opened, subject, (*opened.checks, *mine)))
         if len(previews) < _PREVIEWS and subject.sampled:
             previews.append(log_preview(subject))
-    found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_same and check.code == "RRID-D14")]
+    found += [check for check in check_together(inputs.logs, subjects) if not (settings.allow_overlap and check.code == "RRID-D14")]
     boundary, of_torque = _torque(inputs, subjects, logs)
     found = [*of_torque, *without_followers(found, of_torque)]
     if len({log.robot for log in logs}) == 1:
@@ -193,7 +193,7 @@ def _verdict(result: Result, found: list[Check]) -> str:
     mended = sum(log.verdict == "repair" for log in result.logs)
     warned = sum(log.verdict == "warn" for log in result.logs)
     counted = [(count, words) for count, words in
-               ((bad, "cannot be used"), (mended, "can be used after mending"), (warned, "should be looked at")) if count]
+               ((bad, "cannot be used"), (mended, "can be used after repair"), (warned, "should be looked at")) if count]
     if total == 1:
         said = f"The log {counted[0][1] if counted else 'is not bad in itself'}"
     else:
@@ -218,8 +218,8 @@ def _key_figures(result: Result) -> Table:
 
 def _found_section(found: list[Check]) -> Section:
     more = len(found) - _FINDINGS_SHOWN
-    text = (f"{more} more stand in result.json.",) if more > 0 else ()
-    return Section("What was found", text, (checks_table(found[:_FINDINGS_SHOWN], as_given=True),))
+    text = (f"{more} more are in result.json.",) if more > 0 else ()
+    return Section("Findings", text, (checks_table(found[:_FINDINGS_SHOWN], as_given=True),))
 
 
 def _passed_section(result: Result) -> Section:

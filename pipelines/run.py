@@ -48,7 +48,7 @@ class Settings:
 
     stages: Mapping[str, Any] = field(default_factory=dict, metadata={"option": False})  # filled by --set and --config
     skip: tuple[str, ...] = ()  # stages that are left out
-    fresh: bool = False  # compute everything, whatever earlier runs have left
+    no_cache: bool = False  # compute everything, whatever earlier runs have left
 
 
 @dataclass(frozen=True)
@@ -83,10 +83,10 @@ def read(request: Request, settings: Settings) -> Inputs:
     names = short_names(request.named)
     if request.roles:
         options["roles"] = {str(renamed(str(opened.path), names)): opened.log.role for opened in inputs.logs}
-    pictures = Pictures(out, {}) if settings.fresh else pictures_of(out, MODULES)
+    pictures = Pictures(out, {}) if settings.no_cache else pictures_of(out, MODULES)
     beside = {stage.name: stage.beside(own, request) for stage, own in _wanted(settings) if stage.beside is not None}
     return dataclasses.replace(
-        inputs, material=Material(Store(out, settings.fresh), pictures, names, options, beside, request),
+        inputs, material=Material(Store(out, settings.no_cache), pictures, names, options, beside, request),
         sources=(*inputs.sources, *(path for one in beside.values() for path in one.sources)),
         folders=(*inputs.folders, *(path for one in beside.values() for path in one.folders)))
 
@@ -201,7 +201,7 @@ def _computed(stage: Stage[Any, Any], settings: Any, inputs: Inputs, place: str,
             raise
         told = tilde(renamed(problem.as_dict(), given.names)) | {"exit": problem.exit_code}
         # what is an option of the stage's own command is a setting here
-        told["remedy"] = told["remedy"].replace("--allow-mismatch", f"--set {stage.name}.allow_mismatch=true")
+        told["remedy"] = told["remedy"].replace("--skip-sanity-checks", f"--set {stage.name}.skip_sanity_checks=true")
         return given.store.keep(place, key, {"problem": told}, None, lambda folder: None), None
     about = {"exit": stage.exit_code(result, True), "problem": None,
              "checks": [tilde(renamed(check.as_dict(), given.names)) for check in stage.checks(result)]}

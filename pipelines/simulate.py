@@ -61,7 +61,7 @@ class Result:
     faults: tuple[str, ...]  # as they were written
     logs: tuple[Imitation, ...]
     tracking_rms: tuple[Array | None, ...]  # [rad] measured minus reference, of each log that was simulated in closed loop
-    doctor: tuple[Check, ...]  # what the logs are like
+    data_quality: tuple[Check, ...]  # what the logs are like
 
 
 def read(request: Request, settings: Settings) -> Inputs:
@@ -73,10 +73,10 @@ def read(request: Request, settings: Settings) -> Inputs:
     if not settings.model:
         raise UsageError("C02", "no model", where="simulate", remedy="name a model.json, or the shipped 'rrr'")
     if not request.paths:
-        raise UsageError("C02", "no log to imitate", where="simulate", remedy="name one: --like LOG")
+        raise UsageError("C02", "no log to imitate", where="simulate", remedy="name one: --replay LOG")
     inputs = read_logs(request, settings)
     path = Path(settings.model).absolute()
-    sources = (path,) if path.is_file() else ()  # one that is shipped is none of the user's files
+    sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     arm = Arm.from_model(read_model(settings.model), path)
     if not arm.p.any() and not arm.effects:
         raise UsageError("C02", f"the model {path.name} holds friction alone, no inertia", where="simulate",
@@ -93,7 +93,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         InputRejected: D17, the simulated arm runs away; S22, a plan whose controller is not described; what a log lacks.
     """
     if not inputs.logs:
-        raise NothingMatched("C06", "no log to imitate", where=inputs.label, remedy="name one: --like LOG")
+        raise NothingMatched("C06", "no log to imitate", where=inputs.label, remedy="name one: --replay LOG")
     nominal: Arm = inputs.material
     arm = nominal.extended(*(acting_cause(text, nominal.robot.revolute) for text in settings.fault))
     told = encode(replace(settings, model=Path(settings.model).name))[0]
@@ -140,7 +140,7 @@ def _checks(result: Result) -> tuple[Check, ...]:
     why = (Check.of("S22", "warn", f"simulated in windows of {one.window:.3g} s: {one.reason}", where=one.source,
                     remedy="describe the controller in the log to simulate it in closed loop")
            for one in result.logs if one.simulation == "windowed" and one.reason != "asked for")
-    return (*result.doctor, *why)
+    return (*result.data_quality, *why)
 
 
 def write(result: Result, folder: Path, request: Request) -> None:

@@ -41,7 +41,7 @@ from pipelines.log.places import (
     tilde,
     told_apart,
 )
-from pipelines.log.results import encode, json_text, write_series
+from pipelines.log.results import encode, headed, json_text, write_series
 from pipelines.log.robot_files import robot_sources
 from pipelines.log.shared_work import errand
 from pipelines.report.report import Report
@@ -185,7 +185,7 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
     request.tell("writing the report")
     report = renamed(stage.report(result), names)
     object_, series = encode(result)
-    object_ = tilde({"command": stage.name, **object_})
+    object_ = tilde(headed(stage.name, object_))
     staging = staging_place(out)
     try:
         with environment_faults(out):

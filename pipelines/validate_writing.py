@@ -129,7 +129,7 @@ def _left_in(paths: Sequence[Path]) -> str | None:
 
 
 def _of(model: ModelFile, inputs: Inputs) -> bool:
-    """Whether a model was fitted to some of these logs."""
+    """Return whether a model was fitted to some of these logs."""
     ours = {digest_of(recording(opened.log)) for opened in inputs.logs}
     return any(source.sha256 in ours for source in model.sources)
 
@@ -172,7 +172,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         robot=arm.robot.name, joints=tuple(joint.name for joint in arm.robot.joints), model=said, torque=found.torque,
         gates=found.gates, logs=found.firsts, cases=found.cases, cases_left_out=found.cases_left_out,
         cases_apart=found.cases_apart, drawn=_drawn_from(arm), draws=settings.draws, simulation=error,
-        simulation_left_out=found.simulation_left_out, imitation=done, design=None, doctor=found.checks, derived=derived,
+        simulation_left_out=found.simulation_left_out, imitation=done, design=None, data_quality=found.checks, derived=derived,
         online_seconds=found.seconds)
 
 
@@ -198,7 +198,7 @@ def _drawn_from(arm: Arm) -> str:
 
 
 def _friction_held(arm: Arm) -> bool:
-    """Whether the fit took friction as known: its covariance then has no number of it."""
+    """Return whether the fit took friction as known: its covariance then has no number of it."""
     numbers = {f"{law.place}:{p.name}" for law in arm.friction for p in law.parameters}
     return bool(numbers) and arm.uncertainty is not None and numbers.isdisjoint(arm.uncertainty.names)
 
@@ -297,4 +297,4 @@ def _reads(log: ExperimentLog, settings: Settings) -> bool:
 
 
 STAGE = Stage("validate-writing", "Validate on the writing task", Settings, compute, report, read, write, _exit_code,
-              lambda result: result.doctor, durations=_durations, uses=Uses(_reads, before=True), sessions="one")
+              lambda result: result.data_quality, durations=_durations, uses=Uses(_reads, before=True), sessions="one")

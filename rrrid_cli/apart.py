@@ -47,9 +47,9 @@ def each_by_itself(stage: Any, request: Request, settings: Any, several: Several
         codes.append(code)
         objects.append({"name": clean(name), **told})
     if common.json:
-        from pipelines.log.results import json_text
+        from pipelines.log.results import headed, json_text
 
-        sys.stdout.write(json_text({"command": stage.name, "runs": objects}))
+        sys.stdout.write(json_text(headed(stage.name, {"runs": objects})))
     return _exit_code(codes)
 
 

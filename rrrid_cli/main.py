@@ -1,4 +1,4 @@
-"""The console script: call the command, and end with one line and an exit code, whatever happens."""
+"""The console script: call the command, and end with one line and an exit code in every case."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def _no_folder(problem: RrridError) -> RrridError:
 
 
 def _mute() -> None:
-    """Nobody takes what is still to be printed: it goes nowhere, without another complaint at the end."""
+    """Discard what is still to be printed: the reader of the pipe has left."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

@@ -26,7 +26,7 @@ SomeLogs = Annotated[list[Path] | None, typer.Argument(help="Logs, or folders of
 
 @dataclass(frozen=True)
 class Roles:
-    """Logs named for a role, whatever they say of themselves."""
+    """Logs named for a role, instead of the logs' own roles."""
 
     identify: tuple[str, ...] = ()
     validate: tuple[str, ...] = ()
@@ -40,7 +40,7 @@ class Roles:
 
 @dataclass(frozen=True)
 class Common:
-    """What the shared options said."""
+    """Values of the shared options."""
 
     out: Path | None
     json: bool
@@ -144,7 +144,7 @@ class CauseCommand(StageCommand):
 
 
 _OUT = "Folder for everything the command leaves"
-_KEPT = "another command's result there is kept beside it"
+_KEPT = "an earlier result of another command is kept"
 _SHARED: tuple[tuple[str, Any, Any], ...] = (
     ("out", Annotated[Path | None, _path(f"{_OUT}; {_KEPT}. [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
     ("json", Annotated[bool, _flag("Print result.json on standard output, and nothing else there.", "--json")], False),
@@ -154,12 +154,12 @@ _SHARED: tuple[tuple[str, Any, Any], ...] = (
     ("assume_units", Annotated[bool, _flag("Take signals without units as SI.", "--assume-units")], False),
     ("format", Annotated[str | None, _flag("Container of the logs that are written: h5 or parquet. [h5]", "--format")], None),
     ("config", Annotated[Path | None, _path("TOML file of settings, one table a stage.", "--config")], None),
-    ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable; the names stand below.", "--set")], []),
+    ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable; the names are listed below.", "--set")], []),
     ("no_report", Annotated[bool, _flag("Leave report and figures out.", "--no-report")], False),
     ("force", Annotated[bool, _flag("Replace rrrid's own earlier output, files that were changed as well, and keep none.",
                                      "--force")], False),
     ("quiet", Annotated[bool, _flag("Print nothing but errors.", "-q", "--quiet")], False),
-    ("verbose", Annotated[bool, _flag("Say every step.", "-v", "--verbose")], False),
+    ("verbose", Annotated[bool, _flag("Verbose progress.", "-v", "--verbose")], False),
     ("debug", Annotated[bool, _flag("Show the traceback of an internal error.", "--debug")], False),
 )
 
@@ -171,8 +171,8 @@ _JOINTS = ("joints", Annotated[str | None, _flag("Joints to take of every log: 1
 
 # Of the commands that read logs by their roles.
 _ROLES: tuple[tuple[str, Any, Any], ...] = tuple((role, Annotated[list[str], _flag(words, f"--{role}")], []) for role, words in (
-    ("identify", "Logs to fit, whatever they say of themselves. Repeatable."), ("validate", "Logs that judge. Repeatable."),
-    ("reference", "Logs of the arm as it was before. Repeatable.")))
+    ("identify", "Identification logs, instead of the logs' own roles. Repeatable."), ("validate", "Validation logs. Repeatable."),
+    ("reference", "Reference logs, of the arm as it was before. Repeatable.")))
 
 _SESSION = ("session", Annotated[str, _flag("Of several robots or days only this: 'ROBOT', or 'ROBOT 2026-05-18'. "
                                             "[each by itself]", "--session")], "")

@@ -48,7 +48,7 @@ def main(names: list[str]) -> None:
 
 
 def rounds_alike() -> bool:
-    """Whether MuJoCo and LAPACK are, here, those that made the committed logs of the bench, to the last bit."""
+    """Return whether MuJoCo and LAPACK are, here, those that made the committed logs of the bench, to the last bit."""
     model = build(plan_of(machine().robot), SAMPLE_TIME).model
     axes = hashlib.sha256(model.body_inertia.tobytes() + model.body_iquat.tobytes()).hexdigest()
     return version("mujoco") == _MUJOCO and axes.startswith(_AXES)

@@ -31,7 +31,7 @@ def written(folder: Path, seed: int, moved: tuple[int, float] = (0, 0.0), **more
     values[moved[0]] += moved[1] * STD[moved[0]]
     parameters = [{"name": f"p{i + 1}", "value": float(v), "std": float(s), "unit": "kg m^2", "visible": True}
                   for i, (v, s) in enumerate(zip(values, STD, strict=True))]
-    result = {"command": "estimate-bps", "robot": "arm", "parameters": parameters,
+    result = {"command": "estimate-bps", "schema_version": 2, "robot": "arm", "parameters": parameters,
               "torque_rms": {"identify": [0.02, 0.01], "validate": [0.03, 0.01 * seed]}, **more}
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "result.json").write_text(json.dumps(result))
@@ -132,7 +132,7 @@ def extended(folder: Path, seed: int, **effects: dict[str, tuple[float, float]])
     """A result of extend: the effects as findings, and again in its model; the torque error before and after."""
     held = model(**effects)
     findings = [{"cause": one["effect"], "joint": one["joint"], "parameters": one["parameters"]} for one in held["effects"]]
-    rms = {name: {"validate": [error * seed], "floor": [0.01]} for name, error in (("residual_rms", 0.3), ("after_rms", 0.1))}
+    rms = {name: {"validate": [error * seed], "noise_floor": [0.01]} for name, error in (("residual_rms", 0.3), ("after_rms", 0.1))}
     return written(folder, seed, command="extend", parameters=[], findings=findings, model=held, **rms)
 
 
@@ -208,7 +208,7 @@ def test_one_result_twice_is_said_to_be_one(tmp_path: Path) -> None:
         outcome = go(tmp_path, one, other)
         assert outcome.report.verdict.startswith(f"{words} are the same result")
         assert (outcome.result.same, outcome.exit_code) == (True, 0)
-    bare = bad(tmp_path / "bare", '{"command": "inspect"}')
+    bare = bad(tmp_path / "bare", '{"command": "inspect", "schema_version": 2}')
     assert "the same result" in go(tmp_path, bare, bare).report.verdict
 
 
@@ -220,8 +220,11 @@ def bad(folder: Path, text: str) -> Path:
 
 @pytest.mark.parametrize(("text", "kind", "code"), [
     ('{"command": "frf"', InputRejected, "F02"), ('{"a": 1}', InputRejected, "S19"), ("[1]", InputRejected, "S19"),
-    ('{"command": "frf"}', UsageError, "C02"), ('{"command": "estimate-bps", "stages": [{"exit": 0}]}', InputRejected, "S20"),
-    ('{"command": "estimate-bps", "findings": ["cogging"]}', InputRejected, "S20"), ("[" * 100_000, InputRejected, "F02")])
+    ('{"command": "frf", "schema_version": 2}', UsageError, "C02"),
+    ('{"command": "estimate-bps", "schema_version": 2, "stages": [{"exit": 0}]}', InputRejected, "S20"),
+    ('{"command": "estimate-bps", "schema_version": 2, "findings": ["cogging"]}', InputRejected, "S20"),
+    ('{"command": "estimate-bps"}', InputRejected, "F17.*written by an earlier rrrid.*Run the command again"),
+    ("[" * 100_000, InputRejected, "F02")])
 def test_what_is_no_result_is_refused(tmp_path: Path, text: str, kind: type[RrridError], code: str) -> None:
     """Half a file, another file, another command."""
     with pytest.raises(kind, match=code):

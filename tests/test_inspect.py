@@ -116,17 +116,18 @@ def test_the_report_of_a_broken_log_is_drawn(row: str, tmp_path: Path) -> None:
     assert outcome.report.tone in ("bad", "attention")
 
 
-def test_every_fault_has_a_report() -> None:
+@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.slow)])
+def test_every_fault_has_a_report(every: int) -> None:
     """Words and tables for each; nothing is drawn here."""
     from pipelines.log.files import Opened
     from pipelines.stage import Inputs
 
-    for fault in FAULTS:
+    for fault in FAULTS[::every]:
         opened = Opened(Path("log.h5"), "0" * 64, fault.make(good_log()), ())
         result = inspect.compute(Inputs((opened,)), inspect.Settings())
         report = inspect.report(result)
         assert report.verdict.startswith("The log "), fault.row
-        assert "What was found" in [section.title for section in report.sections[:2]]  # behind what the torque is
+        assert "Findings" in [section.title for section in report.sections[:2]]  # behind what the torque is
 
 
 def test_another_robot_must_have_as_many_joints(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ from pipelines.log.files import open_log, write_log
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 from tests.cli.commands import rrrid
+from tests.diagnose.sessions import but, session, written
 
 WITHOUT = run.Settings(skip=("diagnose", "extend"))  # they are dear, and have tests of their own
 
@@ -50,7 +51,7 @@ def test_the_ledger_begins_with_no_model(whole: Outcome[run.Result]) -> None:
     nothing, rigid, friction = ledger_lines(whole.result.groups[0])
     assert (nothing.before, rigid.before, friction.before) == (None, nothing.rms, rigid.rms)
     assert all(f < r < n for n, r, f in zip(nothing.rms, rigid.rms, friction.rms, strict=True))
-    tables = next(section for section in whole.report.sections if section.title.startswith("Ledger")).tables
+    tables = next(section for section in whole.report.sections if section.title.startswith("Error by model stage")).tables
     assert [row[0] for row in tables[0].rows] == [line.step for line in (nothing, rigid, friction)]
 
 
@@ -84,8 +85,9 @@ def test_it_is_said_whose_friction_went_in(whole: Outcome[run.Result], samples: 
         assert said in told
 
 
-def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(samples: Path, tmp_path: Path) -> None:
-    words = ("diagnose", samples / "rrr-closed-form/excitation-1.h5", "--out", tmp_path / "out", "--no-report")
+def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(tmp_path: Path) -> None:
+    words = ("diagnose", written(tmp_path / "brief", session("cogging", 1, 2.0, 1)), "--out", tmp_path / "out", "--no-report",
+             "--max-causes", "1", *(word for cause in but("cogging") for word in ("--exclude", cause)))
     told = rrrid(*words, cwd=tmp_path).stdout
     assert "Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run" in told
     assert "--set diagnose.model=FILE" in told
@@ -136,7 +138,7 @@ def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> Non
     assert sorted({where.split(", ")[0] for where in lacking}) == ["other", "rrr-tue"]  # whose logs lack something is said
 
 
-def session(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> dict[str, set[str]]:
+def sessions(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> dict[str, set[str]]:
     """Which logs (name -> role and time of recording) go together, by the name of their session."""
     log = open_log(samples / "rrr-closed-form/hold-1.h5").log
     for name, (role, recorded) in logs.items():
@@ -148,7 +150,7 @@ def session(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> di
 def test_days_are_apart_and_share_what_was_recorded_before(samples: Path, tmp_path: Path) -> None:
     """A reference tells of every later day and of none before it."""
     first, between, last = "2026-03-02T09:00:00Z", "2026-03-04T10:00:00Z", "2026-05-18T09:00:00Z"
-    found = session(tmp_path, samples, a=("identify", first), b=("validate", first), c=("reference", between),
+    found = sessions(tmp_path, samples, a=("identify", first), b=("validate", first), c=("reference", between),
                     d=("identify", last), e=("validate", last))
     assert found == {"rrr-tue 2026-03-02": {"a", "b"}, "rrr-tue 2026-05-18": {"c", "d", "e"}}
 
@@ -158,7 +160,7 @@ def test_a_reference_belongs_to_what_it_is_compared_with(samples: Path, tmp_path
     day, later = "2026-03-04T10:00:00Z", "2026-05-18T09:00:00Z"
     for number, (reference, rest) in enumerate(((day, later), (None, later), (day, None), (day, day), (later, day))):
         (tmp_path / str(number)).mkdir()
-        assert session(tmp_path / str(number), samples, c=("reference", reference), d=("identify", rest)) == {"": {"c", "d"}}
+        assert sessions(tmp_path / str(number), samples, c=("reference", reference), d=("identify", rest)) == {"": {"c", "d"}}
 
 
 def test_the_sample_logs_are_three_sessions(samples: Path) -> None:

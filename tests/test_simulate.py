@@ -172,7 +172,7 @@ def test_settings_that_do_not_fit_are_refused(settings: Settings, code: str, tmp
 def test_the_command(tmp_path: Path) -> None:
     """As the contract writes it."""
     write_log(tmp_path / "waving.h5", controlled_log(SAMPLES))
-    done = rrrid("simulate", "rrr", "--like", "waving.h5", "--fault", "quadratic_drag:2:coefficient=0.1",
+    done = rrrid("simulate", "rrr", "--replay", "waving.h5", "--fault", "quadratic_drag:2:coefficient=0.1",
                  "--noise", "0.02,0.01,0.005",
                  "--replicas", "2", "--seed", "7", "--json", "--no-report", "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -181,7 +181,7 @@ def test_the_command(tmp_path: Path) -> None:
     assert [file for log in told["logs"] for file in log["files"]] == ["logs/waving", "logs/waving-2"]
     assert json.loads((tmp_path / "out/provenance.json").read_text())["seed"] == 7
     missing = rrrid("simulate", "rrr", cwd=tmp_path)
-    assert (missing.returncode, "--like" in missing.stderr) == (2, True)
+    assert (missing.returncode, "--replay" in missing.stderr) == (2, True)
 
 
 def test_an_open_loop_log_is_said_to_have_no_feedback(tmp_path: Path) -> None:

@@ -29,13 +29,13 @@ __all__ = ["Diagnose", "asked", "by_command", "by_compute", "engine_named", "jud
 
 Diagnose = Callable[[Path, tuple[str, ...]], Any]
 Task = tuple[Sealed, tuple[str, ...]]
-_KEPT = ("verdict", "findings", "baseline_effects", "rejected", "not_identifiable", "residual_rms", "reason", "floor_origin")
+_KEPT = ("verdict", "findings", "baseline_effects", "rejected", "not_identifiable", "residual_rms", "reason", "noise_floor_origin")
 
 
 def by_command(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
     """What `rrrid diagnose FOLDER --json` prints."""
     stage = importlib.import_module("pipelines.diagnose").STAGE
-    settings = dataclasses.replace(stage.settings(), without=without) if without else stage.settings()
+    settings = dataclasses.replace(stage.settings(), exclude=without) if without else stage.settings()
     with tempfile.TemporaryDirectory() as place:
         return run_stage(stage, Request((folder,), out=Path(place) / "out", no_report=True), settings).json
 
@@ -44,7 +44,7 @@ def by_compute(folder: Path, without: tuple[str, ...]) -> Mapping[str, Any]:
     """What `by_command` says without detection limits, series of figures and a folder of output: verdict, findings and numbers are
     the same, `not_identifiable` lacks causes of which the limits say that no arm could have so much."""
     module = importlib.import_module("pipelines.diagnose")
-    settings = module.Settings(without=without)
+    settings = module.Settings(exclude=without)
     found: Mapping[str, Any] = encode(module.compute(module.read(Request((folder,)), settings), settings, whole=False))[0]
     return found
 

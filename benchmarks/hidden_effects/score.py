@@ -72,7 +72,7 @@ def score(sealed: Sealed, said: Said, seconds: float = math.nan, without: Sequen
 
 
 def same_place(found: Found, truth: Mapping[str, Any]) -> bool:
-    """Whether a finding is this cause. A transmission that couples i with j couples j with i."""
+    """Return whether a finding is this cause. A transmission that couples i with j couples j with i."""
     if found.cause != truth["cause"]:
         return False
     other = truth["parameters"].get("with_joint")
@@ -107,7 +107,7 @@ def _first(sealed: Sealed, said: Said) -> bool:
 
 
 def _joint(first: Found | None, truths: Sequence[Mapping[str, Any]]) -> bool | None:
-    """Whether the first finding is at a joint where something is; None where nothing was named or nothing is at a joint."""
+    """Return whether the first finding is at a joint where something is; None where nothing was named or nothing is at a joint."""
     if first is None or not truths or any(truth["cause"] == "unknown" or truth["joint"] is None for truth in truths):
         return None
     joints = {truth["joint"] for truth in truths}
@@ -154,7 +154,7 @@ def _over_floor(said: Said, floors: Sequence[float]) -> float:
 
 
 def _fell(findings: Sequence[Found]) -> bool | None:
-    """Whether the simulated position error is smaller with all findings than without any."""
+    """Return whether the simulated position error is smaller with all findings than without any."""
     if findings[0].simulated is None or findings[-1].simulated is None:
         return None
     return findings[-1].simulated[1] < findings[0].simulated[0]

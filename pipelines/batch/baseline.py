@@ -111,7 +111,7 @@ def _kinds(baseline: ModelFile) -> dict[str, ModelFile]:
 
 
 def _met(kind: ModelFile, judged: Iterable[Part]) -> bool:
-    """Whether there was something to hold what there is of `kind` against: an effect is met by what names causes as well."""
+    """Return whether there was something to hold what there is of `kind` against: an effect is met by what names causes as well."""
     asked = kind.effects or _spelled(kind)
     return not asked or any(known_figures(kind, part.figures) or (kind.effects and part.diagnosed) for part in judged)
 
@@ -215,7 +215,7 @@ def _law_of(name: str) -> tuple[str, str, int] | None:
 
 
 def _is_of(name: str, one: StoredEffect) -> bool:
-    """Whether a figure is one of an effect at its place, however results spell it."""
+    """Return whether a figure is one of an effect at its place, however results spell it."""
     return any(f" {begun}" in f" {name}" for begun in (f"{one.effect}:{one.joint}:", f"{one.effect} joint {one.joint} "))
 
 

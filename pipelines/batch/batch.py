@@ -32,7 +32,7 @@ from pipelines.batch.work import undone
 from pipelines.errors import Check, EnvironmentFault, NothingMatched, UsageError
 from pipelines.log.model_file import ModelFile, read_model
 from pipelines.log.places import keep_apart, slug, tilde
-from pipelines.log.results import encode
+from pipelines.log.results import encode, headed
 from pipelines.stage import Outcome
 
 __all__ = ["Wanted", "run_batch"]
@@ -99,7 +99,7 @@ def _written(folder: BatchFolder, summary: Summary, done: _Done, started: float)
     """Write the summary. Where the disk was full before, it may be full still: the first fault is told then."""
     wanted, named = done.wanted, None if summary.baseline is None else summary.baseline.name
     result = result_of(summary.stage, summary.records, summary.drifts, named, summary.checks)
-    json_ = tilde({"command": "batch", **encode(result)[0]})
+    json_ = tilde(headed("batch", encode(result)[0]))
     report = tilde(summary_report(summary, figures=not (wanted.no_report or summary.interrupted or done.fault)))
     try:
         folder.finish(summary, json_, None if wanted.no_report else report, wanted.check, _about(done, started))
@@ -188,7 +188,7 @@ class _Done:
         return cluster(self.wanted.backend, self.plan, self.key, items, self.stopped)
 
     def _keep(self, item: Item) -> bool:
-        """Whether the item's earlier result still stands (P07), whole (P10)."""
+        """Return whether the item's earlier result still stands (P07), whole (P10)."""
         if self.listener.number:
             return True  # it will be told as missing
         record = self.folder.ledger.get(item)
@@ -196,7 +196,7 @@ class _Done:
             return False
         if not intact(record, self.folder.items / item.slug):
             self.notices.append(Check.of("P10", "warn", "its stored result is not what was written; done again", where=record.name,
-                                         remedy="look after the disk, if nobody changed it"))
+                                         remedy="check the disk, if you have not changed it"))
             return False
         self.records[item.slug] = record
         return True

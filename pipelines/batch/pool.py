@@ -51,7 +51,7 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
             starts += 1
             if starts == _STARTS:
                 raise EnvironmentFault("P04", "worker processes end before they begin", where="batch",
-                                       remedy="raise --memory, or see what the system says of it") from None
+                                       remedy="raise --memory, or see the system's log") from None
         finally:
             pool.stop()
             pool.join()
@@ -104,7 +104,7 @@ class _Watch:
 
 
 def _there(process: int | None) -> bool:
-    """Whether the process still runs; one that has not said its number has not begun."""
+    """Return whether the process still runs; one that has not said its number has not begun."""
     try:
         if process is not None:
             os.kill(process, 0)

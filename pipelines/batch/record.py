@@ -97,7 +97,7 @@ def relative(path: Path, root: Path) -> str:
 
 
 def fresh(record: Record, item: Item, root: Path, key: str) -> bool:
-    """Whether what was recorded still holds: same logs, same bytes, same settings and code, and it ended as it should.
+    """Return whether what was recorded still holds: same logs, same bytes, same settings and code, and it ended as it should.
 
     What was rejected without a result is done again: the reason may have lain in the moment, and it costs little.
     """
@@ -110,7 +110,7 @@ def fresh(record: Record, item: Item, root: Path, key: str) -> bool:
 
 
 def intact(record: Record, folder: Path) -> bool:
-    """Whether the item's folder holds exactly what was written there (P10)."""
+    """Return whether the item's folder holds exactly what was written there (P10)."""
     try:
         if hash_file(folder / PROVENANCE) != record.provenance:
             return False

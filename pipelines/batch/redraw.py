@@ -73,7 +73,7 @@ def _summary(result: Mapping[str, Any], place: BatchFolder) -> Summary:
 
 
 def _unreached(record: Record) -> bool:
-    """Whether the batch was interrupted before the item."""
+    """Return whether the batch was interrupted before the item."""
     error = record.error or {}
     return error.get("code") == "RRID-P06" and "interrupted" in error.get("message", "")
 

@@ -109,7 +109,7 @@ def _verdict(summary: Summary) -> str:
 
 
 def _beyond_chance(drift: Drift) -> bool:
-    """Whether a robot's figures moved farther than chance moves the farthest of so many (Šidák 1967).
+    """Return whether a robot's figures moved farther than chance moves the farthest of so many (Šidák 1967).
 
     χ² of the whole course shows many items that moved a little, and hardly a single one among hundreds: the farthest item is asked
     by itself as well, in the two-sided probability of a normal one, and either may speak.
@@ -130,7 +130,7 @@ def _of_normal(far: float) -> float:
 
 
 def _unmet(summary: Summary) -> bool:
-    """Whether the baseline, where there is one, met nothing at all."""
+    """Return whether the baseline, where there is one, met nothing at all."""
     return any(check.gate for check in summary.checks)
 
 
@@ -160,7 +160,7 @@ def _checks(summary: Summary) -> list[Section]:
 def _all(summary: Summary) -> Section:
     rows = tuple((r.name, r.status, without_keys(r.verdict) or _why(r)) for r in summary.records[:_ROWS])
     more = len(summary.records) - len(rows)
-    text = (f"{more} more stand in summary.parquet and result.json.",) if more else ()
+    text = (f"{more} more are in summary.parquet and result.json.",) if more else ()
     return Section("All items", text, tables=(Table(("item", "status", "verdict"), rows, tones=tuple(
         _TONES[r.status] for r in summary.records[:_ROWS])),))
 
@@ -188,7 +188,7 @@ def _figure_table(ranked: Sequence[Course]) -> Table:
     rows = tuple((figure_in_words(c.name), _tenths(c.chi_square), c.freedom, _digits(c.probability),
                   _tenths(float(np.max(np.abs(c.away)))), _tenths(c.trend), _first_four(c.moved)) for c in ranked[:listed])
     tones: tuple[Tone, ...] = tuple("attention" if c.moved else "neutral" for c in ranked[:listed])
-    more = "" if len(ranked) <= listed else f" The {len(ranked) - listed} that moved least stand in result.json."
+    more = "" if len(ranked) <= listed else f" The {len(ranked) - listed} that moved least are in result.json."
     return Table(("figure", "χ²", "freedom", "probability", "largest [std]", "first to last [std]", "moved"), rows,
                  caption=f"What moved most stands first.{more}", tones=tones)
 
@@ -209,7 +209,7 @@ def _figures(drift: Drift, ranked: Sequence[Course], baseline: ModelFile | None)
     drawn = []
     before = {} if baseline is None else known_figures(baseline, [course.name for course in ranked])
     for name, courses, words in (("drift", ranked, "The figures that moved most, with one std; those beyond three are red."),
-                                 ("residuals", drift.residuals, "What is left of torque or motion, item by item.")):
+                                 ("residuals", drift.residuals, "Residual of torque or motion, item by item.")):
         whole = [c for c in courses if courses and len(c.items) == max(len(one.items) for one in courses)]
         same = [c for c in whole if c.items == whole[0].items][:_DRAWN]
         if same:

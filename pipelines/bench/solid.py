@@ -59,7 +59,7 @@ class Solid:
 
     @property
     def exists(self) -> bool:
-        """Whether mass could be spread so: positive mass, S positive definite (Traversaro et al. 2016)."""
+        """Return whether mass could be spread so: positive mass, S positive definite (Traversaro et al. 2016)."""
         return self.mass > 0.0 and bool(np.linalg.eigvalsh(self.second_moments).min() > 0.0)
 
     def drawn(self, rng: np.random.Generator, share: float) -> Solid:

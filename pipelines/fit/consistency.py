@@ -87,7 +87,7 @@ def pseudo_inertia(parameters: Array) -> Array:
 
 
 def physical_consistency(beta: Array, covariance: Array, combine: Array) -> Consistency:
-    """Whether bodies exist that reproduce `beta` within `covariance`.
+    """Return whether bodies exist that reproduce `beta` within `covariance`.
 
     Args:
         beta: (k,) estimates.

@@ -233,7 +233,7 @@ def _factor(spectrum: Complex) -> Complex:
 
 
 def _correlated(flat: Complex, mean: Complex, length: int, samples: int) -> bool:
-    """Whether two channels go together beyond chance: at the same instant or a little apart, or within a band.
+    """Return whether two channels go together beyond chance: at the same instant or a little apart, or within a band.
 
     Of channels that are independent, coherence over n frequencies exceeds c with probability exp(-n c) at most.
     """

@@ -197,7 +197,7 @@ def typical_size(value: Array, std: Array, groups: Sequence[str]) -> Array:
 
 
 def visible(value: Array, std: Array, typical: Array | None = None) -> npt.NDArray[np.bool_]:
-    """Whether each parameter is visible: its value is known to a third, or known to be small.
+    """Return whether each parameter is visible: its value is known to a third, or known to be small.
 
     |value| > 3 std, or std ≤ 5 % of `typical`, the size of its like: a parameter that is truly zero never stands out of
     its noise, and is yet well known where that noise is small.

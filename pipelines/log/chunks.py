@@ -78,7 +78,7 @@ def _noise(planes: Bytes) -> list[bool]:
 
 
 def _repeats(plane: Bytes) -> bool:
-    """Whether the four bytes behind some byte are those behind its like elsewhere, as in a clock or a periodic reference."""
+    """Return whether the four bytes behind some byte are those behind its like elsewhere, as in a clock or a periodic reference."""
     at = np.flatnonzero(plane[:-4] == plane[len(plane) // 2])
     behind = plane[at[:, None] + np.arange(1, 5)].view("<u4").ravel().tolist()
     return len(set(behind)) < len(behind)

@@ -29,6 +29,7 @@ CODES: Final[dict[str, str]] = {
     "F04": "checksum mismatch", "F05": "integrity", "F06": "not a log", "F07": "truncated Parquet", "F08": "damaged MAT file",
     "F09": "torn lines in a text file", "F10": "missing HDF5 filter", "F11": "newer format version", "F12": "not a regular file",
     "F13": "permission denied", "F14": "file changed meanwhile", "F15": "in use by another process", "F16": "text file dialect",
+    "F17": "result of an earlier version",
     "P02": "disk or file system", "P03": "out of memory", "P04": "crashed", "P05": "out of time", "P06": "interrupted",
     "P08": "in use by another run",
     "P10": "stored result changed",

@@ -50,7 +50,7 @@ def derive(log: ExperimentLog, command: str, settings: Mapping[str, Any], signal
 
 
 def derived_by(log: ExperimentLog, command: str, settings: Mapping[str, Any]) -> bool:
-    """Whether `log` holds what `command` with `settings` derives from the very recording it holds."""
+    """Return whether `log` holds what `command` with `settings` derives from the very recording it holds."""
     done = _steps(log).get(command)
     return (done is not None and done == json.loads(json.dumps(dict(settings))) and log.derived is not None
             and log.derived.source_sha256 == digest_of(recording(log)))

@@ -130,7 +130,7 @@ class ExperimentLog:
 
     @property
     def controlled(self) -> bool:
-        """Whether it says how its controller works."""
+        """Return whether it says how its controller works."""
         return self.controller is not None and self.controller.law != "unknown"
 
     @property

@@ -76,7 +76,7 @@ def heard(end: socket.socket, deadline: float, longest: int, path: Path) -> byte
         if size < 0 and len(text) >= LENGTH.size:
             size = LENGTH.size + LENGTH.unpack_from(text)[0]
         if size > LENGTH.size + longest:
-            raise InputRejected("X05", f"what it says of itself is longer than {longest / 1e6:.0f} MB", where=path,
+            raise InputRejected("X05", f"its description is longer than {longest / 1e6:.0f} MB", where=path,
                                 remedy="keep samples in signals, and texts short")
     return bytes(text[LENGTH.size:])
 
@@ -154,7 +154,7 @@ def _copied(store: int, place: list[int]) -> Array:
     while view:
         got = os.preadv(store, [view], offset)
         if not got:
-            raise ValueError("fewer samples than were told")
+            raise ValueError("fewer samples than were announced")
         offset, view = offset + got, view[got:]
     values.flags.writeable = False
     return values

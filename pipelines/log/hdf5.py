@@ -206,7 +206,7 @@ def _robot_text(file: Any, where: str) -> str:
                             remedy="a log explains itself: write /robot")
     dataset = file["robot"]
     if dataset.shape != () or h5py.check_string_dtype(dataset.dtype) is None or foreign_storage(dataset):
-        raise InputRejected("S20", "/robot is not a scalar text", where=where, remedy="write the robot's TOML as one text")
+        raise InputRejected("S20", "/robot is not a scalar text", where=where, remedy="write the robot's TOML as a single text")
     return str(dataset.asstr()[()])
 
 

@@ -32,7 +32,7 @@ class WrongKind(ValueError):
 
 
 def printable(value: str) -> bool:
-    """Whether both containers can carry `value`: UTF-8 has no lone surrogates, and a C text ends at its first NUL."""
+    """Return whether both containers can carry `value`: UTF-8 has no lone surrogates, and a C text ends at its first NUL."""
     try:
         value.encode("utf-8")
     except UnicodeEncodeError:

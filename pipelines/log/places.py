@@ -125,7 +125,7 @@ def _members(folder: Path, above: str = "") -> Iterator[str]:
 
 
 def holds_apart(folder: Path, command: str) -> bool:
-    """Whether `folder` holds nothing but outputs of `command`, one beside the other: of several robots or days."""
+    """Return whether `folder` holds nothing but outputs of `command`, one beside the other: of several robots or days."""
     if folder.is_symlink() or not folder.is_dir():
         return False
     there = list(islice(folder.iterdir(), _MOST_APART))

@@ -19,12 +19,12 @@ __all__ = ["fitted", "name_in", "numbers_of", "residuals", "robot_of"]
 _RESIDUALS: Final = {"torque_rms": ("torque rms", "N m"), "residual_rms": ("nominal model residual rms", "N m"),
                      "after_rms": ("extended model residual rms", "N m"), "relative_error": ("relative error", "1"),
                      "reconstruction_error_max": ("reconstruction error max", "rad")}
-_SAID_BEFORE: Final = {"after_rms": "floor"}  # it is no model's, and stands with the nominal one already
+_SAID_BEFORE: Final = {"after_rms": "noise_floor"}  # it is no model's, and stands with the nominal one already
 _SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
 # Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
 _NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
 _SILENT: Final = ("parameters", "result", "torque")
-_PASSED_OVER: Final = ("balance", "comparison", "ladder", "rejected", "detection_limits", "courses")
+_PASSED_OVER: Final = ("balance", "comparison", "candidate_laws", "rejected", "detection_limits", "courses")
 _PICTURES: Final = "previews"  # whose units are of position and torque, not of joints
 _A_MODEL: Final = "model"  # whose "robot" is a whole description
 _MOST = 400  # figures of one item
@@ -140,7 +140,7 @@ def _leaves(value: Any, words: tuple[str, ...] = (), joint: int = 0, but: str | 
     elif isinstance(value, Mapping):
         for key, item in value.items():
             if key != but:
-                yield from _leaves(item, (*words, key), joint)
+                yield from _leaves(item, (*words, key.replace("_", " ")), joint)
     elif isinstance(value, list):
         for index, item in enumerate(value, 1):
             yield from _leaves(item, (*words, f"joint {index}"), index)

@@ -15,7 +15,7 @@ from typing import Any, Final
 __all__ = ["Place", "less_findings", "modelled"]
 
 Place = tuple[str, str, int | None]  # the part of a run with several robots or days, else ""; cause; joint, from 1
-_FINDINGS: Final = ("findings", "standing")
+_FINDINGS: Final = ("findings", "baseline_effects")
 
 
 def modelled(result: Mapping[str, Any], part: str = "") -> frozenset[Place]:
@@ -39,7 +39,7 @@ def _held(result: Mapping[str, Any], part: str) -> Iterator[Place]:
 
 
 def less_findings(result: Mapping[str, Any], held: Container[Place], part: str = "") -> dict[str, Any]:
-    """`result` without the findings, and what stands, that are `held`."""
+    """`result` without the findings, and baseline effects, that are `held`."""
     less = dict(result)
     for kind in _FINDINGS:
         if isinstance(less.get(kind), list):

@@ -15,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from pipelines.log.field_words import words_of
+from pipelines.log.results import SCHEMA_VERSION
 
 __all__ = ["DRAFT", "result_schema"]
 
@@ -33,8 +34,10 @@ def result_schema(kind: type[Any], command: str) -> dict[str, Any]:
     """The schema of the result.json of `command`, whose result is a `kind`."""
     defs: _Defs = {"numbers": _ARRAY, "series": _SERIES}
     whole = _object(kind, defs)
-    whole["properties"] = {"command": {"const": command, "description": "the command that has left this"}} | whole["properties"]
-    whole["required"] = ["command", *whole["required"]]
+    heading = {"command": {"const": command, "description": "the command that has left this"},
+               "schema_version": {"const": SCHEMA_VERSION, "description": "version of the names in this file"}}
+    whole["properties"] = heading | whole["properties"]
+    whole["required"] = [*heading, *whole["required"]]
     title = f"result.json of rrrid {command}"
     return {"$schema": DRAFT, "title": title, **whole, "$defs": {name: defs[name] for name in sorted(defs)}}
 

@@ -26,11 +26,12 @@ from pipelines.errors import InputRejected
 from pipelines.log.chunks import store
 from pipelines.log.experiment import Array
 
-__all__ = ["FLAT", "NOT_STORED", "decode", "encode", "json_text", "read_foreign_series", "read_series", "stored_result",
-           "write_series"]
+__all__ = ["FLAT", "NOT_STORED", "SCHEMA_VERSION", "decode", "encode", "headed", "json_text", "read_foreign_series", "read_series",
+           "refuse_earlier", "stored_result", "write_series"]
 
 NOT_STORED: Final[Mapping[str, object]] = {"stored": False}
 FLAT: Final[Mapping[str, object]] = {"flat": True}
+SCHEMA_VERSION: Final = 2  # of result.json
 _INLINE = 64
 _CHUNK = 65536  # numbers
 _SERIES = "$series"
@@ -51,8 +52,28 @@ def json_text(value: Any) -> str:
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
+def headed(command: str, object_: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the object of a result.json: the command and the version of the schema before what was found."""
+    return {"command": command, "schema_version": SCHEMA_VERSION, **object_}
+
+
+def refuse_earlier(object_: Mapping[str, Any], file: Path) -> None:
+    """Refuse a result.json of an earlier schema, whose names have other meanings.
+
+    Raises:
+        InputRejected: F17.
+    """
+    version = object_.get("schema_version", 1)
+    if not isinstance(version, int) or version < SCHEMA_VERSION:
+        raise InputRejected("F17", "written by an earlier rrrid", where=file, remedy="run the command again")
+
+
 def stored_result(path: Path, command: str) -> Mapping[str, Any] | None:
-    """The object of the result.json of `command`, named itself or in the folder named; None where there is none."""
+    """The object of the result.json of `command`, named itself or in the folder named; None where there is none.
+
+    Raises:
+        InputRejected: F17, it was written by an earlier rrrid.
+    """
     file = path / "result.json" if path.is_dir() else path
     if file.name != "result.json" or not file.is_file():
         return None
@@ -60,7 +81,10 @@ def stored_result(path: Path, command: str) -> Mapping[str, Any] | None:
         found = json.loads(file.read_text(encoding="utf-8"))
     except ValueError:
         return None
-    return found if isinstance(found, dict) and found.get("command") == command else None
+    if not isinstance(found, dict) or found.get("command") != command:
+        return None
+    refuse_earlier(found, file)
+    return found
 
 
 def _encode(value: Any, path: str, series: dict[str, Array]) -> Any:

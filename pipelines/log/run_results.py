@@ -33,7 +33,9 @@ def _within(run: Path, path: Path) -> StoredResult | None:
     """Of a result that can be read: what somebody else left beside a folder that is not there is none of its faults."""
     try:
         return _stage_of(read_result(run), path)
-    except InputRejected:
+    except InputRejected as problem:
+        if problem.code == "RRID-F17":
+            raise
         return None
 
 

@@ -120,7 +120,7 @@ def _patiently(work: Callable[[], A]) -> A:
 
 
 def _second() -> bool:
-    """Whether another process may be made: not among the workers of a batch, which have every processor already."""
+    """Return whether another process may be made: not among the workers of a batch, which have every processor already."""
     alone = multiprocessing.parent_process() is None and threading.current_thread() is threading.main_thread()
     return alone and not _COPY.is_set() and processors() > 1
 
@@ -162,7 +162,7 @@ class _Other:
 
     @property
     def ready(self) -> bool:
-        """Whether its answer is there, or none will come."""
+        """Return whether its answer is there, or none will come."""
         return self._ours.poll()
 
     def answer(self) -> Any:
@@ -189,7 +189,7 @@ class _Other:
 
 
 def _is_there(process: int) -> bool:
-    """Whether it has not ended yet; of one that has nothing is left."""
+    """Return whether it has not ended yet; of one that has nothing is left."""
     try:
         return os.waitpid(process, os.WNOHANG) == (0, 0)
     except ChildProcessError:  # somebody else has waited for it

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.files import PROVENANCE, hash_file, regular_file
+from pipelines.log.results import refuse_earlier
 from pipelines.log.text import read_small_text
 
 __all__ = ["StoredResult", "listed_outputs", "read_result"]
@@ -42,7 +43,8 @@ def read_result(path: Path) -> StoredResult:
 
     Raises:
         UsageError: C04, there is none.
-        InputRejected: F05, it is not what provenance.json says; F02, it is damaged; S19, it is no result of rrrid.
+        InputRejected: F05, it is not what provenance.json says; F02, it is damaged; S19, it is no result of rrrid; F17, of an
+            earlier one.
     """
     file = path / "result.json" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
@@ -60,6 +62,7 @@ def read_result(path: Path) -> StoredResult:
         return StoredResult(file, "model", object_)
     if not isinstance(object_, dict) or not isinstance(object_.get("command"), str):
         raise InputRejected("S19", "not a result of rrrid", where=file, remedy="name a result.json, or the folder it is in")
+    refuse_earlier(object_, file)
     return StoredResult(file, object_["command"], object_)
 
 

@@ -149,7 +149,7 @@ def _in_si(log: ExperimentLog, name: str, signal: Signal, law: str | None, assum
     unit = to_si(signal.units, quantity, where=where)
     if not unit.is_si:
         checks.append(Check.of("S06", "warn", f"declared in {signal.units}, converted to {wanted}", where=where,
-                               remedy="store SI units, if the conversion should not stand in every result"))
+                               remedy="store SI units, if results should not list the conversion"))
     return replace(signal, values=unit.factor * signal.values + unit.offset, units=wanted)
 
 

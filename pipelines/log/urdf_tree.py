@@ -62,7 +62,7 @@ class TreeJoint:
 
     @property
     def independent(self) -> bool:
-        """Whether its one coordinate is its own."""
+        """Return whether its one coordinate is its own."""
         return self.type in _MOVING and not self.mimics
 
 

@@ -47,7 +47,7 @@ class Likeness:
 
     @property
     def sure(self) -> bool:
-        """Whether it is the command, but for scale and time."""
+        """Return whether it is the command, but for scale and time."""
         return self.left <= _LEFT and self.before >= _BETTER * self.left
 
 
@@ -114,7 +114,7 @@ def _said(s: Subject, j: int, like: Likeness, wanted: Array, every: bool) -> Che
 
 
 def _stamped(s: Subject, j: int, like: Likeness, wanted: Array) -> bool:
-    """Whether a torque is the commanded one at another time, and not smoothed by what it was logged through."""
+    """Return whether a torque is the commanded one at another time, and not smoothed by what it was logged through."""
     if abs(like.late) <= _SAMPLES or abs(like.late) * s.log.sample_time < _LATE or like.left > _LEFT_LATE:
         return False
     lags = [_smoothed_left(s.log.tau[:len(wanted), j], wanted, factor * like.late) for factor in _LAGS] if like.late > 0 else []

@@ -254,7 +254,7 @@ def _unlike(alike: Repeats, found: Periods, least: Array, joints: int) -> str:
     beyond = drift - np.maximum(_DRIFT, _SURE * alike.order_std)
     worst = int(np.argmax(beyond))
     what, joint = ("motion", "torque")[worst // joints], worst % joints + 1
-    return f"the {what} of joint {joint} drifts from the first period to the last" if beyond[worst] > 0.0 else ""
+    return f"the {what} of joint {joint} drifts over the periods" if beyond[worst] > 0.0 else ""
 
 
 def _between_copies(log: ExperimentLog, found: Reconstructed, folded: _Folded) -> tuple[ExperimentLog, Reconstructed]:

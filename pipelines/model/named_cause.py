@@ -19,7 +19,7 @@ from pipelines.model.effects.base import Effect, Quantity
 __all__ = ["acting_cause", "refuse_unknown", "wanted_cause"]
 
 
-_LISTED_BY = {"--with": "extend", "--without": "diagnose", "--tell-apart": "design-excitation"}  # whose option it is
+_LISTED_BY = {"--with": "extend", "--exclude": "diagnose", "--discriminate": "design-excitation"}  # whose option it is
 
 
 def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault", command: str = "simulate") -> Acting:
@@ -59,14 +59,14 @@ def wanted_cause(text: str, revolute: Sequence[bool], where: str = "--with") -> 
     given = [part.partition("=")[0].strip() for part in numbers.split(",") if part.strip()]
     shapes = [q.name for q in kind.parameters if q.shape and not q.derived]
     if linear := [one for one in given if one not in shapes]:
-        raise UsageError("C02", f"'{text}': {', '.join(linear)} is fitted, whatever it is said to be", where=where,
+        raise UsageError("C02", f"'{text}': {', '.join(linear)} is fitted and takes no value", where=where,
                          remedy=f"a start can be given to {', '.join(shapes)}" if shapes else f"write {text.split(':')[0]}"
                                 f"{'' if joint is None else f':{joint}'}")
     return effect, {one: values[one] for one in given}
 
 
 def refuse_unknown(text: str, where: str, command: str = "extend") -> None:
-    """Whether `text` begins with the name of a cause.
+    """Return whether `text` begins with the name of a cause.
 
     Raises:
         UsageError: C01, it does not; with the nearest names, and where all of them stand.

@@ -143,7 +143,7 @@ def _signs(e: Evidence) -> list[Check]:
 
 
 def _negative(e: Evidence, joint: int) -> bool:
-    """Whether this row alone needs inertia or friction to be negative, and the other does not speak against it.
+    """Return whether this row alone needs inertia or friction to be negative, and the other does not speak against it.
 
     Needs: without it the residual would be twice as large. Forcing d·x = 0 on least squares adds (d·x)² / var(d·x) · s² to
     the squared residual. Significance alone would not do: with torques this precise, a slip of the smoothing is

@@ -93,7 +93,7 @@ class Observers:
 
     @property
     def twice(self) -> bool:
-        """Whether the smoother goes over what it left: where its jerk is found, not asked for."""
+        """Return whether the smoother goes over what it left: where its jerk is found, not asked for."""
         return self.smoothing is not self.causal
 
 

@@ -64,11 +64,11 @@ class Store:
 
     Args:
         out: the run's output folder, whose last outcome is looked at.
-        fresh: take nothing back.
+        no_cache: use nothing that is stored.
     """
 
-    def __init__(self, out: Path, fresh: bool = False) -> None:
-        self.out, self.fresh = out, fresh
+    def __init__(self, out: Path, no_cache: bool = False) -> None:
+        self.out, self.no_cache = out, no_cache
         self.unfinished = out.absolute().parent / f".rrrid-unfinished-{slug(out.absolute().name)}"
         self._lock: int | None = None
 
@@ -78,7 +78,7 @@ class Store:
         Args:
             dry: only look, take no lock.
         """
-        if self.fresh:
+        if self.no_cache:
             return Missed("everything is asked to be computed anew")
         if not dry and self.unfinished.is_dir():
             self._own()

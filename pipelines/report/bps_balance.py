@@ -41,7 +41,7 @@ def balance_words(result: Result) -> tuple[str, ...]:
 
 
 def _nothing_else(balance: Balance) -> bool:
-    """Whether parameters and delay agree, and the motion's own contradiction alone stands against it."""
+    """Return whether parameters and delay agree, and the motion's own contradiction alone stands against it."""
     return balance.closure > CLOSED and max(balance.apart) < ALONE and balance.deviate < TOGETHER and (
         abs(balance.delay) < ALONE * balance.delay_std)
 

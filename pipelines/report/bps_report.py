@@ -148,7 +148,7 @@ def _noise_section(result: Result) -> Section:
     text, rows = [], []
     for log in result.noise_floor:
         text.append(_periods_of(log))
-        rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.floor[j],
+        rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.noise_floor[j],
                   log.residual[j], log.ratio[j]) for j, name in enumerate(result.joints)]
     unit, position = _torque_unit(result), " or ".join(dict.fromkeys("m" if own == "N" else "rad" for own in result.torque_units))
     columns = ("log", "joint", f"position, one sample [{position}]", f"torque, one sample [{unit}]",
@@ -211,7 +211,7 @@ def _rotor_words(result: Result) -> tuple[str, ...]:
     """Where the inertia of a rotor has gone that has no row of its own beside others that have one."""
     own = {int(p.name.split(":")[1]) for p in result.parameters if p.name.startswith("rotor_inertia:")}
     rest = [str(j) for j in range(1, len(result.joints) + 1) if own and j not in own]
-    return (f"The rotor inertia of joint {', '.join(rest)} cannot be told from that of the links: it is contained in their "
+    return (f"The rotor inertia of joint {', '.join(rest)} cannot be separated from that of the links: it is contained in their "
             "parameters, and not in the described values.",) if rest else ()
 
 
@@ -224,7 +224,7 @@ def _course_section(result: Result) -> Section:
                    "relative [%]"), rows, "Root mean squares, after the low-pass.")
     passed = "" if result.filter_hz is None else f", all after the low-pass of {result.filter_hz:.3g} Hz"
     figures = [torque_figure(f"torque-{c.name}", f"{c.name} ({c.role}): measured torque, the model's, its friction, "
-                                                 f"and what is left{passed}.",
+                                                 f"and the residual{passed}.",
                              c.t, c.measured, c.model, c.friction, c.left, result.joints, unit) for c in result.courses]
     worst = ", ".join(f"{name} ({format_number(left['validate'][result.joints.index(name)], 2)} "
                       f"{result.torque_units[result.joints.index(name)]} rms)" for name, _ in _worst_joints(result))
@@ -269,7 +269,7 @@ def _settling(result: Result) -> tuple[float, str]:
 
 
 def _settling_words(result: Result) -> tuple[str, ...]:
-    """Whether the second half of the samples moved the estimates more than noise does."""
+    """Return whether the second half of the samples moved the estimates more than noise does."""
     moved, most = _settling(result)
     if not moved > 0.0:
         return ()
@@ -279,7 +279,7 @@ def _settling_words(result: Result) -> tuple[str, ...]:
 
 
 def _winner(comparison: tuple[Compared, ...]) -> str:
-    """Whether another way explains measurably better what was held out, and by how much."""
+    """Return whether another way explains measurably better what was held out, and by how much."""
     ranked = sorted((c for c in comparison if c.value), key=lambda c: c.validate)
     if len(ranked) < 2:
         return "Only one way gives an estimate." if ranked else "No way gives an estimate."

@@ -38,7 +38,7 @@ def column_texts(cells: Sequence[Cell], words: Callable[[str], str] = printable)
 
 
 def are_numbers(texts: Sequence[str]) -> bool:
-    """Whether a column is one of numbers, with or without a deviation, a power of ten, a percent sign."""
+    """Return whether a column is one of numbers, with or without a deviation, a power of ten, a percent sign."""
     return any(texts) and all(_NUMBER.fullmatch(text) for text in texts)
 
 

@@ -22,7 +22,7 @@ _SHOWN = 40  # lines of a table or a figure
 _VERDICTS = {"no-fault-found": "nothing wrong", "cause": "a cause is named", "unknown": "something wrong without a name",
              "cannot-judge": "cannot be judged"}
 _CIRCLE = "A phase or a direction is the same again after a whole turn: it is away by the shorter way around."
-_MODELS = "The nominal model is the one before any extension; the extended model has what was found, and what stands, as well."
+_MODELS = "The nominal model is the one before any extension; the extended model has the findings and the baseline effects as well."
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ def comparison_report(result: Comparison) -> Report:
 def _verdict(result: Comparison) -> str:
     a, b = result.names
     if result.same:
-        return f"{a} and {b} are the same result, to the last digit: there is nothing to compare."
+        return f"{a} and {b} are the same result, digit by digit: there is nothing to compare."
     one, other = result.robots
     two = bool(one and other and one != other)
     apart = f"They are of two robots, {one} and {other}: a difference is no change of one machine." if two else ""
@@ -111,7 +111,7 @@ def _verdict(result: Comparison) -> str:
     told = [f"{one.what} ({_spoken(one.a)} in {a}, {_spoken(one.b)} in {b})" for one in result.answers
             if one.differs and not _said_by(one, result)]
     if told:
-        words.append(f"what they say differs: {'; '.join(told[:2])}")
+        words.append(f"their conclusions differ: {'; '.join(told[:2])}")
     rest = "; ".join(words)
     return " ".join(filter(None, (f"{a} and {b} differ.", apart, *has, f"{rest[:1].upper()}{rest[1:]}." if rest else "")))
 
@@ -124,7 +124,7 @@ def _in_words(effects: Sequence[str]) -> str:
 
 
 def _said_by(one: Answer, result: Comparison) -> bool:
-    """Whether two lists of findings differ by nothing but the effects that only one was fitted with."""
+    """Return whether two lists of findings differ by nothing but the effects that only one was fitted with."""
     apart = set(one.a.split(", ")) ^ set(one.b.split(", "))
     return apart - {"none"} <= {*result.effects_a, *result.effects_b}
 
@@ -148,7 +148,7 @@ def _answers(result: Comparison) -> Section | None:
         return None
     rows = tuple((one.what, _spoken(one.a), _spoken(one.b)) for one in result.answers)
     tones: tuple[Tone, ...] = tuple("attention" if one.differs else "neutral" for one in result.answers)
-    return Section("What they say", (), (Table(("what", *_heads(result)), rows, tones=tones),))
+    return Section("Conclusions", (), (Table(("what", *_heads(result)), rows, tones=tones),))
 
 
 def _heads(result: Comparison) -> tuple[str, str]:
@@ -169,7 +169,7 @@ def _figures(result: Comparison) -> Section | None:
             f"has changed, that happens to any of these {len(result.figures)} with a probability of "
             f"{format_number(100.0 * result.alpha, 2)} % at most; the errors of the two are taken to be independent, and the "
             "stated standard deviations to be right.", *((_CIRCLE,) if any(one.period for one in shown) else ()),
-            *((f"{more} more, all nearer, stand in result.json.",) if more > 0 else ()))
+            *((f"{more} more, all nearer, are in result.json.",) if more > 0 else ()))
     table = Table(("figure", *_heads(result), "unit", "away [std]", "verdict"), rows, "The farthest first.", tones)
     return Section("Figures", text, (table,), (_picture(result),))
 
@@ -202,7 +202,7 @@ def _residuals(result: Comparison) -> Section | None:
     more = len(result.residuals) - len(changed)
     text = ("No standard deviation is known of these, so that they are not judged.",
             *((_MODELS,) if any("extended model" in one.name for one in changed) else ()),
-            *((f"{more} more stand in result.json.",) if more > 0 else ()))
+            *((f"{more} more are in result.json.",) if more > 0 else ()))
     table = Table(("residual", *_heads(result), "unit", "change [%]"), rows, "The greatest change first.")
     return Section("Residuals", text, (table,))
 

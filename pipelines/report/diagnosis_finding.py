@@ -37,7 +37,7 @@ _TURNING = Units()
 _HIDDEN = 2.0  # times the share of the whole, from which the share at its own joint says something else
 
 
-def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool = True, floor: str = "the floor",
+def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool = True, floor: str = "the noise floor",
                     units: Units = _TURNING, beside: Sequence[Finding] = (), left: Array | None = None) -> Section:
     """What it is, what to check, what it is worth, and the figure that proves it.
 
@@ -50,8 +50,8 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     """
     kind = find_effect(one.cause)
     text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
-            f"{_share(one, nominal, floor)}; the refitted model could hide "
-            f"{format_number(100.0 * (1.0 - one.identifiability), 2)} % of it.{tip_worth(one.gain)}"]
+            f"{_share(one, nominal, floor)}; {format_number(100.0 * (1.0 - one.identifiability), 2)} % of it is confounded with "
+            f"model parameters.{tip_worth(one.gain)}"]
     if of_any_size(one):
         text.append("How large its torque is these logs do not tell: rigid body and friction can take in any amount of it, and the "
                     "size given below is one of many: fed forward, it holds on motion like that of these logs alone")
@@ -70,7 +70,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.alternatives)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
         pair = " ".join(cause_at(some.cause, some.joint) for some in (one, one.alternatives[0]))
-        text.append(f"Or let \"rrrid design-excitation LOG --tell-apart {pair}\" design the motion")
+        text.append(f"Or let \"rrrid design-excitation LOG --discriminate {pair}\" design the motion")
     return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
                    figures=(*answer_figures(number, one), *proof_figures(number, one, units)))
 
@@ -126,8 +126,8 @@ def _happens_once(one: Finding) -> bool:
 
 
 def _share(one: Finding, nominal: ResidualRms, floor: str) -> str:
-    """Of what all joints leave above the floor; and of its own joint, where a larger one beside it hides the share."""
-    whole = f"It explains {format_number(100.0 * one.explained, 3)} % of what stands above {floor}"
+    """Return its share of the residual above the floor of all joints; and of its own joint, where a larger one hides the share."""
+    whole = f"It accounts for {format_number(100.0 * one.explained, 3)} % of the residual above {floor}"
     own = _own_share(one, nominal)
     if len(nominal.identify) == 1 or not own > _HIDDEN * one.explained:
         return whole

@@ -30,7 +30,7 @@ _MENTIONED, _MENTIONED_ABOVE_NOISE = 1.3, 10.0
 
 def what_stays(found: Diagnosis) -> str:
     """Return the joints whose residual is still above the noise floor, in a sentence; or nothing."""
-    noise = found.floor_origin == "blocks"
+    noise = found.noise_floor_origin == "blocks"
     ratio = found.after_rms.validate / np.maximum(found.residual_rms.noise_floor, 1e-300)
     high = np.flatnonzero(ratio > (_MENTIONED_ABOVE_NOISE if noise else _MENTIONED)).tolist()
     if not high:
@@ -47,17 +47,17 @@ def what_stays(found: Diagnosis) -> str:
 
 def floor_name(found: Diagnosis) -> str:
     """Return the name of the noise floor, as a heading."""
-    return "noise of the residual" if found.floor_origin == "blocks" else "left by reference logs"
+    return "noise of the residual" if found.noise_floor_origin == "blocks" else "left by reference logs"
 
 
 def floor_words(found: Diagnosis) -> str:
     """Return where the noise floor comes from."""
-    if found.floor_origin == "blocks":
+    if found.noise_floor_origin == "blocks":
         return (
-            "The noise floor is what the final model leaves of the identification logs; there are "
+            "The noise floor is the residual of the final model on the identification logs; there are "
             "no reference logs to compare with."
         )
-    return "The noise floor is what the healthy model leaves of the reference logs."
+    return "The noise floor is the residual of the healthy model on the reference logs."
 
 
 def judge_words(held_out: str) -> str:

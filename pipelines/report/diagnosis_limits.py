@@ -12,14 +12,14 @@ from pipelines.report.style import format_number, format_unit
 
 __all__ = ["limits_sections"]
 
-_WAY = {"injected": "hidden", "analytic": "worked out"}  # how a detection limit was found
+_WAY = {"injected": "injection", "analytic": "analytic"}  # how a detection limit was found
 _AT = {  # what of a cause's shape a technician can use; the rest is the form of its law
     "order": "{size} waves {per}", "from_joint": "from joint {size}", "with_joint": "with joint {size}", "link": "of link {size}",
     "speed": "speed {size} {unit}", "distance": "travel {size} {unit}", "time_constant": "time constant {size} {unit}",
     "duration": "lasting {size} {unit}", "frequency": "{size} {unit}", "gap": "free play {size} {unit}",
     "limit": "at {size} {unit}"}
-_FOUND = ("With 95 %, had it been there; nothing smaller can be excluded. Hidden: put into these logs and found; worked out: by a "
-          "formula. Cannot be seen: nothing that is physically likely would show.")
+_FOUND = ("With 95 %, had it been there; nothing smaller can be excluded; by injection into these logs, or analytically. "
+          "Cannot be seen: nothing that is physically likely would show.")
 
 
 def limits_sections(result: Diagnosis) -> list[Section]:

@@ -39,7 +39,7 @@ def _section(found: Diagnosis, one: Evidence, rated: Sequence[float], number: in
 
 
 def _above(found: Diagnosis, one: Evidence, rated: Sequence[float], units: Units) -> Table:
-    joints, rows = len(one.above_floor), []
+    joints, rows = len(one.above_noise_floor), []
     torques = to_one_place([float(x) for one_rms in (found.residual_rms.identify, found.residual_rms.noise_floor) for x in one_rms])
     for j in range(joints):
         residual = float(found.residual_rms.identify[j])
@@ -47,7 +47,7 @@ def _above(found: Diagnosis, one: Evidence, rated: Sequence[float], units: Units
         low, high = one.band[j]
         band = f"{format_number(float(low), 2)} to {format_number(float(high), 2)}" if np.isfinite([low, high]).all() else None
         rows.append((j + 1, torques[j], three_digits(share), torques[joints + j],
-                     three_digits(100.0 * float(one.above_floor[j])), band))
+                     three_digits(100.0 * float(one.above_noise_floor[j])), band))
     columns = ("joint", f"residual, rms [{units.torque}]", "residual [% of rated]", f"floor [{units.torque}]",
                "power above the floor [%]", "mostly at [Hz]")
     return Table(columns, tuple(rows), "Of the nominal model, refitted to these logs.")
@@ -76,7 +76,7 @@ def _figures(one: Evidence, suffix: str, units: Units) -> list[Figure]:
                             f"{one.simulated_t[-1]:.0f} s.",
                             lambda drawing: _simulated(joint_axes(drawing, joints), one, units.thousandths), joint_size(joints)))
     for over, words in (("order", "Orders of the joint's angle, from those on "
-                         "that its range tells apart: a peak at k is a torque that repeats k times a turn."),
+                         "that its range resolves: a peak at k is a torque that repeats k times a turn."),
                         ("frequency", "Spectrum of the residual.")):
         spectra = [s for s in one.spectra if s.over == over]
         if spectra:

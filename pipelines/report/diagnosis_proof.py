@@ -46,9 +46,9 @@ def _shown(proof: Proof, torque: str) -> str:
     before, after = (float(np.sqrt(over(np.square(shown)))) for shown in (proof.before, proof.after))
     sizes = f"{format_number(before, 2)} {torque} rms without the finding, {format_number(after, 2)} {torque} with it"
     if after <= _LITTLE * before:
-        return f"{sizes}; what is left without it follows what it predicts"
+        return f"{sizes}; the residual without it follows what it predicts"
     if after <= _MUCH * before:
-        return f"{sizes}; part of what is left without it follows what it predicts"
+        return f"{sizes}; part of the residual without it follows what it predicts"
     alike = "like this" if _in_waves(proof) else "averaged like this"
     return f"{sizes}; {alike} most of it stays, and the gain in numbers has to prove it"
 

@@ -48,7 +48,7 @@ __all__ = ["diagnosis_report"]
 
 _LEDGER = 40  # lines
 _IN_RUN = "--set diagnose.model=FILE"
-_OUT_OF_REACH = "A threshold above 100 % is told as a dash: an arm in order leaves so much of it that such logs cannot show it."
+_OUT_OF_REACH = "A threshold above 100 % is shown as a dash: a healthy arm leaves so much of it that such logs cannot show it."
 _TONES: dict[str, Tone] = {"no-fault-found": "good", "cause": "bad", "unknown": "attention", "cannot-judge": "attention"}
 
 
@@ -103,7 +103,7 @@ def _said(result: Result) -> str:
     alone = whole is first.gain
     change = tip_change(whole) if not (alone and more) else ""  # of the first alone it says nothing of them all
     moved = f"; with {'it' if alone else 'them'} {change}" if change else ""
-    rest = f" Beside it, {without_keys(result.reason)}." if result.reason else ""
+    rest = f" In addition, {without_keys(result.reason)}." if result.reason else ""
     cause = f"{first.title}{how_much(first)}{where(first)}"
     return f"{changed}{cause}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
 
@@ -150,18 +150,18 @@ def _hundredths(x: float) -> float | None:
 def _unknown(result: Result) -> list[Section]:
     if result.verdict != "unknown":
         return []
-    near = sorted(_nearest(result.ledger).items(), key=lambda one: -one[1])[:5]
+    near = sorted(_nearest(result.candidate_causes).items(), key=lambda one: -one[1])[:5]
     names = ", ".join(f"{named(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
-    tried = f" The nearest explanations, none of which is named: {names}." if near else ""
+    tried = f" The nearest explanations, not named: {names}." if near else ""
     return [Section("Why there is no name", (
         as_sentence(without_keys(result.reason)) + tried, *_follows(result),
-        "A wrong name costs more than none. What follows shows where and when the residual stands above its floor."))]
+        "A wrong name costs more than none. The residual analysis shows where and when the residual exceeds the noise floor."))]
 
 
 def _follows(result: Result) -> Iterator[str]:
     """Which signals the joint that is farthest above its floor goes with most."""
     for one in result.evidence[:1]:
-        joint = int(np.argmax(np.nan_to_num(one.above_floor))) + 1
+        joint = int(np.argmax(np.nan_to_num(one.above_noise_floor))) + 1
         curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:3]
         if curves:
             said = ", ".join(f"{c.against} ({format_number(100.0 * c.explained, 2)} % of its power)" for c in curves)
@@ -183,7 +183,7 @@ def _standing(result: Result) -> list[Section]:
         return []
     rows = tuple((title_of(one.cause), one.joint, told_values(in_order(one.cause, one.parameters)),
                   three_digits(100.0 * one.explained)) for one in result.baseline_effects)
-    return [Section("What the reference logs show as well", ("It is part of this robot and no news; the extended model has it.",),
+    return [Section("Baseline effects", ("The reference logs show them as well; the extended model has them.",),
                     (Table(("effect", "joint", "parameters", "explains [%]"), rows),))]
 
 
@@ -192,23 +192,23 @@ def _others(result: Result) -> list[Section]:
     sections = []
     if result.rejected:
         sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("causes", "why"), _folded(result.rejected)),)))
-    shown = [t for t in result.ledger if t.accepted or math.isfinite(t.exact_gain)]
-    shown += [t for t in sorted(result.ledger, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
+    shown = [t for t in result.candidate_causes if t.accepted or math.isfinite(t.exact_gain)]
+    shown += [t for t in sorted(result.candidate_causes, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
         rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _reachable(t.threshold),
                       _hundredths(100.0 * t.exact_gain), _hundredths(t.identifiability),
                       _outcome(t, result))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
-        more = len(result.ledger) - len(rows)
-        text = (f"{more} more, all weaker, stand in result.json.",) if more > 0 else ()
-        sections.append(Section("Ledger of hypotheses", text, (Table(
+        more = len(result.candidate_causes) - len(rows)
+        text = (f"{more} more, all weaker, are in result.json.",) if more > 0 else ()
+        sections.append(Section("Candidate causes", text, (Table(
             ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]",
              "identifiability",
              "outcome"), rows,
             "Gain in square: share of the squared residual of the fitted logs that each takes away; what does not exceed its "
-            f"threshold is not believed, nor what time held out does not bear out. {_OUT_OF_REACH} "
-            "So is that of a cause that takes next to nothing: none was worked out."
+            f"threshold is not accepted, nor what held-out time does not confirm. {_OUT_OF_REACH} "
+            "So is that of a cause that takes next to nothing: none was computed."
             f"{_alike(len(result.residual_rms.identify))}", tones),)))
     return sections
 
@@ -218,16 +218,16 @@ def _outcome(trial: Trial, result: Result) -> str:
     if not trial.accepted:
         return without_keys(trial.reason)
     named = any((one.cause, one.joint) == (trial.cause, trial.joint) for one in result.findings)
-    return "accepted" if named else "taken up by the search, not named"
+    return "accepted" if named else "fitted by the search, not named"
 
 
 def _refused(rejected: Sequence[Rejected]) -> str:
     """How close they came: most were not even tried, for others took more off the residual."""
     weaker = sum(one.reason == WEAKER for one in rejected)
     if not weaker:
-        return "They came close, and are not believed."
+        return "They came close, and were not accepted."
     more = len(rejected) - weaker
-    rest = f" The other {more if more > 1 else 'one'} came close, and {'are' if more > 1 else 'is'} not believed." if more else ""
+    rest = f" The other {more if more > 1 else 'one'} came close, and {'were' if more > 1 else 'was'} not accepted." if more else ""
     which = "Each of these" if not more else f"{weaker} of these are {WEAKER}: each" if weaker > 1 else f"One is {WEAKER}: it"
     return (f"{which} takes more than its threshold off the residual in some search, but others take more and were tried "
             f"instead.{rest}")
@@ -263,4 +263,4 @@ def _basis(result: Result) -> Section:
 
 def _doctor(result: Result) -> Iterable[Section]:
     if result.data_quality:
-        yield Section("What the log doctor remarks", (), (checks_table(result.data_quality),))
+        yield Section("Data quality", (), (checks_table(result.data_quality),))

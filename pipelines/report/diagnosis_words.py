@@ -26,7 +26,7 @@ def cause_at(cause: str, joint: int | None) -> str:
 
 
 def is_cause(name: str) -> bool:
-    """Whether it is something that may be wrong, and no law of friction that every nominal model may have."""
+    """Return whether it is something that may be wrong, and no law of friction that every nominal model may have."""
     return name in effect_names() and find_effect(name).evidence != "none"
 
 

@@ -12,7 +12,7 @@ __all__ = ["alike_words", "apart_section", "are_rivals"]
 
 
 def are_rivals(found: Apart | None) -> bool:
-    """Whether the design leaves two causes so alike that a diagnosis of its log would call them alternatives."""
+    """Return whether the design leaves two causes so alike that a diagnosis of its log would call them alternatives."""
     return found is not None and found.after.similarity > RIVALS
 
 

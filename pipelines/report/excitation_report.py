@@ -224,7 +224,7 @@ def _certificate(result: Result) -> Section | None:
         "element of p7. So M₈₈ + M₉₉ ≥ 2 M₇₇ + Z.",
         "Every diagonal element is at least λ, so M₇₇ ≥ λ, and with Z ≥ λ the sum is at least 3 λ. The larger of the two is at "
         "least 1.5 λ, and so is the largest eigenvalue. The condition number of Φ is the root of their ratio.",
-        "The argument holds for any motion whatever, periodic or not, and with further columns as well, for these only widen "
+        "The argument holds for any motion, periodic or not, and with further columns as well, for these only widen "
         "the range of the eigenvalues."))
 
 

@@ -12,7 +12,7 @@ _MUCH = 0.01  # of its size: that belongs into the verdict
 
 
 def much_smaller(result: Result) -> bool:
-    """Whether it was made smaller by more than a limit between two samples asks for."""
+    """Return whether it was made smaller by more than a limit between two samples asks for."""
     return result.shrunk < 1.0 - _MUCH
 
 

@@ -15,13 +15,13 @@ from pipelines.report.tip_words import tip_change
 __all__ = ["extension_report"]
 
 # Of a spring of 3 N m and an offset, a touch more among the causes moved it by 1, 25 and 3 parts in ten thousand, joint by joint.
-_NOW = ("Now: fitted without what it is extended by. \"rrrid diagnose\" may tell it slightly otherwise where its causes are not "
-        "just these, for what sampling does to the numbers is taken out as it shows beside all of them. ")
-_OF_BEFORE = ("Now: by the base parameters of before, without {0}, as \"rrrid diagnose\" tells it: fitted to these logs they take "
+_NOW = ("Now: fitted without what it is extended by. \"rrrid diagnose\" may give it slightly otherwise where its causes are not "
+        "just these, for what sampling does to the numbers is taken out as it shows with all causes. ")
+_OF_BEFORE = ("Now: by the base parameters of before, without {0}, as \"rrrid diagnose\" gives it: fitted to these logs they take "
               "it in, and leave less. ")
-_NOISE = ("noise of the residual", "Noise of the residual: what of it no model can explain, for it does not hang together in time. "
-          "An arm in order leaves more than that, for instance where it reverses: the report of \"rrrid diagnose\" on these logs "
-          "tells how much, and whether what the extended model leaves is in order.")
+_NOISE = ("noise of the residual", "Noise of the residual: the part of it that is white in time, which no model can explain. "
+          "A healthy arm leaves more than that, for instance where it reverses: the report of \"rrrid diagnose\" on these logs "
+          "says how much, and whether the residual of the extended model is normal.")
 
 
 def extension_report(result: Extension) -> Report:
@@ -38,7 +38,7 @@ def extension_report(result: Extension) -> Report:
                                    (Table(("cause", "joint", "why"), rows),)))
     sections.append(_basis(result, units))
     if result.data_quality:
-        sections.append(Section("What the log doctor remarks", (), (checks_table(result.data_quality),)))
+        sections.append(Section("Data quality", (), (checks_table(result.data_quality),)))
     return Report(f"Extension of {result.robot}" if result.robot else "Extension", _verdict(result), tone,
                   torque_errors(result.residual_rms, result.after_rms, result.rated, result.residual_rms.noise_floor, _NOISE[0],
                                 f"{_now(result)}{_NOISE[1]}", units),
@@ -77,7 +77,7 @@ def _basis(result: Extension, units: Units) -> Section:
     if result.baseline_effects:
         text.append(f"The reference logs show as well, and the model has: {', '.join(map(without_keys, result.baseline_effects))}.")
     if result.model is not None:
-        text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --like LOG\" "
+        text.append("model.json holds the extended model with everything refitted; \"rrrid simulate model.json --replay LOG\" "
                     "simulates it.")
     tables = (gain_table(result.gain, "Gain of all accepted causes together, on held-out time, root mean square.",
                          units),) \

@@ -31,7 +31,7 @@ def frf_report(responses: Sequence[Method], postures: Sequence[Posture], classif
         sections.append(_joint(joint, own, drawn))
     sections += [_rigid(postures), _beside(postures, by_posture), _recorded(postures, by_posture)]
     if doctor:
-        sections.append(Section("What the logs say of themselves", (), (checks_table(doctor),)))
+        sections.append(Section("Data quality", (), (checks_table(doctor),)))
     return Report("Frequency responses", _verdict(classification, undecided, doctor), _tone(classification, undecided, doctor),
                   _key_figures(classification), tuple(sections))
 
@@ -67,8 +67,8 @@ def _said(one: Classified) -> str:
     if one.kind == "delay":
         return f"Joint {one.joint} is measured {format_number(1e3 * one.parameters['delay'].value, 3)} ms late."
     if one.kind == "base":
-        return f"The base gives way at {_known(one.frequency)} Hz."
-    return f"Joint {one.joint} gives way at {_each(one)} Hz, its motor locked."
+        return f"Base resonance at {_known(one.frequency)} Hz."
+    return f"Compliance in joint {one.joint}: {_each(one)} Hz with its motor locked."
 
 
 def _each(one: Classified) -> str:
@@ -80,7 +80,7 @@ def _each(one: Classified) -> str:
 
 def _key_figures(sure: Sequence[Classified]) -> Table | None:
     rows = [(_where(one), _each(one), _known(one.damping), _numbers(one.parameters)) for one in sure if one.cause]
-    return Table(("what gives way", "frequency [Hz]", "damping ratio", "parameters"), tuple(rows)) if rows else None
+    return Table(("compliance", "frequency [Hz]", "damping ratio", "parameters"), tuple(rows)) if rows else None
 
 
 def _where(one: Classified) -> str:
@@ -111,10 +111,10 @@ def _grouping(sure: Sequence[Classified], unsure: Sequence[Undecided]) -> Sectio
                             tuple((one.joint, _known(one.frequency), " or ".join(c.replace("_", " ") for c in one.candidates),
                                    one.evidence, one.experiment) for one in unsure), "Not decided.",
                             tuple("attention" for _ in unsure)))
-    text = ("A base gives way at the same frequency in every posture, with a phase lead between its antiresonance and its "
+    text = ("A base resonance has the same frequency in every posture, with a phase lead between its antiresonance and its "
             "resonance. A spring in a joint has an antiresonance that moves with the inertia of the posture, and above its "
             "resonance the motor alone is moved. A delay turns the phase and leaves the magnitude.",)
-    return Section("What gives way", text, tuple(tables))
+    return Section("Compliance", text, tuple(tables))
 
 
 def _modes(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method]]) -> Section:

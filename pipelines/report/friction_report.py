@@ -30,7 +30,7 @@ def friction_report(result: Result) -> Report:
     """The verdict first; then every joint's law, figures and ladder."""
     sections = [_summary(result), *(section for joint in result.joints for section in _joint_sections(joint))]
     if result.checks:
-        sections.append(Section("What the logs say of themselves", (), (checks_table(result.checks),)))
+        sections.append(Section("Data quality", (), (checks_table(result.checks),)))
     return Report("Friction", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
 
 
@@ -239,7 +239,7 @@ def _simulation_words(joint: JointResult) -> tuple[str, ...]:
 
 def _ladder_words(joint: JointResult) -> tuple[str, ...]:
     judge = "held-out logs" if joint.judged_by == "logs" else "held-out blocks of the fitted logs"
-    if len(joint.ladder) == 1:
+    if len(joint.candidate_laws) == 1:
         return ("The law was given.",)
     return (f"Every law was fitted on one part and judged on {judge}; the simplest that is not measurably worse than the best was "
             "taken.", *_why_not_plainer(joint))
@@ -247,12 +247,12 @@ def _ladder_words(joint: JointResult) -> tuple[str, ...]:
 
 def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
     """What the best law with fewer numbers leaves more of what was held out."""
-    chosen = next(rung for rung in joint.ladder if rung.chosen)
-    plainer = [rung for rung in joint.ladder if rung.size < chosen.size and not rung.reason]
-    if not plainer or min(rung.validate_rms for rung in joint.ladder) <= 0.0:
+    chosen = next(rung for rung in joint.candidate_laws if rung.chosen)
+    plainer = [rung for rung in joint.candidate_laws if rung.size < chosen.size and not rung.reason]
+    if not plainer or min(rung.validate_rms for rung in joint.candidate_laws) <= 0.0:
         return ()
     plain = min(plainer, key=lambda rung: rung.validate_rms)
-    best = min([rung for rung in joint.ladder if not rung.reason] or [chosen], key=lambda rung: rung.validate_rms)
+    best = min([rung for rung in joint.candidate_laws if not rung.reason] or [chosen], key=lambda rung: rung.validate_rms)
     more = format_number(100.0 * (plain.validate_rms / best.validate_rms - 1.0), 2)  # than the best: what chance was asked of
     than = "" if best is chosen else f" than {_plain(best.law)}, the best of all"
     return (f"{_capital(_plain(chosen.law))}, with {chosen.size} numbers, and not {_plain(plain.law)}, the best law with fewer "
@@ -271,9 +271,9 @@ def _plain_reason(reason: str) -> str:
 def _ladder(joint: JointResult) -> Table:
     rows = []
     tones: list[Tone] = []
-    for rung in joint.ladder:
+    for rung in joint.candidate_laws:
         verdict = "chosen" if rung.chosen else _plain_reason(rung.reason) or ("not worse" if rung.alike else "worse")
         rows.append((_plain(rung.law), rung.size, 1e3 * rung.identify_rms, 1e3 * rung.validate_rms, verdict))
         tones.append("good" if rung.chosen else "neutral")
     return Table(("law", "numbers", "left, fitted [mN m]", "left, held out [mN m]", ""), tuple(rows),
-                 "Root mean square of what is left of mean torques over windows.", tuple(tones))
+                 "Root mean square of the residual of mean torques over windows.", tuple(tones))

@@ -39,8 +39,8 @@ def ripple_section(joint: JointResult) -> tuple[Section, ...]:
     figure = ripple_figure(f"ripple-{joint.joint}", f"{joint.name}: what friction and inertia leave, by the {place} of the joint: "
                            "the same forth and back, as no friction is.", ripple.along, joint.revolute)
     inertia = inertia_in_words(joint, ripple, _shown)
-    text = (f"{ripple_in_words(joint)} It explains {format_number(100.0 * ripple.share, 2)} % of what the law leaves of blocks "
-            f"that were held out (mean square).{inertia and f' {inertia}.'}", f"{NAMED[:1].upper()}{NAMED[1:]}.")
+    text = (f"{ripple_in_words(joint)} It explains {format_number(100.0 * ripple.share, 2)} % of the law's residual on held-out "
+            f"blocks (mean square).{inertia and f' {inertia}.'}", f"{NAMED[:1].upper()}{NAMED[1:]}.")
     return (Section(f"{joint.name}: a torque of the {place}", text, (), (figure,)),)
 
 

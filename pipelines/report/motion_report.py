@@ -39,7 +39,7 @@ def motion_report(logs: Sequence[LogResult]) -> Report:
     tone: Tone = "attention" if far or doubtful else "good" if known else "neutral"
     sections = [_explanation(logs), *(_log_section(log, log.series, i) for i, log in enumerate(logs) if log.series is not None)]
     if more := [log.name for log in logs if log.series is None]:
-        sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
+        sections.append(Section("Further logs", (f"Their figures are in result.json alone: {', '.join(more[:40])}.",)))
     verdict = " ".join(f"{words[0].upper()}{words[1:]}." for words in said)
     return Report("Reconstructed motion", verdict, tone, _key_figures(logs), tuple(sections))
 
@@ -152,7 +152,7 @@ def _log_section(log: LogResult, series: Series, number: int) -> Section:
         without += [f"the first {floor.settling_time:.2g} s, in which the motion settled"] if floor.settling_time else []
         left_out = f" (left out: {'; '.join(without)})" if without else ""
         mean = ("The motion in the derived log is that of every sample; an estimate takes its equations from the mean of the "
-                "periods, whose deviations stand in the table as well." if log.mean is not None else
+                "periods, whose deviations are in the table as well." if log.mean is not None else
                 f"They are not averaged: {floor.unlike}." if floor.unlike else "They are not averaged, as asked for.")
         compared = f"{floor.periods} periods were compared: their scatter is the noise floor in the table{left_out}. "
         text.append(f"{compared if floor.periods else ''}{mean}"

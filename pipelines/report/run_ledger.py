@@ -102,7 +102,7 @@ def _before(one: Finding) -> tuple[float, ...]:
 
 
 def _alike(x: tuple[float, ...], y: tuple[float, ...]) -> bool:
-    """Whether two lines show the same figures."""
+    """Return whether two lines show the same figures."""
     return bool(np.allclose(x, y, rtol=_SAME))
 
 
@@ -125,7 +125,7 @@ def _with(step: str, stage: str, gain: Gain) -> Line:
 
 
 def _whole(gain: Gain) -> bool:
-    """Whether the gain is one in torque: what is found by frequency responses alone need not have one."""
+    """Return whether the gain is one in torque: what is found by frequency responses alone need not have one."""
     return bool(np.isfinite(gain.validate_torque_rms.after).all() and np.isfinite(gain.validate_torque_rms.before).all())
 
 
@@ -145,10 +145,10 @@ def ledger_section(groups: Sequence[tuple[str, tuple[Line, ...]]]) -> Section | 
             tones.append("attention" if line.sure is False else "good" if line.sure else "neutral")
     heads = (*(("logs",) if several else ()), "step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain in rms [%]",
              "beyond chance", "simulated tip [mm]")
-    text = ("Torque error on what nothing was fitted to, root mean square, with each step of the model. A gain is the "
-            "share of that error, all joints together, that a step takes off the line it builds on. The ledger of hypotheses tells "
-            "it in the square, of the fitted logs: half the error is 50 % here and 75 % there.", _compared(told), *_simulated(told))
-    return Section("Ledger: what every step brings on held-out logs", text, (Table(heads, tuple(rows), tones=tuple(tones)),),
+    text = ("Torque error on held-out logs, root mean square, with each step of the model. A gain is the share of that error, "
+            "all joints together, that a step takes off the line it builds on. The table of candidate causes gives it in the "
+            "square, of the fitted logs: half the error is 50 % here and 75 % there.", _compared(told), *_simulated(told))
+    return Section("Error by model stage, on held-out logs", text, (Table(heads, tuple(rows), tones=tuple(tones)),),
                    tuple(_picture(name, lines, several) for name, lines in told))
 
 

@@ -34,7 +34,7 @@ def level_tone(levels: Iterable[Level]) -> Tone:
 def checks_table(checks: Iterable[Check], caption: str = "", *, as_given: bool = False) -> Table:
     """What was checked and found, the worst first, or `as_given`."""
     ordered = list(checks) if as_given else sorted(checks, key=lambda check: _ORDER.index(check.level))
-    return Table(columns=("result", "what was found", "where", "what to do", "code"),
+    return Table(columns=("result", "finding", "where", "what to do", "code"),
                  rows=tuple((_RESULTS[check.level], check.message, check.where, check.remedy,
                              f"{check.code} {title_of(check.code)}".strip())
                             for check in ordered),

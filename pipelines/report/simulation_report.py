@@ -37,7 +37,7 @@ def simulation_report(model: str, faults: Sequence[str], logs: Sequence[Imitatio
                 f"{_way(worst)}")
     sections = [_section(one, one.course) for one in logs if one.course is not None]
     if more := [one.name for one in logs if one.course is None]:
-        sections.append(Section("Further logs", (f"Their figures stand in result.json alone: {', '.join(more[:40])}.",)))
+        sections.append(Section("Further logs", (f"Their figures are in result.json alone: {', '.join(more[:40])}.",)))
     return Report("Simulation", f"{said}.", "neutral", _key_figures(logs, tracking), tuple(sections))
 
 

@@ -57,7 +57,7 @@ def split_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None
         axes[0].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=5, borderpad=0.0)
         drawing.supylabel(f"torque [{joined(found.torque_units)}]", fontsize="medium")
 
-    return Figure(f"split-{found.name}", "What the model's torque is made of, and what it leaves of the measured one.", draw,
+    return Figure(f"split-{found.name}", "Parts of the model's torque, and the residual of the measured one.", draw,
                   figures.joint_size(len(joints)))
 
 

@@ -103,8 +103,8 @@ def _torque_section(result: Result) -> Section:
     cutoffs = [format_number(hz, 2) for hz in sorted({log.low_pass_hz for log in result.logs if log.low_pass_hz is not None})]
     span = " to ".join(dict.fromkeys((cutoffs[0], cutoffs[-1]))) if cutoffs else ""
     filtered = f" Low-passed: both after the same zero-phase low-pass, at {span} Hz." if cutoffs else ""
-    table = Table(columns, tuple(rows), "Root mean squares in N m (N of a joint that slides): the measured torque, what the model "
-                  "leaves of it, and the parts of the model.")
+    table = Table(columns, tuple(rows), "Root mean squares in N m (N of a joint that slides): the measured torque, the residual of "
+                  "the model, and the parts of the model.")
     text = ("The torque that the controller commanded, beside the torque of the model on the motion that was realised. A command "
             "also holds what the controller makes of encoder steps and noise, which no model has."
             f"{filtered}",)
@@ -113,7 +113,7 @@ def _torque_section(result: Result) -> Section:
         c = log.course
         assert c is not None
         drawn.append(torque_figure(f"torque-{log.name}", f"{log.name}: torque measured and of the model, the friction in it, and "
-                                   "what is left.", c.t, c.measured, c.model, c.friction, c.left, result.joints,
+                                   "the residual.", c.t, c.measured, c.model, c.friction, c.left, result.joints,
                                    log.torque_units[0]))
         drawn += [split for split in (split_figure(log, result.joints),) if split is not None]
     return Section("Torque: the first validation", text, (table,), tuple(drawn))
@@ -172,8 +172,8 @@ def _cases_section(result: Result) -> Section:
         some = "Some of the six control cases are" if result.cases else "The six control cases are"
         text.append(f"{some} left out: {result.cases_left_out}.")
     if result.cases_apart:
-        text.append(f"Not compared: {', '.join(result.cases_apart)}. The controller is none of the six, its gains are others, or "
-                    "it followed another reference.")
+        text.append(f"Not compared: {', '.join(result.cases_apart)}. The controller is not one of the six, its gains are others, "
+                    "or it followed another reference.")
     if any(one.origin == "simulated" for one in result.cases):
         base = next(one.logs[0] for one in result.cases if one.origin == "simulated")
         text.append(f"Simulated: on the controller of {base}. The plant is the model plus what it left of the torque of that log, "
@@ -214,7 +214,7 @@ def _simulation_section(result: Result) -> Section:
         return Section("The task simulated", (f"Left out: {result.simulation_left_out}.",))
     how = ("in closed loop: the controller, the references and the encoders of the log" if found.simulation == "closed-loop" else
            f"in windows of {format_number((found.window or 0.0) * 1e3, 3)} ms under the logged torque ({found.reason})")
-    text = (f"The model in the experiment of {found.name}, {how}. It is not told what the arm did.",)
+    text = (f"The model in the experiment of {found.name}, {how}. The log does not say what the arm did.",)
     rows = tuple((name, *(None if x is None else three_digits(x[j]) for x in (
         found.position_rms, found.position_max, found.speed_rms, found.torque_rms)))
                  for j, name in enumerate(result.joints))

@@ -101,7 +101,7 @@ def _narrowest(whole: list[_Record], frequency: Array, order: int) -> list[_Reco
 
 
 def _hold_lines(records: list[_Record], frequency: Array, order: int) -> bool:
-    """Whether three quarters of the windows that the source excites hold order + 3 lines of it.
+    """Return whether three quarters of the windows that the source excites hold order + 3 lines of it.
 
     (Σ power)² / Σ power² lines of equal power; half of the bins where the source is noise.
     """

@@ -19,7 +19,7 @@ from pipelines.log.atomic import environment_faults, replace_folder, staging_fol
 from pipelines.log.earlier import Coming, put_in_place
 from pipelines.log.files import PROVENANCE, hash_file
 from pipelines.log.places import keep_apart, refuse_foreign, refuse_own_place, tilde
-from pipelines.log.results import decode, json_text, read_foreign_series
+from pipelines.log.results import decode, headed, json_text, read_foreign_series
 from pipelines.log.stored_result import StoredResult, listed_outputs, read_result
 from pipelines.recall.pictures import DRAWING, pictures_of, with_pictures, write_drawing
 from pipelines.recall.store import CACHE
@@ -106,7 +106,7 @@ def _result(stage: Stage[Any, Any], stored: StoredResult) -> Any:
         from pipelines.run import restored
 
         return restored(stored.path.parent, stored.object)
-    object_ = {key: value for key, value in stored.object.items() if key != "command"}
+    object_ = {key: value for key, value in stored.object.items() if key not in headed("", {})}
     return decode(result_type(stage), object_, _series(stored))
 
 
@@ -124,7 +124,7 @@ def _series(stored: StoredResult) -> dict[str, Any]:
 
 
 def _refers(value: Any) -> bool:
-    """Whether a JSON object names a series."""
+    """Return whether a JSON object names a series."""
     if isinstance(value, dict):
         return "$series" in value or any(map(_refers, value.values()))
     return isinstance(value, list) and any(map(_refers, value))

@@ -37,7 +37,7 @@ def about(
     version: Annotated[bool, typer.Option("--version", help="Print the version and exit.", is_eager=True,
                                           callback=_say_version)] = False,
 ) -> None:
-    """What holds for every command."""
+    """Options of the program itself."""
 
 
 def go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],
@@ -64,7 +64,7 @@ def done(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, A
     Args:
         given: the command's own options; None means: not given.
         fallback: what holds where nothing else was said.
-        roles: logs that are named for a role, whatever they say of themselves.
+        roles: logs that are named for a role, instead of the logs' own roles.
     """
     request, settings, teller = asked(stage, paths, common, given, fallback, roles)
     return _done(stage, request, settings, teller, common)
@@ -83,7 +83,7 @@ def _done(stage: Any, request: Request, settings: Any, teller: Teller, common: C
 
 def asked(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],
           fallback: dict[str, Any] | None = None, roles: Roles | None = None) -> tuple[Request, Any, Teller]:
-    """The request and the settings that the options say, and who tells of the progress."""
+    """Return the request, the settings and the progress reporter of the options."""
     from pipelines.stage import Request
     from rrrid_cli.settings import make_settings
 

@@ -1,4 +1,4 @@
-"""What the simulation gets wrong, why, and the model that has it."""
+"""Diagnose what the simulation gets wrong, and extend the model."""
 
 from __future__ import annotations
 
@@ -17,17 +17,18 @@ __all__ = ["diagnose", "extend"]
 def diagnose(
     common: Common, roles: Roles,
     logs: SomeLogs = None,
-    without: Annotated[list[str] | None, typer.Option(help="Cause that it is not, you know: cogging; all causes stand below. "
+    exclude: Annotated[list[str] | None, typer.Option(help="Exclude this cause: cogging; all causes are listed below. "
                                                       "Repeatable.")] = None,
     model: Annotated[str | None, typer.Option(help="model.json whose friction laws are taken. [Coulomb and viscous]")] = None,
-    most: Annotated[int | None, typer.Option(help="Causes to look for, at most. [4]")] = None,
+    max_causes: Annotated[int | None, typer.Option(help="Largest number of causes to look for. [4]")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
-    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    cutoff_hz: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
     decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
-    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Diagnose torque that looks misplaced.")] = None,
+    skip_sanity_checks: Annotated[bool | None, typer.Option("--skip-sanity-checks",
+                                                            help="Diagnose torque that fails its checks.")] = None,
 ) -> None:
-    """Say what the simulation gets wrong, why, what to check, and how much better the model becomes.
+    """Find what the simulation gets wrong, why, what to check, and how much better the model becomes.
 
     Takes some 30 s for three joints and two minutes of motion. Logs of role reference, recorded while the arm was
     healthy, turn the question into what has changed since.
@@ -35,9 +36,9 @@ def diagnose(
     from pipelines.diagnose import STAGE
 
     go(STAGE, tuple(logs or ()), common, {
-        **roles.named, "without": tuple(without or ()) or None, "model": model,
-        "most": most, "blocks": blocks, "filter": filter, "decimate": decimate,
-        "min_speed": numbers(min_speed, "--min-speed"), "allow_mismatch": allow_mismatch})
+        **roles.named, "exclude": tuple(exclude or ()) or None, "model": model,
+        "max_causes": max_causes, "blocks": blocks, "cutoff_hz": cutoff_hz, "decimate": decimate,
+        "min_speed": numbers(min_speed, "--min-speed"), "skip_sanity_checks": skip_sanity_checks})
 
 
 @app.command(cls=CauseCommand)
@@ -46,15 +47,16 @@ def extend(
     common: Common, roles: Roles,
     logs: SomeLogs = None,
     with_: Annotated[list[str] | None, typer.Option("--with", help="CAUSE:JOINT, or CAUSE:JOINT:NAME=VALUE with a start for a "
-                                                    "non-linear number: cogging:2:order=18; all causes stand below. "
+                                                    "non-linear number: cogging:2:order=18; all causes are listed below. "
                                                     "What may act more than once at a joint, waves of several orders say, "
-                                                    "does so as held-out logs bear it out. Repeatable.")] = None,
+                                                    "does so as held-out logs confirm. Repeatable.")] = None,
     model: Annotated[str | None, typer.Option(help="model.json to extend: its effects are kept, and fitted anew.")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
-    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    cutoff_hz: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
     decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
-    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Fit torque that looks misplaced.")] = None,
+    skip_sanity_checks: Annotated[bool | None, typer.Option("--skip-sanity-checks",
+                                                            help="Fit torque that fails its checks.")] = None,
 ) -> None:
     """Extend the model by named causes, refit everything, and judge it on held-out logs.
 
@@ -66,4 +68,5 @@ def extend(
 
     go(STAGE, tuple(logs or ()), common, {
         "causes": tuple(with_ or ()) or None, **roles.named, "model": model, "blocks": blocks,
-        "filter": filter, "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "allow_mismatch": allow_mismatch})
+        "cutoff_hz": cutoff_hz, "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"),
+        "skip_sanity_checks": skip_sanity_checks})

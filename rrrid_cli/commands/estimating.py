@@ -1,4 +1,4 @@
-"""What a motion was, and the numbers of the nominal model: friction and base parameters."""
+"""Reconstruct motion; fit friction and base parameters."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ __all__ = ["estimate_bps", "fit_friction", "reconstruct"]
 
 Average = Annotated[bool | None, typer.Option("--average/--no-average",
                                               help="Of a periodic log, take the mean of periods that are alike. [average]")]
-AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
+AllowOverlap = Annotated[bool | None, typer.Option("--allow-overlap", help="One recording may be fitted and judged by.")]
 
 
 @app.command("fit-friction", cls=StageCommand)
 @with_common
 def fit_friction(
     common: Common, roles: Roles, logs: SomeLogs = None,
-    law: Annotated[str | None, typer.Option(help="Law to fit, as the ladder names it. [the simplest that is not worse]")] = None,
+    law: Annotated[str | None, typer.Option(help="Law to fit, as the report names it. [the simplest that is not worse]")] = None,
     method: Annotated[str | None, typer.Option(help="varpro, output-error, or ekf (Kostić et al. 2004). [varpro]")] = None,
     window: Annotated[float | None, typer.Option(help="Windows of the equations [s]. [0.02]")] = None,
 ) -> None:
@@ -57,23 +57,24 @@ def estimate_bps(
     jerk_std: Annotated[list[str] | None, typer.Option(help="Jerk [rad/s^order]: one, or one a joint. [as data say]")] = None,
     bandwidth: Annotated[list[str] | None, typer.Option(help="Bandwidth [Hz], instead of jerk: one, or one a joint.")] = None,
     average: Average = None,
-    filter: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
+    cutoff_hz: Annotated[float | None, typer.Option(help="Low-pass over torque and columns [Hz]. [from the motion]")] = None,
     decimate: Annotated[int | None, typer.Option(help="Keep every Nth sample. [four a period of the low-pass]")] = None,
     min_speed: Annotated[list[str] | None, typer.Option(help="Leave slower samples out [rad/s]: one, or one a joint. [0]")] = None,
     blocks: Annotated[int | None, typer.Option(help="Blocks held out in turn where no log is validate. [10]")] = None,
     symmetric: Annotated[bool | None, typer.Option("--symmetric", help="RRR arm, mirror-symmetric links: p4 = p15 = 0.")] = None,
     unweighted: Annotated[bool, typer.Option("--unweighted", help="Weigh all joints alike, as Kostić et al. 2004.")] = False,
     model: Annotated[str | None, typer.Option(help="model.json whose friction is subtracted, not fitted.")] = None,
-    allow_same: AllowSame = None,
-    allow_mismatch: Annotated[bool | None, typer.Option("--allow-mismatch", help="Fit torque that looks misplaced.")] = None,
+    allow_overlap: AllowOverlap = None,
+    skip_sanity_checks: Annotated[bool | None, typer.Option("--skip-sanity-checks",
+                                                            help="Fit torque that fails its checks.")] = None,
 ) -> None:
     """Estimate base parameters and friction by least squares, with their uncertainty."""
     from pipelines.estimate_bps import STAGE
 
     go(STAGE, tuple(logs or ()), common, {
         "method": method, "order": order, "jerk_std": numbers(jerk_std, "--jerk-std"),
-        "bandwidth": numbers(bandwidth, "--bandwidth"), "average": average, "filter": filter,
+        "bandwidth": numbers(bandwidth, "--bandwidth"), "average": average, "cutoff_hz": cutoff_hz,
         "decimate": decimate, "min_speed": numbers(min_speed, "--min-speed"), "blocks": blocks,
-        "symmetric": symmetric, "weighted": False if unweighted else None, "model": model, "allow_same": allow_same,
-        "allow_mismatch": allow_mismatch,
+        "symmetric": symmetric, "weighted": False if unweighted else None, "model": model, "allow_overlap": allow_overlap,
+        "skip_sanity_checks": skip_sanity_checks,
         "compare": False if common.no_report else None}, roles=roles)

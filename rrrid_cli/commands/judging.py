@@ -1,4 +1,4 @@
-"""Hold a model against logs: simulate it, validate it, measure what gives way."""
+"""Compare a model with logs: simulate, validate, measure compliance."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ __all__ = ["frf", "simulate", "validate_writing"]
 def simulate(
     common: Common,
     model: Annotated[str, typer.Argument(help="The model.json of estimate-bps, or the shipped 'rrr'.", show_default=False)],
-    like: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to imitate, or a folder. Repeatable.")] = None,
+    replay: Annotated[list[Path] | None, typer.Option(readable=False, help="Log to replay, or a folder. Repeatable.")] = None,
     fault: Annotated[list[str] | None, typer.Option(
-        help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes stand below; a "
+        help="CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes are listed below; a "
              "wrong NAME is refused with a list of the right ones.")] = None,
     replicas: Annotated[int | None, typer.Option(help="Simulations that differ in their noise; windows have one. [1]")] = None,
     seed: Annotated[int | None, typer.Option(help="Seed of the first one's noise. [1]")] = None,
@@ -43,7 +43,7 @@ def simulate(
     """Simulate a model as a log's experiment would have it, optionally with a fault."""
     from pipelines.simulate import STAGE
 
-    go(STAGE, tuple(like or ()), common, {
+    go(STAGE, tuple(replay or ()), common, {
         "model": model, "fault": tuple(fault or ()) or None, "replicas": replicas, "seed": seed,
         "noise": numbers(noise, "--noise"), "windowed": windowed, "window": window, "steps": steps})
 
@@ -94,7 +94,7 @@ def frf(
     posture: Annotated[list[str] | None, typer.Option(help="Postures to draw, by their numbers: 1,3. "
                                                              "[nearest to the two of Kostić et al. 2004]")] = None,
 ) -> None:
-    """Measure frequency responses, and say what gives way: base, joint, delay, or nothing."""
+    """Measure frequency responses and classify compliance: base, joint, delay or none."""
     from pipelines.frf import STAGE
 
     go(STAGE, tuple(logs or ()), common, {

@@ -16,19 +16,19 @@ __all__ = ["convert", "import_", "inspect"]
 
 
 TrustUnits = Annotated[bool | None, typer.Option("--trust-units", help="Units are as declared, however large the numbers.")]
-AllowSame = Annotated[bool | None, typer.Option("--allow-same", help="One recording may be fitted and judged by.")]
+AllowOverlap = Annotated[bool | None, typer.Option("--allow-overlap", help="One recording may be fitted and judged by.")]
 
 
 @app.command(cls=StageCommand)
 @with_common_but("format")
 def inspect(
     logs: LogPaths, common: Common, trust_units: TrustUnits = None,
-    allow_same: AllowSame = None,
+    allow_overlap: AllowOverlap = None,
 ) -> None:
     """The log doctor: check container, units, time and signals; nothing is changed."""
     from pipelines.inspect import STAGE
 
-    go(STAGE, tuple(logs), common, {"trust_units": trust_units, "allow_same": allow_same})
+    go(STAGE, tuple(logs), common, {"trust_units": trust_units, "allow_overlap": allow_overlap})
 
 
 @app.command("import", cls=StageCommand)

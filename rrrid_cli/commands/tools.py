@@ -38,7 +38,7 @@ def report(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a command has left.", show_default=False,
                                            readable=False)],
     out: Annotated[Path | None, typer.Option(
-        readable=False, help="Folder for the report; another command's result there is kept beside it. [DIR itself]")] = None,
+        readable=False, help="Folder for the report; an earlier result of another command is kept. [DIR itself]")] = None,
     force: Annotated[bool, typer.Option("--force", help="Replace what was changed as well, and keep none.")] = False,
     quiet: Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
@@ -82,9 +82,9 @@ def doctor(
             print(f"  {_SIGNS[one.level]} {one.name}: {one.found}{remedy}", flush=True)
     bad = [one for one in found if one.level == "bad"]
     if json:
-        from pipelines.log.results import encode, json_text
+        from pipelines.log.results import encode, headed, json_text
 
-        sys.stdout.write(json_text({"command": "doctor", "works": not bad, "findings": encode(found)[0]}))
+        sys.stdout.write(json_text(headed("doctor", {"works": not bad, "findings": encode(found)[0]})))
     else:
         print("rrrid cannot work here: see x above." if bad else "rrrid can work here.")
     raise typer.Exit(EnvironmentFault.exit_code if bad else 0)

@@ -21,8 +21,8 @@ __all__ = ["batch", "demo", "run"]
 def run(
     common: Common, roles: Roles, logs: SomeLogs = None,
     skip: Annotated[list[str] | None, typer.Option(help="Stage to leave out, such as diagnose. Repeatable.")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Say what would be computed, and why; compute nothing.")] = False,
-    fresh: Annotated[bool, typer.Option("--fresh", help="Compute everything, also what has not changed.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="Report what would be computed, and why; compute nothing.")] = False,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="Compute everything, also what has not changed.")] = False,
 ) -> None:
     """Do the whole workflow on a folder of logs; one report. What has not changed is not computed again.
 
@@ -30,7 +30,7 @@ def run(
     """
     from pipelines.run import STAGE, plan
 
-    given = {"skip": tuple(skip or ()) or None, "fresh": fresh or None}
+    given = {"skip": tuple(skip or ()) or None, "no_cache": no_cache or None}
     if not dry_run:
         go(STAGE, tuple(logs or ()), common, given, roles=roles)
     request, settings, teller = asked(STAGE, tuple(logs or ()), common, given, roles=roles)
@@ -39,14 +39,14 @@ def run(
     finally:
         teller.done()
     if common.json:
-        from pipelines.log.results import encode, json_text
+        from pipelines.log.results import encode, headed, json_text
 
-        sys.stdout.write(json_text({"command": "run", "stages": encode(planned)[0]}))
+        sys.stdout.write(json_text(headed("run", {"stages": encode(planned)[0]})))
     elif not common.quiet:
         from rrrid_cli.console import say_table
 
         say_table(("logs", "stage", "would be", "because"),
-                  [(one.logs, one.stage, "computed" if one.computed else "taken back", one.why) for one in planned])
+                  [(one.logs, one.stage, "computed" if one.computed else "cached", one.why) for one in planned])
 
 
 app.command(cls=BatchCommand)(batch)

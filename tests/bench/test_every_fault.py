@@ -40,7 +40,7 @@ def moved(name: str, joint: int, strength: float) -> np.ndarray:
     return np.array([np.sqrt(np.mean((a - b) ** 2)) for a, b in ((sick.q, healthy().q), (sick.tau, healthy().tau))])
 
 
-@pytest.mark.parametrize("joint", [1, 3])
+@pytest.mark.parametrize("joint", [1, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", fault_names())
 def test_no_jump_at_zero(name: str, joint: int) -> None:
     """A thousandth of the strength moves positions and torques by at most two thousandths of what the whole does."""

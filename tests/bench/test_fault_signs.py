@@ -133,7 +133,7 @@ def test_nothing_is_left_of_a_healthy_machine() -> None:
     assert np.abs(np.where(np.abs(m.dq) > 0.1, m.load, 0.0)[20:]).max() < 2e-3
 
 
-@pytest.mark.parametrize("joint", [1, 2, 3])
+@pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", COLUMNS)
 def test_a_load_has_the_sign_and_the_size_of_its_answer(name: str, joint: int) -> None:
     """The column of causes.md at the answer's parameters, coefficient near one."""

@@ -104,10 +104,10 @@ def test_a_pipe_as_a_log_is_exit_3_at_once(tmp_path: Path) -> None:
 
 @pytest.mark.row("D14")
 def test_one_recording_for_fit_and_validation(tmp_path: Path) -> None:
-    """D14: the same samples as "identify" and "validate" are a leak, exit 3; --allow-same vouches for it."""
+    """D14: the same samples as "identify" and "validate" are a leak, exit 3; --allow-overlap vouches for it."""
     write_log(tmp_path / "logs/a.h5", good_log())
     write_log(tmp_path / "logs/b.h5", replace(good_log(), role="validate", name="other"))
-    for options, exit_code, codes in (((), 3, {"RRID-D14"}), (("--allow-same",), 0, set())):
+    for options, exit_code, codes in (((), 3, {"RRID-D14"}), (("--allow-overlap",), 0, set())):
         done = rrrid("inspect", "logs", "--json", "--no-report", "--out", "out", *options, cwd=tmp_path)
         assert done.returncode == exit_code, done.stderr
         assert {c["code"] for c in json.loads(done.stdout)["checks"] if c["level"] == "reject"} == codes

@@ -55,7 +55,7 @@ def test_json_is_alone_on_standard_output(logs: Path) -> None:
     (("convert", "logs/a.h5", "--robot", ""), "RRID-C02", 2),
     *(((command, "logs/a.h5", "--robot", "nobody"), "RRID-C04", 2)
       for command in ("run", "inspect", "reconstruct", "estimate-bps")),
-    (("estimate-bps", "logs/a.h5", "--filter", "fast"), "RRID-C02", 2),
+    (("estimate-bps", "logs/a.h5", "--cutoff-hz", "fast"), "RRID-C02", 2),
     (("estimate-bps", "logs/a.h5", "--decimate", "1.5"), "RRID-C02", 2),
     (("import", "tx40", "--robot", "nobody"), "RRID-C04", 2),
     (("convert", "logs/a.h5", "--config", "no.toml"), "RRID-C04", 2),
@@ -108,10 +108,10 @@ def test_every_error_is_one_line_with_code_and_remedy(logs: Path, words: tuple[s
     (("reconstruct", "logs", "--order", "2.5"), "RRID-C02 --order: '2.5' is no whole number. "),
     (("fit-friction", "logs", "--window", "many"), "RRID-C02 --window: 'many' is no number. Give a number, such as 0.5."),
     (("diagnose", "logs", "--twins", "3"), "RRID-C01 rrrid diagnose: no such option '--twins'. See "),
-    (("diagnose", "logs", "--without", "coging"),
-     "RRID-C01 --without: 'coging' is not a cause, did you mean 'cogging'? 'rrrid diagnose --help' lists all causes."),
-    (("diagnose", "logs", "--without", "cogging:2"),
-     "RRID-C02 --without: 'cogging:2': a cause is left out as a whole, at every joint. Write cogging."),
+    (("diagnose", "logs", "--exclude", "coging"),
+     "RRID-C01 --exclude: 'coging' is not a cause, did you mean 'cogging'? 'rrrid diagnose --help' lists all causes."),
+    (("diagnose", "logs", "--exclude", "cogging:2"),
+     "RRID-C02 --exclude: 'cogging:2': a cause is left out as a whole, at every joint. Write cogging."),
     (("extend", "logs", "--with", "quadratic:2"),
      "RRID-C01 --with: 'quadratic' is not a cause, did you mean 'quadratic_drag'? 'rrrid extend --help' lists all causes."),
     (("convert", "logs", "-q", "-v"), "RRID-C02 -q, -v: "),
@@ -127,7 +127,8 @@ def test_wrong_usage_is_one_line_and_exit_2(logs: Path, words: tuple[str, ...], 
 
 
 @pytest.mark.parametrize(("words", "option"), [
-    (("design-excitation", "rrr", "--tell-apart", "spring:2"), "--tell-apart"), (("reconstruct", "logs", "--order"), "--order")])
+    (("design-excitation", "rrr", "--discriminate", "spring:2"), "--discriminate"),
+    (("reconstruct", "logs", "--order"), "--order")])
 def test_an_option_without_its_argument_is_one_of_a_command(tmp_path: Path, words: tuple[str, ...], option: str) -> None:
     """Whose help has more: that of the command, and no list of all commands."""
     done = rrrid(*words, cwd=tmp_path)
@@ -215,7 +216,7 @@ def test_an_estimate_loads_only_what_it_uses(tmp_path: Path) -> None:
     code = ("import sys, rrrid_cli.main as main\ntry:\n    main.entry()\nexcept SystemExit:\n    pass\n"
             f"print(sorted({unused} & set(sys.modules)))")
     log = REPO / "sample_logs/rrr-closed-form/excitation-1.h5"
-    words = ("estimate-bps", log, "--no-report", "--quiet", "--filter", "20", "--out", tmp_path / "out")
+    words = ("estimate-bps", log, "--no-report", "--quiet", "--cutoff-hz", "20", "--out", tmp_path / "out")
     done = subprocess.run([sys.executable, "-c", code, *map(str, words)], capture_output=True, text=True, cwd=REPO, check=False)
     assert (done.stdout, done.stderr) == ("[]\n", "")
     assert (tmp_path / "out/model.json").is_file()
@@ -232,7 +233,7 @@ def test_help_is_plain(tmp_path: Path) -> None:
 def test_help_names_what_set_takes(tmp_path: Path) -> None:
     """The options of --set, for `run` those of every stage, are made of the stages' own settings."""
     assert "--set convert.OPTION=VALUE, options: to." in rrrid("convert", "--help", cwd=tmp_path).stdout
-    assert "--set inspect.OPTION=VALUE, options: trust_units, allow_same." in rrrid("run", "--help", cwd=tmp_path).stdout
+    assert "--set inspect.OPTION=VALUE, options: trust_units, allow_overlap." in rrrid("run", "--help", cwd=tmp_path).stdout
 
 
 @pytest.mark.parametrize("command", ["run", "diagnose", "extend"])

@@ -73,24 +73,19 @@ def test_what_was_put_in_its_place_is_kept(tmp_path: Path) -> None:
     assert len(list((tmp_path / "demo/recording-demo/logs").iterdir())) == 3
 
 
-def test_a_checkout_stays_clean(tmp_path: Path) -> None:
-    """The README's command, said inside a checkout, leaves nothing that git would take for work."""
+def test_without_mujoco_and_network(tmp_path: Path) -> None:
+    """With MuJoCo out of reach and sockets shut, the demo works; in a checkout it leaves nothing that git would take for work."""
     shutil.copy(REPO / ".gitignore", tmp_path)
     subprocess.run(["git", "init", "--quiet", tmp_path], check=True)
-    assert rrrid("demo", *QUICK, cwd=tmp_path).returncode == 0
-    assert (tmp_path / "demo").is_dir()
-    said = subprocess.run(["git", "status", "--porcelain"], cwd=tmp_path, text=True, capture_output=True, check=True).stdout
-    assert said.split() == ["??", ".gitignore"]
-
-
-def test_without_mujoco_and_network(tmp_path: Path) -> None:
-    """With MuJoCo out of reach and sockets shut, the demo works."""
     code = ("import sys, socket\nsys.modules['mujoco'] = None\n"
             "def shut(*a, **k): raise OSError('no network')\nsocket.socket.connect = shut\nsocket.getaddrinfo = shut\n"
             f"sys.argv = ['rrrid', 'demo', '-q', *{QUICK!r}]\nfrom rrrid_cli.main import entry\nentry()")
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(REPO)}, text=True,
                           capture_output=True, check=False, timeout=300)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (tmp_path / "demo").is_dir()
+    said = subprocess.run(["git", "status", "--porcelain"], cwd=tmp_path, text=True, capture_output=True, check=True).stdout
+    assert said.split() == ["??", ".gitignore"]
 
 
 def test_the_end_lays_what_was_found_beside_what_was_hidden() -> None:

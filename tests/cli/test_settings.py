@@ -14,21 +14,21 @@ def made(*sets: str) -> Settings:
 
 
 @pytest.mark.parametrize(("text", "without"), [
-    ("diagnose.without=cogging", ("cogging",)), ('diagnose.without="cogging"', ("cogging",)),
-    ('diagnose.without=["cogging", "spring"]', ("cogging", "spring")), ("diagnose.without=[]", ())])
+    ("diagnose.exclude=cogging", ("cogging",)), ('diagnose.exclude="cogging"', ("cogging",)),
+    ('diagnose.exclude=["cogging", "spring"]', ("cogging", "spring")), ("diagnose.exclude=[]", ())])
 def test_one_stands_for_a_list_of_one(text: str, without: tuple[str, ...]) -> None:
-    assert made(text).without == without
+    assert made(text).exclude == without
 
 
 @pytest.mark.parametrize("value", ["3", "[3]", "true"])
 def test_what_is_no_list_of_texts_is_refused(value: str) -> None:
     with pytest.raises(UsageError, match="is not a list") as refused:
-        made(f"diagnose.without={value}")
+        made(f"diagnose.exclude={value}")
     assert refused.value.code.endswith("C02")
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("diagnose.most=abc", "'abc' is not a whole number"), ("diagnose.most=1.5", "1.5 is not a whole number"),
+    ("diagnose.max_causes=abc", "'abc' is not a whole number"), ("diagnose.max_causes=1.5", "1.5 is not a whole number"),
     ("diagnose.blocks=true", "is not a whole number")])
 def test_what_is_no_number_is_refused_in_words(text: str, words: str) -> None:
     with pytest.raises(UsageError, match=words):

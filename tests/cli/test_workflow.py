@@ -24,7 +24,7 @@ def short(tmp_path: Path) -> Path:
 
 
 def test_dry_run_writes_nothing_and_tells_why(short: Path) -> None:
-    """Before the first run everything would be computed, after it nothing, and with --fresh everything again."""
+    """Before the first run everything would be computed, after it nothing, and with --no-cache everything again."""
     words = ("run", "logs", "--out", "out", "--no-report", *SKIP)
     first = rrrid(*words, "--dry-run", cwd=short)
     assert (first.returncode, first.stderr) == (0, "")
@@ -34,7 +34,7 @@ def test_dry_run_writes_nothing_and_tells_why(short: Path) -> None:
     again = rrrid(*words, "--dry-run", "--json", cwd=short)
     assert json.loads(again.stdout)["stages"] == [
         {"logs": "all", "stage": stage, "computed": False, "why": "unchanged"} for stage in ("inspect", "reconstruct")]
-    assert rrrid(*words, "--dry-run", "--fresh", cwd=short).stdout.count("anew") == 2
+    assert rrrid(*words, "--dry-run", "--no-cache", cwd=short).stdout.count("anew") == 2
 
 
 def test_roles_by_name(short: Path) -> None:

@@ -135,11 +135,11 @@ def test_the_report_warns_in_bold(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("changes", "code"), [
-    ({"purpose": "writing"}, "RRID-C02"), ({"keep_out": (1.0,)}, "RRID-C02"), ({"keep_out": (6.0, 4.0)}, "RRID-C02"),
-    ({"keep_out": (-5.0, -2.0)}, "RRID-C02"),
+    ({"experiment": "writing"}, "RRID-C02"), ({"stop_band": (1.0,)}, "RRID-C02"), ({"stop_band": (6.0, 4.0)}, "RRID-C02"),
+    ({"stop_band": (-5.0, -2.0)}, "RRID-C02"),
     ({"robot": "nobody"}, "RRID-C04"),
     ({"criterion": "C"}, "RRID-C02"), ({"periods": 0}, "RRID-C02"), ({"evaluations": 0}, "RRID-C02"),
-    ({"seconds": float("nan")}, "RRID-C02"), ({"seed": -1}, "RRID-C02"), ({"tip_speed": 0.0}, "RRID-C02"),
+    ({"time_limit": float("nan")}, "RRID-C02"), ({"seed": -1}, "RRID-C02"), ({"tip_speed": 0.0}, "RRID-C02"),
     ({"noise": (1.0, -1.0, 1.0)}, "RRID-C02"), ({"torque_share": 1.5}, "RRID-C02"), ({"speed_share": 1.5}, "RRID-C02"),
     ({"bounds": "nothing"}, "RRID-C02"),
     ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.results import headed
 from pipelines.log.robot_files import load_robot
 from pipelines.model.arm import Arm
 from tests.design_excitation.short import QUICK, designed, without_links
@@ -17,7 +18,8 @@ from tests.design_excitation.short import QUICK, designed, without_links
 
 def test_the_top_harmonic_stays_below_a_mode(tmp_path: Path) -> None:
     """A mode at 4.5 Hz that `frf` has found: no harmonic above 1.5 Hz."""
-    found = {"command": "frf", "responses": [{"joint": 1, "modes": [{"frequency": {"value": 9.0}}, {"frequency": {"value": 4.5}}]}]}
+    modes = [{"frequency": {"value": 9.0}}, {"frequency": {"value": 4.5}}]
+    found = headed("frf", {"responses": [{"joint": 1, "modes": modes}]})
     (tmp_path / "frf").mkdir()
     (tmp_path / "frf" / "result.json").write_text(json.dumps(found))
     out = designed(tmp_path / "out", replace(QUICK, harmonics=None), (tmp_path / "frf",)).folder
@@ -32,10 +34,16 @@ def test_the_top_harmonic_stays_below_a_mode(tmp_path: Path) -> None:
 def test_a_mode_that_cannot_be_kept_below_is_said(responses: object, code: str, tmp_path: Path) -> None:
     """Nothing that `frf` writes; a mode so low that no motion is left."""
     (tmp_path / "frf").mkdir()
-    (tmp_path / "frf" / "result.json").write_text(json.dumps({"command": "frf", "responses": responses}))
+    (tmp_path / "frf" / "result.json").write_text(json.dumps(headed("frf", {"responses": responses})))
     with pytest.raises(UsageError) as told:
         designed(tmp_path / "out", QUICK, (tmp_path / "frf",))
     assert told.value.code == code
+
+
+def test_a_result_of_an_earlier_version_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "result.json").write_text(json.dumps({"command": "frf", "responses": []}))
+    with pytest.raises(InputRejected, match="F17.*written by an earlier rrrid.*Run the command again"):
+        designed(tmp_path / "out", QUICK, (tmp_path / "result.json",))
 
 
 def test_earlier_logs_count(tmp_path: Path, samples: Path) -> None:

@@ -21,7 +21,7 @@ from tests.design_excitation.short import QUICK, designed
 @pytest.mark.parametrize(("purpose", "count"), [("friction", 3), ("frf", 6), ("hold", 8)])
 def test_the_other_experiments(purpose: str, count: int, tmp_path: Path) -> None:
     """One log an experiment, each within the limits, its speed and acceleration the derivatives of its position."""
-    out = designed(tmp_path / "out", replace(QUICK, purpose=purpose)).folder
+    out = designed(tmp_path / "out", replace(QUICK, experiment=purpose)).folder
     robot = load_robot("rrr")
     paths = sorted((out / "logs").glob("*.h5"))
     assert len(paths) == count
@@ -40,7 +40,7 @@ def test_the_other_experiments(purpose: str, count: int, tmp_path: Path) -> None
 
 def test_friction_speeds_span_two_decades(tmp_path: Path) -> None:
     """Both directions, each of nine speeds held constant, the slowest a hundredth of the fastest; the others stay."""
-    out = designed(tmp_path / "out", replace(QUICK, purpose="friction")).folder
+    out = designed(tmp_path / "out", replace(QUICK, experiment="friction")).folder
     log = open_log(out / "logs/friction-2.h5").log
     assert log.joint == 2
     assert not np.ptp(log["q_ref"][:, [0, 2]], axis=0).any()
@@ -53,7 +53,7 @@ def test_friction_speeds_span_two_decades(tmp_path: Path) -> None:
 
 def test_frf_plans_tell_distortion_from_noise(tmp_path: Path) -> None:
     """Odd lines alone, one of four left out; two realisations on the same lines; two periods each way where the joint turns."""
-    out = designed(tmp_path / "out", replace(QUICK, purpose="frf")).folder
+    out = designed(tmp_path / "out", replace(QUICK, experiment="frf")).folder
     one, two = (open_log(out / f"logs/frf-2-{k}.h5").log for k in (1, 2))
     assert one.period is not None
     period = round(one.period / one.sample_time)
@@ -73,7 +73,7 @@ def test_frf_plans_tell_distortion_from_noise(tmp_path: Path) -> None:
 
 def test_random_noise_in_the_place_of_multisines(tmp_path: Path) -> None:
     """As in the paper: white, of no period, and drawn anew for the second log."""
-    out = designed(tmp_path / "out", replace(QUICK, purpose="frf", random=True)).folder
+    out = designed(tmp_path / "out", replace(QUICK, experiment="frf", random=True)).folder
     one, two = (open_log(out / f"logs/frf-1-{k}.h5").log for k in (1, 2))
     v, w = one["v"][:, 0], two["v"][:, 0]
     assert one.period is None
@@ -83,7 +83,7 @@ def test_random_noise_in_the_place_of_multisines(tmp_path: Path) -> None:
 
 def test_held_postures_show_gravity(tmp_path: Path) -> None:
     """Together the postures determine all four parameters of gravity (rank 4, verified.md, section 3)."""
-    out = designed(tmp_path / "out", replace(QUICK, purpose="hold")).folder
+    out = designed(tmp_path / "out", replace(QUICK, experiment="hold")).folder
     postures = np.array([open_log(path).log.posture for path in sorted((out / "logs").glob("*.h5"))])
     body = Arm.from_links(load_robot("rrr")).body
     still = np.zeros_like(postures)
@@ -98,7 +98,7 @@ def test_held_postures_show_gravity(tmp_path: Path) -> None:
 
 def test_held_postures_stay_in_the_box(tmp_path: Path) -> None:
     box = (-0.4, 0.4, -0.4, 0.4, 0.4, 1.0)
-    out = designed(tmp_path / "out", replace(QUICK, purpose="hold", tip_box=box)).folder
+    out = designed(tmp_path / "out", replace(QUICK, experiment="hold", tip_box=box)).folder
     postures = np.array([open_log(path).log.posture for path in (out / "logs").glob("*.h5")])
     tip = BaseArm(load_robot("rrr")).tip(postures)
     assert len(tip) == 8
@@ -108,7 +108,7 @@ def test_held_postures_stay_in_the_box(tmp_path: Path) -> None:
 @pytest.mark.parametrize("purpose", ["friction", "frf"])
 def test_plans_keep_the_tip_speed_and_the_torque(purpose: str, tmp_path: Path) -> None:
     """A slow tip makes plans slower: its speed from its places by differences; the torque of the excitation included."""
-    out = designed(tmp_path / "out", replace(QUICK, purpose=purpose, tip_speed=0.8)).folder
+    out = designed(tmp_path / "out", replace(QUICK, experiment=purpose, tip_speed=0.8)).folder
     robot = load_robot("rrr")
     arm = BaseArm(robot)
     p = arm.known_parameters()
@@ -125,14 +125,14 @@ def test_plans_keep_the_tip_speed_and_the_torque(purpose: str, tmp_path: Path) -
 def test_a_plan_that_no_limit_allows_names_the_limit(tmp_path: Path) -> None:
     """Home lies outside the box: every friction plan leaves it."""
     with pytest.raises(UsageError) as told:
-        designed(tmp_path / "out", replace(QUICK, purpose="friction", tip_box=(5.0, 6.0, -1.0, 1.0, 0.0, 2.0)))
+        designed(tmp_path / "out", replace(QUICK, experiment="friction", tip_box=(5.0, 6.0, -1.0, 1.0, 0.0, 2.0)))
     assert told.value.code == "RRID-C08"
     assert "tip x" in told.value.message
 
 
 def test_plans_are_rehearsed(tmp_path: Path) -> None:
     """The simulated arm holds each posture, and no drive saturates."""
-    done = designed(tmp_path / "out", replace(QUICK, purpose="hold", rehearse=True)).result
+    done = designed(tmp_path / "out", replace(QUICK, experiment="hold", rehearse=True)).result
     assert len(done.rehearsals) == 8
     for _, found in done.rehearsals:
         assert found.safe

@@ -1,4 +1,4 @@
-"""`design-excitation --tell-apart`: causes that look alike in a plain design can be told in this one, within the same limits."""
+"""`design-excitation --discriminate`: causes that look alike in a plain design can be told in this one, within the same limits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOISE = 0.05  # [N m] rms
 
 
 def designed(out: Path, *causes: str, **more: object) -> Outcome[Result]:
-    settings = design_excitation.Settings(robot="rrr", harmonics=(8,), tell_apart=causes,
+    settings = design_excitation.Settings(robot="rrr", harmonics=(8,), discriminate=causes,
                                           **{"evaluations": 150, "rehearse": False, **more})  # type: ignore[arg-type]
     return run_stage(design_excitation.STAGE, Request((), out=out, no_report=True), settings)
 
@@ -84,7 +84,7 @@ def test_a_robot_that_nobody_named_is_said_with_the_reason(tmp_path: Path, monke
     """The shipped one where no robot.toml is here; nothing of the kind for one that was named."""
     monkeypatch.chdir(tmp_path)
     for robot, said in ((None, True), ("rrr", False)):
-        settings = design_excitation.Settings(robot=robot, purpose="hold", rehearse=False)
+        settings = design_excitation.Settings(robot=robot, experiment="hold", rehearse=False)
         report = run_stage(design_excitation.STAGE, Request((), out=tmp_path / f"{robot}", no_report=True), settings).report
         assert ("no robot.toml is here: the shipped rrr" in " ".join(report.basis)) == said
 
@@ -170,7 +170,7 @@ def test_a_seed_and_a_number_of_evaluations_give_it_again(both: dict[str, Outcom
 
 @pytest.mark.parametrize(("causes", "more", "words"), [
     (("spring:2",), {}, "two causes"), (("spring:2", "cogs:2"), {}, "cogging"), (("spring:2", "torque_offset:7"), {}, "1 to 3"),
-    (("spring:2", "torque_offset:2"), {"purpose": "hold"}, "excitation"),
+    (("spring:2", "torque_offset:2"), {"experiment": "hold"}, "excitation"),
     (("spring:2", "torque_offset:2"), {"rest": False}, "at rest"),
     (("spring:2", "rotor_inertia:1"), {}, "no motion"),
     (("spring:2", "spring:2"), {}, "spring:2 and spring:2 are one cause"),
@@ -196,7 +196,7 @@ def test_a_plan_that_tells_apart_and_a_plain_one_lie_beside_each_other(tmp_path:
     monkeypatch.chdir(tmp_path)
     folders = []
     for causes in ((), ("spring:2", "torque_offset:2"), ("spring:2", "cogging:2:order=7")):
-        settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=2, rehearse=False, tell_apart=causes)
+        settings = design_excitation.Settings(robot="rrr", harmonics=(8,), evaluations=2, rehearse=False, discriminate=causes)
         folders.append(run_stage(design_excitation.STAGE, Request((), no_report=True), settings).folder)
     assert [str(one) for one in folders[:2]] == ["runs/rrr-tue/excitation/design-excitation",
                                                  "runs/rrr-tue/excitation-spring-2-torque_offset-2/design-excitation"]
@@ -207,7 +207,7 @@ def test_a_plan_that_tells_apart_and_a_plain_one_lie_beside_each_other(tmp_path:
 def test_a_log_names_the_robot_that_it_is_of(both: dict[str, Outcome[Result]], tmp_path: Path) -> None:
     """What was imported is described nowhere else."""
     plan = both["plain"].folder / "trajectory.h5"
-    settings = design_excitation.Settings(robot=str(plan), purpose="hold", rehearse=False)
+    settings = design_excitation.Settings(robot=str(plan), experiment="hold", rehearse=False)
     found = run_stage(design_excitation.STAGE, Request((), out=tmp_path / "out", no_report=True), settings)
     log = open_log(next((found.folder / "logs").glob("*.h5"))).log
     assert log.robot == open_log(plan).log.robot

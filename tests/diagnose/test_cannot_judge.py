@@ -47,7 +47,7 @@ def asked(logs: Sequence[ExperimentLog]) -> Diagnosis:
 def rubbed(tmp_path_factory: pytest.TempPathFactory) -> diagnose.Result:
     """A healthy arm of much friction that the model lacks, whose controller nobody has described."""
     folder = written(tmp_path_factory.mktemp("rubbing"), rubbing(undescribed(session()), 1.0))
-    settings = diagnose.Settings(without=FEW, most=1)
+    settings = diagnose.Settings(exclude=FEW, max_causes=1)
     return diagnose.compute(diagnose.read(Request((folder,)), settings), settings, whole=False)
 
 

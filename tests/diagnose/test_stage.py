@@ -25,7 +25,7 @@ GAIN = {"validate_torque_rms", "simulated_position_rms", "simulation", "simulate
 
 def asked(folder: Path, out: Path, **settings: object) -> Outcome[diagnose.Result]:
     """The stage, its library cut down."""
-    chosen = diagnose.Settings(**({"without": FEW, "most": 1} | settings))  # type: ignore[arg-type]
+    chosen = diagnose.Settings(**({"exclude": FEW, "max_causes": 1} | settings))  # type: ignore[arg-type]
     return run_stage(diagnose.STAGE, Request((folder,), out=out, no_report=True, check=True), chosen)
 
 
@@ -53,7 +53,7 @@ def test_the_result_holds_what_the_contract_says(rippled: Outcome[diagnose.Resul
     assert all(isinstance(x, float) for x in finding["gain"]["tip_error_rms"].values())
     assert finding["gain"]["simulation"] == "closed-loop"
     assert all(set(one) == {"value", "std", "unit"} for one in finding["parameters"].values())
-    assert set(stored["residual_rms"]) == {"identify", "validate", "floor"}
+    assert set(stored["residual_rms"]) == {"identify", "validate", "noise_floor"}
     assert all(set(one) >= {"cause", "joint", "minimum"} for one in stored["detection_limits"])
     assert all(set(one["minimum"]) >= {"value", "unit"} for one in stored["detection_limits"])
     assert all(set(one) >= {"cause", "reason"} for one in (*stored["not_identifiable"], *stored["rejected"]))
@@ -96,10 +96,10 @@ def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> Non
 
 def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagnose.Result]) -> None:
     """Where nothing exceeded its threshold nothing was fitted, and first order tells: cogging, most of what joint 2 leaves."""
-    ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.ledger)
-    result = replace(rippled.result, verdict="unknown", reason="it is far above its floor", findings=(), ledger=ledger)
+    ledger = tuple(replace(one, exact_gain=math.nan, accepted=False) for one in rippled.result.candidate_causes)
+    result = replace(rippled.result, verdict="unknown", reason="it is far above its floor", findings=(), candidate_causes=ledger)
     section = next(one for one in diagnose.report(result).sections if one.title == "Why there is no name")
-    assert "The nearest explanations, none of which is named: cogging at joint 2 (" in section.text[0]
+    assert "The nearest explanations, not named: cogging at joint 2 (" in section.text[0]
     assert section.text[0].count("cogging at joint 2 (") == 1
     assert section.text[1].startswith("The residual of joint 2 goes most with position (")  # cogging follows the joint's angle
     assert section.text[0].count("% of the residual") == min(5, len({(one.cause, one.joint) for one in ledger if one.gain > 0.0}))
@@ -118,12 +118,12 @@ def test_an_arm_in_order_has_nothing_wrong(tmp_path: Path) -> None:
     outcome = asked(written(tmp_path / "logs", session()), tmp_path / "out")
     assert (outcome.result.verdict, outcome.result.findings, outcome.exit_code) == ("no-fault-found", (), 0)
     assert {one.cause for one in outcome.result.detection_limits} >= {"cogging", "torque_offset"}
-    assert outcome.result.floor_origin == "blocks"
+    assert outcome.result.noise_floor_origin == "blocks"
 
 
 def test_what_the_user_excludes_is_not_named(tmp_path: Path) -> None:
-    """--without cogging: the ripple then has no name, and certainly not that one."""
-    outcome = asked(written(tmp_path / "logs", session("cogging", 2)), tmp_path / "out", without=(*FEW, "cogging"))
+    """--exclude cogging: the ripple then has no name, and certainly not that one."""
+    outcome = asked(written(tmp_path / "logs", session("cogging", 2)), tmp_path / "out", exclude=(*FEW, "cogging"))
     assert "cogging" not in {one.cause for one in outcome.result.findings}
     _, said, causes = outcome.report.verdict.partition("Not looked for, because you said so: ")
     assert said
@@ -144,10 +144,10 @@ def test_paths_go_before_what_logs_say_of_themselves(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("settings", "words"), [
-    ({"without": ("cogs",)}, "cogging"), ({"blocks": 1}, "1 block"),
-    ({"filter": 0.0}, "low-pass"), ({"most": 0}, "findings"), ({"min_speed": (-1.0,)}, "--min-speed"),
+    ({"exclude": ("cogs",)}, "cogging"), ({"blocks": 1}, "1 block"),
+    ({"cutoff_hz": 0.0}, "low-pass"), ({"max_causes": 0}, "findings"), ({"min_speed": (-1.0,)}, "--min-speed"),
     ({"min_speed": (math.nan,)}, "--min-speed"), ({"min_speed": (0.1, 0.2)}, "--min-speed: 2 values for 3 joints"),
-    ({"decimate": 0}, "--decimate"), ({"decimate": -3}, "--decimate"), ({"filter": 450.0}, "sampled at 1000 Hz")])
+    ({"decimate": 0}, "--decimate"), ({"decimate": -3}, "--decimate"), ({"cutoff_hz": 450.0}, "sampled at 1000 Hz")])
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """Before any log is examined, let alone simulated."""

@@ -12,6 +12,7 @@ from pipelines.diagnosis.answer import answer
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.extension import extend
+from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.log.hdf5 import read_parts
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
@@ -27,6 +28,7 @@ _BLOCKS = 10
 class _Arm:
     prepared: Prepared
     told: Diagnosis
+    limits: Limits
     extended: Extended | None
     truth: dict[str, float]
     place: tuple[str, int]
@@ -40,8 +42,9 @@ def _arm(shared: Path, number: str) -> _Arm:
     settings = DiagnosisSettings(cutoff_hz=config.cutoff_hz)
     prepared = prepare(Logs.by_role([read_parts(path)[0] for path in paths]), settings)
     found = diagnose_prepared(prepared, config)
-    told, extended = answer(prepared, found, lambda words: None, _BLOCKS)
-    return _Arm(prepared, told, extended, truth["parameters"], (truth["cause"], truth["joint"]))
+    told, extended = answer(prepared, found, lambda words: None, _BLOCKS, whole=False)
+    limits = limits_of(found.look.later, found.look.selection.end, found.look.baseline)
+    return _Arm(prepared, told, limits, extended, truth["parameters"], (truth["cause"], truth["joint"]))
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +90,7 @@ def test_the_extended_arm_leaves_what_is_told_of_it(lagging: _Arm) -> None:
 
 
 def test_as_small_a_lag_would_have_been_found_at_the_other_joints(lagging: _Arm) -> None:
-    limits = {(one.cause, one.joint): one.minimum.value for one in lagging.told.detection_limits}
+    limits = {(one.cause, one.joint): one.minimum.value for one in lagging.limits.detection_limits}
     assert lagging.place not in limits
     for joint in (1, 3):
         smallest = limits["drive_lag", joint]

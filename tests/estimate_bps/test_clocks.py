@@ -55,7 +55,7 @@ def test_panda_is_predicted_as_published(shared: Path) -> None:
     found = panda(shared / "real")
     assert found.relative_error["validate"] <= 0.018
     assert fixed_row_error(found, 0.0) <= 0.016
-    assert not [check for check in found.doctor if check.code == "RRID-T06"]
+    assert not [check for check in found.data_quality if check.code == "RRID-T06"]
     assert any({"mx2", "torque_offset:2:offset"} <= set(group) for group in found.not_separated)
 
 
@@ -64,7 +64,7 @@ def test_kr300_rests_do_not_spoil_the_fit(shared: Path) -> None:
     """Each log held out once; 22 % where its rests are fitted. Short logs separate no offset from gravity."""
     found = kr300(shared / "real")
     assert np.mean([one.relative_error["validate"] for one in found]) <= 0.07
-    assert not [check for one in found for check in one.doctor if check.code == "RRID-T06"]
+    assert not [check for one in found for check in one.data_quality if check.code == "RRID-T06"]
     for one in found:
         assert any({"mz5", "torque_offset:5:offset"} <= set(group) for group in one.not_separated)
 

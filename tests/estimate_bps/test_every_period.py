@@ -40,7 +40,7 @@ def spread(found: list[Result]) -> Array:
 
 
 @pytest.mark.parametrize(("spoil", "arms"), [
-    pytest.param(cogging, FEW, id="cogging"),
+    pytest.param(cogging, FEW, id="cogging", marks=pytest.mark.slow),
     pytest.param(cogging, REPLICAS, id="cogging, eight arms", marks=pytest.mark.slow),
     pytest.param(lambda seed: None, REPLICAS, id="noise alone, eight arms", marks=pytest.mark.slow)])
 def test_the_scatter_is_what_is_told(spoil: Callable[[int], Spoil | None], arms: int) -> None:
@@ -70,7 +70,7 @@ def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     mean, every = map(only, both)
     assert (mean.averaged, every.averaged) == (True, False)
     assert every.residual[0] == pytest.approx(0.1, rel=0.3)
-    np.testing.assert_allclose(every.floor, mean.floor, rtol=0.02)
+    np.testing.assert_allclose(every.noise_floor, mean.noise_floor, rtol=0.02)
     np.testing.assert_allclose(every.ratio, mean.ratio, rtol=0.02)
     said = [bps_report(found).verdict.partition("the residual of the fitted logs is ")[2].partition(" times")[0] for found in both]
     assert said[0] == said[1] != ""
@@ -84,7 +84,7 @@ def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float]
     none = estimated(replace(log, period=None))
     for period, average in product(periods, averages):
         found = estimated(replace(log, period=period), average=average)
-        said = [check for check in found.doctor if check.message.startswith("its periods are not averaged")]
+        said = [check for check in found.data_quality if check.message.startswith("its periods are not averaged")]
         assert [check.code for check in said] == ["RRID-T10"] * average
         np.testing.assert_allclose(std_of(found), std_of(none), rtol=1e-9)
 
@@ -95,7 +95,7 @@ def test_a_touch_that_is_kept_is_named() -> None:
         tau[24_000:24_500, 2] += 0.3
 
     found = estimated(periodic(0, 5, spoil=touched), average=False)
-    assert [check.message for check in found.doctor if check.code == "RRID-T10"] == [
+    assert [check.message for check in found.data_quality if check.code == "RRID-T10"] == [
         "period 3 differs from the 4 others and is kept, for its periods are not averaged"]
     assert "period 3 differs and is kept" in str(bps_report(found).sections)
     assert max(found.equations) > 4.5 * max(of_periods(0, 1).equations)

@@ -25,7 +25,7 @@ from tests.model.estimation.experiments import arm, experiment, truth
 
 
 def test_the_balance_of_power_agrees_on_healthy_logs(tmp_path: Path) -> None:
-    for seed in range(5):
+    for seed in range(2):
         balance = stage(tmp_path / str(seed), experiment(seed)).result.balance
         assert balance is not None
         assert balance.agree, (seed, balance.apart)
@@ -46,10 +46,15 @@ def test_the_balance_of_power_finds_a_spoilt_acceleration(good: ExperimentLog, t
     assert not balance.agree
 
 
-def test_the_default_wins_held_out(samples: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def of_samples(samples: Path, tmp_path_factory: pytest.TempPathFactory) -> estimate_bps.Result:
+    request = Request((samples / "rrr-closed-form",), out=tmp_path_factory.mktemp("samples") / "out", no_report=True)
+    return run_stage(estimate_bps.STAGE, request, Settings()).result
+
+
+def test_the_default_wins_held_out(of_samples: estimate_bps.Result) -> None:
     """The table of four ways to reconstruct: none explains the held-out sample log better than the default, but for a trifle."""
-    request = Request((samples / "rrr-closed-form",), out=tmp_path / "out", no_report=True)
-    result = run_stage(estimate_bps.STAGE, request, Settings()).result
+    result = of_samples
     assert [c.method for c in result.comparison if c.used] == ["smoother"]
     errors = {c.method: c.validate for c in result.comparison}
     assert errors["smoother"] < 1.01 * min(errors.values()), errors
@@ -146,10 +151,9 @@ def test_the_report_names_a_better_way_only_where_it_is_measured(good: Experimen
     assert "better by more than a trifle than smoother" in said(smoother=(0.0401, 0.0, 0.0), observer=(0.04, -0.0002, -0.0001))
 
 
-def test_what_is_alike_is_called_so(samples: Path, tmp_path: Path) -> None:
-    """Sample logs of a fine encoder: smoother and zero-phase filter cannot be told apart, the observer can."""
-    request = Request((samples / "rrr-closed-form",), out=tmp_path / "out", no_report=True)
-    beside = {c.method: c for c in run_stage(estimate_bps.STAGE, request, Settings()).result.comparison}
+def test_what_is_alike_is_called_so(of_samples: estimate_bps.Result) -> None:
+    """Sample logs of a fine encoder: smoother and zero-phase filter are indistinguishable, the observer is not."""
+    beside = {c.method: c for c in of_samples.comparison}
     assert {name for name, c in beside.items() if c.tied} == {"smoother", "zero-phase"}
     low, high = beside["zero-phase"].apart
     assert low < beside["zero-phase"].validate - beside["smoother"].validate < high

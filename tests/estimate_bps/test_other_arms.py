@@ -118,10 +118,10 @@ def test_a_slower_log_beside_a_fast_one(role: str) -> None:
 
 
 def test_a_low_pass_that_would_do_nothing_is_not_accepted() -> None:
-    """--filter at 0.45 of the rate: refused, instead of reported and left out."""
+    """--cutoff-hz at 0.45 of the rate: refused, instead of reported and left out."""
     arm, _ = an_arm("two")
     with pytest.raises(UsageError, match=r"C02 .*below 0.4 of the rate, 200 Hz"):
-        estimated(recorded(arm), filter=225.0)
+        estimated(recorded(arm), cutoff_hz=225.0)
 
 
 def test_symmetric_links_are_the_papers() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.torque_boundary import KINDS, judged
 
-SEEDS = (103, 108)
+SEEDS = (pytest.param(103, marks=pytest.mark.slow), 108)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -27,7 +27,11 @@ def test_no_field_is_wrong_and_what_is_told_is_what_was_logged(seed: int, kind: 
 
 
 @pytest.mark.parametrize(
-    "fault", ["spring", "cogging", "payload", "offset", "gain", "encoder", "longer link", "tilt"]
+    "fault",
+    [
+        *("spring", "payload", "longer link", "tilt"),
+        *(pytest.param(fault, marks=pytest.mark.slow) for fault in ("cogging", "offset", "gain", "encoder")),
+    ],
 )
 def test_a_fault_of_the_arm_is_no_mistake_of_its_description(fault: str) -> None:
     assert judged(108, "whole", fault)["alarms"] == []

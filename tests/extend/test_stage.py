@@ -48,6 +48,7 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
     assert "Now: fitted without what it is extended by." in outcome.report.key_figures.caption
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(strict=True, reason="accepted on logs of 3 s")
 def test_a_hump_that_is_not_there_is_refused_beside_a_ripple(
     rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path
@@ -57,6 +58,7 @@ def test_a_hump_that_is_not_there_is_refused_beside_a_ripple(
     assert [(one.cause, one.joint) for one in result.rejected] == [("stribeck", 2)]
 
 
+@pytest.mark.slow
 def test_an_order_of_which_only_a_harmonic_is_there_is_refused_with_what_was_fitted(
         rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path) -> None:
     """Asked for a third of the waves that there are, the third harmonic takes all: the first wave would be a made-up one."""
@@ -164,7 +166,7 @@ def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_sa
 
 @pytest.mark.parametrize(("settings", "words"), [
     ({"blocks": 0}, "--blocks"), ({"min_speed": (-1.0,)}, "--min-speed"), ({"min_speed": (0.1, 0.2)}, "2 values for 3 joints"),
-    ({"decimate": 0}, "--decimate"), ({"filter": -3.0}, "--filter"), ({"filter": 450.0}, "sampled at 1000 Hz")])
+    ({"decimate": 0}, "--decimate"), ({"cutoff_hz": -3.0}, "--cutoff-hz"), ({"cutoff_hz": 450.0}, "sampled at 1000 Hz")])
 def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], words: str, tmp_path: Path,
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """C02, by the option's name, before any log is examined."""

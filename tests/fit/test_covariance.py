@@ -41,8 +41,8 @@ def covered(z: Array) -> float:
 @pytest.mark.parametrize(("noise", "every", "size", "width"), [
     pytest.param(white, 0, None, 13, id="white"),
     pytest.param(autoregressive, 0, None, 13, id="ar"),
-    pytest.param(NEARLY_INTEGRATED, 0, None, 13, id="ar 0.99"),
-    pytest.param(white, 5, None, 13, id="decimated by 5"),
+    pytest.param(NEARLY_INTEGRATED, 0, None, 13, id="ar 0.99", marks=pytest.mark.slow),
+    pytest.param(white, 5, None, 13, id="decimated by 5", marks=pytest.mark.slow),
     pytest.param(correlated, 10, None, 13, id="correlated, decimated"),
     *(pytest.param(*other, id=name, marks=pytest.mark.slow) for name, other in {
         "ar, blocks": (autoregressive, 0, 1000, 13), "ar, 40 parameters": (autoregressive, 0, None, 40),

@@ -34,7 +34,7 @@ def test_an_outrunner_that_cogs_is_not_called_good(outrunner: Result) -> None:
     """Cogging is nearly all of its torque: the fit is a problem, and says that its inertia (2.5e-4 kg m² in truth) is not seen."""
     told = fit_friction.report(outrunner)
     assert told.tone == "bad"
-    assert "7 waves a turn" in told.verdict
+    assert "7 cycles per revolution" in told.verdict
     assert "no friction" in told.verdict
     assert "depends on its angle alone" in told.verdict
     codes = [(check.code, check.gate) for check in outrunner.checks if check.code in ("RRID-D19", "RRID-D21")]
@@ -71,7 +71,7 @@ def test_cogging_of_a_motor_that_was_replaced(samples: Path) -> None:
     assert abs(joint.ripple.inertia.value - inertia) < abs(joint.inertia.value - inertia)
     told = fit_friction.report(after)
     assert told.tone == "attention"
-    assert "18 waves a turn" in told.verdict
+    assert "18 cycles per revolution" in told.verdict
     assert "ripple-2" in [figure.name for section in told.sections for figure in section.figures]
 
 

@@ -25,10 +25,12 @@ from tests.model.friction.one_joint import COSINE, INERTIA, JOINT, SINE, STEP, T
 QUICK = Settings(law="coulomb+viscous")
 
 
-def stage(folder: Path, *logs: ExperimentLog, settings: Settings = QUICK, check: bool = False) -> Outcome[Result]:
+def stage(folder: Path, *logs: ExperimentLog, settings: Settings = QUICK, check: bool = False,
+          no_report: bool = True) -> Outcome[Result]:
     for log in logs:
         write_log(folder / f"logs/{log.name}.h5", log)
-    return run_stage(fit_friction.STAGE, Request((folder / "logs",), out=folder / "out", check=check), settings)
+    request = Request((folder / "logs",), out=folder / "out", check=check, no_report=no_report)
+    return run_stage(fit_friction.STAGE, request, settings)
 
 
 def computed(*logs: ExperimentLog, settings: Settings = QUICK) -> Result:
@@ -53,7 +55,7 @@ def good() -> ExperimentLog:
 @pytest.fixture(scope="module")
 def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome[Result]:
     return stage(tmp_path_factory.mktemp("friction"), recorded("three_sigmoid", 4), recorded("three_sigmoid", 54, "validate"),
-                 settings=Settings())
+                 settings=Settings(), no_report=False)
 
 
 def test_the_fields_of_the_contract(outcome: Outcome[Result]) -> None:
@@ -64,8 +66,8 @@ def test_the_fields_of_the_contract(outcome: Outcome[Result]) -> None:
     for number in (*joint["parameters"].values(), joint["inertia"], *joint["gravity"].values()):
         assert set(number) == {"value", "std", "unit"}
     assert set(joint["gravity"]) == {"sine", "cosine"}
-    assert set(joint["ladder"][0]) >= {"law", "identify_rms", "validate_rms", "chosen"}
-    assert [rung["law"] for rung in joint["ladder"] if rung["chosen"]] == ["three_sigmoid"]
+    assert set(joint["candidate_laws"][0]) >= {"law", "identify_rms", "validate_rms", "chosen"}
+    assert [rung["law"] for rung in joint["candidate_laws"] if rung["chosen"]] == ["three_sigmoid"]
     assert joint["judged_by"] == "logs"
     assert joint["parameters"]["w1"]["value"] > joint["parameters"]["w2"]["value"] > joint["parameters"]["w3"]["value"]
 
@@ -129,7 +131,7 @@ def test_three_methods(method: str) -> None:
 def test_a_given_law_may_join_several(good: ExperimentLog) -> None:
     (joint,) = computed(good, settings=Settings(law="stribeck+asymmetric_friction")).joints
     assert joint.law == "stribeck+asymmetric_friction"
-    assert [rung.law for rung in joint.ladder] == [joint.law]
+    assert [rung.law for rung in joint.candidate_laws] == [joint.law]
 
 
 def ramps(seed: int = 6) -> ExperimentLog:

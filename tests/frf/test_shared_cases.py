@@ -60,7 +60,7 @@ def test_aliasing_is_said_and_no_lag(shared: Path, tmp_path: Path) -> None:
     assert ended.returncode == 1
     result = json.loads(ended.stdout)
     assert result["classification"] == result["undecided"] == []
-    assert any("aliasing" in check["message"] for check in result["doctor"])
+    assert any("aliasing" in check["message"] for check in result["data_quality"])
 
 
 @pytest.mark.parametrize("arm", ["02", pytest.param("03", marks=pytest.mark.slow), pytest.param("05", marks=pytest.mark.slow),

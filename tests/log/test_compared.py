@@ -11,6 +11,7 @@ import pytest
 from pipelines.errors import UsageError
 from pipelines.log.compared import label_of, of_other_commands
 from pipelines.log.places import slug
+from pipelines.log.results import headed
 from pipelines.log.run_results import read_any_result
 from pipelines.log.stored_result import read_result
 
@@ -20,7 +21,7 @@ MODEL = {"format": "rrrid-model", "base_parameters": [], "friction": [], "effect
 def left(folder: Path, command: str, **more: Any) -> Path:
     """What a command leaves in `folder`."""
     folder.mkdir(parents=True)
-    (folder / "result.json").write_text(json.dumps({"command": command, **more}))
+    (folder / "result.json").write_text(json.dumps(headed(command, more)))
     (folder / "model.json").write_text(json.dumps(MODEL))
     (folder / "provenance.json").write_text(json.dumps({"tool": "rrrid", "command": command, "outputs": {}}))
     return folder
@@ -75,7 +76,7 @@ def test_what_lies_beside_a_folder_that_is_not_there_is_none_of_its_faults(tmp_p
     """A run without stages of several days; and a result.json of some other program."""
     (tmp_path / "run").mkdir()
     provenance = json.dumps({"tool": "rrrid", "command": "run", "outputs": {}})
-    for text in (json.dumps({"command": "run"}), "[]", "{"):
+    for text in (json.dumps(headed("run", {})), "[]", "{"):
         (tmp_path / "run/result.json").write_text(text)
         (tmp_path / "run/provenance.json").write_text(provenance)
         with pytest.raises(UsageError, match=f"C04.*{tmp_path}/run/frf"):

@@ -17,7 +17,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.files import open_log, write_log
 from pipelines.log.log_schema import log_schema
 from pipelines.log.result_schema import result_schema
-from pipelines.log.results import FLAT, NOT_STORED, encode
+from pipelines.log.results import FLAT, NOT_STORED, encode, headed
 from tests.log.logs import random_log, small_log
 
 
@@ -53,7 +53,7 @@ GOOD = Whole((Part(float("inf"), np.arange(3.0)), Part(1.0, np.zeros((40, 3)))),
 
 
 def stored(result: Whole) -> dict[str, Any]:
-    return {"command": "try", **json.loads(json.dumps(encode(result)[0]))}
+    return headed("try", json.loads(json.dumps(encode(result)[0])))
 
 
 def test_a_result_of_every_kind_of_field() -> None:

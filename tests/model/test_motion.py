@@ -15,9 +15,9 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.motion import METHODS, Reconstructed, Reconstruction, reconstruct
 from tests.fault_table import FAULTS
 from tests.healthy import ENCODER, TS, Path, changed, fourier, good_log, make_log, rest, rows, with_signal
+from tests.seeds import seeds
 
 SMOOTHER = Reconstruction()
-SEEDS = range(4)
 
 
 def path_of(seed: int) -> Path:
@@ -39,7 +39,7 @@ def coverage(found: Reconstructed, truth: tuple[Array, Array, Array], where: Any
             for e, s in zip(errors(found, truth), found.std, strict=True)]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", seeds(4))
 def test_every_filter_beats_central_differences_and_the_smoother_all(seed: int) -> None:
     """Against the truth: accelerations 10 times better than central differences with any filter, 100 times with the smoother."""
     log, truth = good_log(seed), path_of(seed)(good_log(seed).t)
@@ -51,7 +51,7 @@ def test_every_filter_beats_central_differences_and_the_smoother_all(seed: int) 
         assert all(mine < theirs for mine, theirs in zip(off["smoother"], off[alternative], strict=True))
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", seeds(4))
 def test_the_stated_deviation_covers_the_truth(seed: int) -> None:
     """95 % lie within two deviations (92 % at least: an encoder's steps are no normal noise)."""
     log = good_log(seed)

@@ -109,5 +109,5 @@ def test_the_command_that_was_called_lists_the_causes(command: str, of: dict[str
         acting_cause("x", REVOLUTE, **of)
     assert refused.value.remedy == f"'rrrid {command} --help' lists all causes"
     with pytest.raises(UsageError) as refused:
-        wanted_cause("x", REVOLUTE, "--tell-apart")
+        wanted_cause("x", REVOLUTE, "--discriminate")
     assert refused.value.remedy == "'rrrid design-excitation --help' lists all causes"

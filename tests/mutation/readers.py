@@ -216,8 +216,8 @@ def _model(path: Path) -> None:
 
 def _configs(folder: Path) -> list[bytes]:
     return [b'[reconstruct]\nbandwidth = [20.0, 20.0, 30.0]\norder = 3\n[convert]\nto = "csv"\n'
-            b'[inspect]\ntrust_units = true\nallow_same = false\n'
-            b'[estimate-bps]\nfilter = 20.0\ndecimate = 2\nblocks = 3\n[fit-friction]\nwindow = 0.02\n']
+            b'[inspect]\ntrust_units = true\nallow_overlap = false\n'
+            b'[estimate-bps]\ncutoff_hz = 20.0\ndecimate = 2\nblocks = 3\n[fit-friction]\nwindow = 0.02\n']
 
 
 def _config(path: Path) -> None:

@@ -106,7 +106,7 @@ def test_logs_may_move_and_be_touched(small: Path) -> None:
     (small / "elsewhere/logs").rename(small / "logs")
     assert go(small, no_report=True)[1] == []
     assert contents(small / "out") == before
-    assert go(small, replace(SHORT, fresh=True), no_report=True)[1] == ["inspect", "reconstruct", "frf"]
+    assert go(small, replace(SHORT, no_cache=True), no_report=True)[1] == ["inspect", "reconstruct", "frf"]
     assert contents(small / "out") == before
 
 

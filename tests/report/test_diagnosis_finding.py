@@ -54,7 +54,7 @@ def test_what_stays_above_the_floor_is_said(
 ) -> None:
     floor = np.array([0.05, 0.04])
     rms = ResidualRms(np.array(left), np.array(left), floor)
-    found: Any = SimpleNamespace(floor_origin=origin, after_rms=rms, residual_rms=rms)
+    found: Any = SimpleNamespace(noise_floor_origin=origin, after_rms=rms, residual_rms=rms)
     assert what_stays(found) == said
 
 
@@ -159,7 +159,7 @@ def test_several_findings_are_one_extension() -> None:
 def test_a_small_joint_is_not_hidden_by_a_large_one() -> None:
     """All that is wrong with joint 3 is little of what is wrong with the arm; both are said, where they differ."""
     said = " ".join(finding_section(1, finding(), NOMINAL).text)
-    assert "explains 0.05 % of what stands above the floor at all joints together, and 100 % of that of joint 3" in said
+    assert "accounts for 0.05 % of the residual above the noise floor at all joints together, and 100 % of that of joint 3" in said
     assert "all joints together" not in " ".join(finding_section(1, replace(finding(), explained=0.9), NOMINAL).text)
 
 

@@ -38,8 +38,8 @@ COMMAND = re.compile(r'"rrrid [^"]*"')
 
 NOTHING: Any = {field.name: () for field in fields(Result)} | {
     "boundary": None,
-    "verdict": "no-fault-found", "question": "what is wrong", "reason": "", "floor_origin": "reference logs", "held_out": "logs",
-    "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
+    "verdict": "no-fault-found", "question": "what is wrong", "reason": "", "noise_floor_origin": "reference logs",
+    "held_out": "logs", "robot": "", "residual_rms": ResidualRms(*(np.ones(3),) * 3),
     "after_rms": ResidualRms(*(np.ones(3),) * 3), "rated": (50.0,) * 3}
 
 
@@ -96,14 +96,14 @@ def test_a_stored_reason_is_read_without_keys() -> None:
     assert without_keys("absorbed by p3, coulomb:3:level; needs more") == (
         "absorbed by p3, level of Coulomb friction at joint 3; needs more")
     assert without_keys("spring and friction stay as they are: 3 of 4") == "spring and friction stay as they are: 3 of 4"
-    assert named("payload", None) == "a load at the tip"
+    assert named("payload", None) == "payload at the tip"
 
 
 def test_one_cause_at_several_joints_is_told_once() -> None:
     """Three joints with Stribeck friction need no advice three times."""
     places = (("stribeck", 1), ("payload", None), ("stribeck", 3), ("cogging", 2), ("stribeck", 2))
     found = [Rejected(cause, joint, "") for cause, joint in places]
-    assert [words for _, words in together(found)] == ["Stribeck friction at joints 1, 3 and 2", "a load at the tip",
+    assert [words for _, words in together(found)] == ["Stribeck friction at joints 1, 3 and 2", "payload at the tip",
                                                        "cogging at joint 2"]
 
 
@@ -165,14 +165,14 @@ def test_a_threshold_that_nothing_can_exceed_is_no_figure() -> None:
     trials = tuple(Trial(1, "cogging", joint, 0.02, threshold, 0.95, float("nan"), False, "below its threshold")
                    for joint, threshold in ((1, 0.05), (2, 6.04)))
     bounds = tuple(Threshold("cogging", joint, threshold, "blocks") for joint, threshold in ((1, 0.05), (2, 6.04)))
-    page = diagnosis_report(Result(**(NOTHING | {"ledger": trials, "thresholds": bounds})))
+    page = diagnosis_report(Result(**(NOTHING | {"candidate_causes": trials, "thresholds": bounds})))
     tables = {section.title: section.tables[0] for section in page.sections if section.tables}
-    for title, heading in (("Ledger of hypotheses", "threshold [%]"), ("What this rests on",
+    for title, heading in (("Candidate causes", "threshold [%]"), ("What this rests on",
                                                                        "share of the squared residual to exceed [%]")):
         table = tables[title]
         assert [row[table.columns.index(heading)] for row in table.rows] == [5.0, None]
-        assert "above 100 % is told as a dash" in table.caption
-    ledger = tables["Ledger of hypotheses"]
+        assert "above 100 % is shown as a dash" in table.caption
+    ledger = tables["Candidate causes"]
     assert {"gain in square [%]", "gain in square, fitted exactly [%]"} <= set(ledger.columns)
     assert "squared residual of the fitted logs" in ledger.caption
 
@@ -194,14 +194,14 @@ def test_any_number_of_waves_has_words() -> None:
 
 @pytest.mark.parametrize(("reasons", "said"), [
     (("weaker than others",) * 2, "Each of these takes more than its threshold off the residual"),
-    (("weaker than others", "weaker than others", "impossible numbers"), "The other one came close, and is not believed."),
-    (("impossible numbers",), "They came close, and are not believed.")])
+    (("weaker than others", "weaker than others", "impossible numbers"), "The other one came close, and was not accepted."),
+    (("impossible numbers",), "They came close, and were not accepted.")])
 def test_what_was_rejected_is_introduced_by_why(reasons: tuple[str, ...], said: str) -> None:
     rejected = tuple(Rejected("cogging", joint, reason) for joint, reason in enumerate(reasons, 1))
     page = diagnosis_report(Result(**(NOTHING | {"rejected": rejected})))
     (section,) = (section for section in page.sections if section.title == "Rejected")
     assert said in section.text[0]
-    assert ("believed" in section.text[0]) == (reasons[-1] != "weaker than others")
+    assert ("not accepted" in section.text[0]) == (reasons[-1] != "weaker than others")
 
 
 def test_causes_rejected_for_one_reason_share_a_line() -> None:
@@ -212,7 +212,7 @@ def test_causes_rejected_for_one_reason_share_a_line() -> None:
     page = diagnosis_report(Result(**(NOTHING | {"rejected": rejected})))
     (table,) = (section.tables[0] for section in page.sections if section.title == "Rejected")
     assert table.rows == (("Stribeck friction at joint 1", "the logs do not agree on its size"),
-                          ("spring at joints 2 and 3; cogging at joint 1; a load at the tip", "weaker than others"))
+                          ("spring at joints 2 and 3; cogging at joint 1; payload at the tip", "weaker than others"))
 
 
 def test_limits_are_told_for_what_a_technician_can_see() -> None:
@@ -229,7 +229,7 @@ def test_limits_are_told_for_what_a_technician_can_see() -> None:
 
 
 @pytest.mark.parametrize(("left", "said"), [
-    (0.02, "follows what it predicts"), (0.6, "part of what is left"), (1.0, "most of it stays")])
+    (0.02, "follows what it predicts"), (0.6, "part of the residual"), (1.0, "most of it stays")])
 def test_a_proof_says_what_it_shows(left: float, said: str) -> None:
     """Where the means hardly fall, the figure does not claim that they do."""
     x = np.linspace(0.0, 1.0, 20)
@@ -274,11 +274,11 @@ def test_the_verdict_says_what_was_not_looked_for(verdict: str) -> None:
 
 
 def test_nothing_wrong_says_at_once_of_what_it_says_nothing() -> None:
-    """A load at the tip that these logs cannot tell from the arm is not nothing."""
+    """Payload at the tip that these logs cannot tell from the arm is not nothing."""
     beyond = tuple(NotIdentifiable(cause, joint, "why", "what") for cause, joint in (
         ("rotor_inertia", 1), ("rotor_inertia", 2), ("payload", None)))
     said = diagnosis_report(Result(**(NOTHING | {"not_identifiable": beyond}))).verdict
-    assert "as far as these logs can tell, and they say nothing of rotor inertia at joints 1 and 2 and a load at the tip;" in said
+    assert "as far as these logs can tell, and they say nothing of rotor inertia at joints 1 and 2 and payload at the tip;" in said
     one = diagnosis_report(Result(**(NOTHING | {"not_identifiable": beyond[2:]}))).verdict
-    assert "they say nothing of a load at the tip;" in one
+    assert "they say nothing of payload at the tip;" in one
     assert "nothing of" not in diagnosis_report(Result(**NOTHING)).verdict

@@ -12,7 +12,7 @@ from pipelines.report.extension_report import _now
 
 @pytest.mark.parametrize(("origins", "said"), [
     (("residual",), "Now: fitted without what it is extended by."),
-    (("residual", "base parameters"), "Now: by the base parameters of before, without a load at the tip,"), ((), "")])
+    (("residual", "base parameters"), "Now: by the base parameters of before, without payload at the tip,"), ((), "")])
 def test_whose_error_is_now_is_told(origins: tuple[str, ...], said: str) -> None:
     """Base parameters that are fitted to later logs hold a load: the error that it takes away is counted from those of before."""
     names = {"residual": "cogging", "base parameters": "payload"}

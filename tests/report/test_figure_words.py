@@ -25,7 +25,7 @@ from pipelines.report.figure_words import figure_in_words
     ("fit-friction waist stribeck joint 1 varpro stribeck.speed", "fit-friction waist: Stribeck friction at joint 1, speed"),
     ("fit-friction waist three_sigmoid joint 1 varpro three sigmoid.f1",
      "fit-friction waist: friction of three sigmoids at joint 1, f1"),
-    ("payload mass", "A load at the tip, mass"),
+    ("payload mass", "Payload at the tip, mass"),
     ("diagnose cogging joint 2 torque rms", "diagnose: cogging at joint 2, torque rms"),
     ("estimate-bps p3", "estimate-bps p3"), ("torque rms validate joint 2", "torque rms validate joint 2"), ("", "")])
 def test_causes_are_told_in_words(name: str, words: str) -> None:
@@ -81,11 +81,11 @@ def test_a_joint_that_slides_has_its_own_units() -> None:
 
 
 def test_what_an_extension_leaves_is_not_what_the_nominal_model_left() -> None:
-    """Both are there, each by its name; the floor beside them is that of both, and told once."""
-    nominal, extended = ({"identify": [error], "validate": [2.0 * error], "floor": [0.01]} for error in (0.3, 0.1))
+    """Both are there, each by its name; the noise floor is that of both, and listed once."""
+    nominal, extended = ({"identify": [error], "validate": [2.0 * error], "noise_floor": [0.01]} for error in (0.3, 0.1))
     assert {name: value for name, (value, _) in residuals({"residual_rms": nominal, "after_rms": extended}).items()} == {
         "nominal model residual rms identify joint 1": 0.3, "nominal model residual rms validate joint 1": 0.6,
-        "nominal model residual rms floor joint 1": 0.01, "extended model residual rms identify joint 1": 0.1,
+        "nominal model residual rms noise floor joint 1": 0.01, "extended model residual rms identify joint 1": 0.1,
         "extended model residual rms validate joint 1": 0.2}
 
 

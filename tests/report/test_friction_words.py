@@ -10,7 +10,7 @@ import pytest
 
 from pipelines import fit_friction
 from pipelines.log.files import open_log
-from pipelines.model.friction.result import Result, Rung
+from pipelines.model.friction.result import CandidateLaw, Result
 from pipelines.stage import Inputs
 
 
@@ -50,9 +50,9 @@ def test_more_numbers_are_given_a_reason(samples: Path) -> None:
 def test_how_much_worse_is_told_beside_the_law_that_chance_was_asked_of(result: Result) -> None:
     """A law is refused because it is measurably worse than the best, which need not be the one that was taken."""
     (joint,) = result.joints
-    ladder = tuple(Rung(law, size, 0.01, left, alike, chosen, "") for law, size, left, alike, chosen in (
+    laws = tuple(CandidateLaw(law, size, 0.01, left, alike, chosen, "") for law, size, left, alike, chosen in (
         ("coulomb+viscous", 3, 0.0150, False, False), ("stribeck", 5, 0.0101, True, True),
         ("three_sigmoid", 7, 0.0100, True, False)))
-    told = fit_friction.report(replace(result, joints=(replace(joint, ladder=ladder, law="stribeck"),)))
+    told = fit_friction.report(replace(result, joints=(replace(joint, candidate_laws=laws, law="stribeck"),)))
     words = next(" ".join(section.text) for section in told.sections if section.title.endswith(": choice of the law"))
     assert "that leaves 50 % more of what was held out (rms) than three sigmoids, the best of all, more than chance" in words

@@ -89,7 +89,7 @@ def test_every_gain_counts_from_a_line_above_it() -> None:
 def test_a_load_alone_is_told_beside_the_arm_without_it() -> None:
     """The model fitted to the loaded arm is no step towards the load: it does not stand in the ledger."""
     bare, load, extended = ledger_lines(told(LOAD, was=BARE))
-    assert bare.step.endswith("without a load at the tip")
+    assert bare.step.endswith("without payload at the tip")
     assert (bare.rms, load.before, extended.before) == (tuple(BARE),) * 3
 
 
@@ -150,7 +150,7 @@ def test_each_refusal_is_told_once_and_nothing_that_follows_from_it() -> None:
     """The headline names the stages that one reason stopped, with one thing to do; the table of stages has the rest."""
     steps = (Step("inspect", 1, object(), Report("Log doctor", "All should be looked at.", "attention"), ()),
              Step("fit-friction", 0, object(), Report("Friction", "A law. " * 20, "bad"), ()),
-             *(refused(name, f"correct the map; if it is right, say --set {name}.allow_mismatch=true") for name in
+             *(refused(name, f"correct the map; if it is right, say --set {name}.skip_sanity_checks=true") for name in
                ("estimate-bps", "diagnose")),
              Step("frf", 5, None, Report("Responses", "Passed over: no frf log. Record one.", "neutral"),
                   (Check.of("C06", "warn", "no frf log", remedy="record one"),)))

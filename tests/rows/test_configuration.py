@@ -33,7 +33,7 @@ def test_an_unknown_name(words: tuple[str, ...], says: str, command: Command, tm
 @pytest.mark.parametrize(("words", "says"), [
     (("reconstruct", "logs", "--bandwidth", "nan"), "positive"), (("reconstruct", "logs", "--bandwidth", "-1"), "positive"),
     (("reconstruct", "logs", "--order", "9"), "order"), (("estimate-bps", "logs", "--blocks", "0"), "block"),
-    (("estimate-bps", "logs", "--filter", "inf"), "filter"), (("convert", "logs", "--to", "xlsx"), "parquet"),
+    (("estimate-bps", "logs", "--cutoff-hz", "inf"), "cutoff"), (("convert", "logs", "--to", "xlsx"), "parquet"),
     (("extend", "logs", "--with", "cogging:9"), "1 to 3")])
 @row("C02")
 def test_a_value_out_of_its_bounds(words: tuple[str, ...], says: str, command: Command, tmp_path: Path) -> None:

@@ -177,7 +177,7 @@ LEVELS = {"the first 55 %": lambda f: np.where(f < 0.55, 3.0, 1.0),
 
 
 @pytest.mark.parametrize("colour", [0.0, 0.95])
-@pytest.mark.parametrize("periods", [2, 3, 5])
+@pytest.mark.parametrize("periods", [2, *(pytest.param(count, marks=pytest.mark.slow) for count in (3, 5))])
 @pytest.mark.parametrize("level", LEVELS)
 def test_noise_that_varies_along_the_period_is_no_start(level: str, periods: int, colour: float) -> None:
     """However much larger it is where the motion begins, and however slow: at most one of a hundred seems to have a start."""

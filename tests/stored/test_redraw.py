@@ -148,8 +148,10 @@ def test_a_provenance_that_is_none_leads_nowhere(results: Path, tmp_path: Path, 
 
 
 def test_another_versions_result_is_refused(tmp_path: Path) -> None:
-    """Fields that this version does not know of, and a command that has no report: told, exit 3 and 2."""
-    for name, told, kind in (("inspect", {"logs": 3}, InputRejected), ("batch", {}, UsageError)):
+    """An earlier schema, fields that this version does not know, and a command that has no report: exit 3, 3 and 2."""
+    for name, told, kind in (("frf", {"schema_version": 1}, InputRejected),
+                             ("inspect", {"schema_version": 2, "logs": 3}, InputRejected),
+                             ("batch", {"schema_version": 2}, UsageError)):
         (tmp_path / name).mkdir()
         (tmp_path / name / "result.json").write_text(json.dumps({"command": name, **told}))
         with pytest.raises(kind):

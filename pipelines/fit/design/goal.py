@@ -125,7 +125,7 @@ class Goal:
                        float(np.log(weighed.values).sum()), math.sqrt(variance))
 
     def meets(self, condition_number: float) -> bool:
-        """Whether that is below the ceiling, if there is one."""
+        """Return whether that is below the ceiling, if there is one."""
         return self.ceiling is None or condition_number <= self.ceiling * (1.0 + _ROUNDED)
 
     def singular_values(self, grams: Array) -> Array:

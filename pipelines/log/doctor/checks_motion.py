@@ -172,7 +172,7 @@ def direction(s: Subject) -> list[Check]:
         return []
     one_way = [j for j, (up, down) in both_ways(s).items() if min(up, down) < 0.02]
     found = [s.say("D10", "warn",
-                   f"the speed of joint {j + 1} never changes sign: its Coulomb friction cannot be told from a torque offset",
+                   f"the speed of joint {j + 1} never changes sign: its Coulomb friction is confounded with a torque offset",
                    signal="q", joint=j, gate=True,
                    remedy="move the joint in both directions") for j in one_way]
     return found or s.ok("D10", "every joint moves in both directions", signal="q")

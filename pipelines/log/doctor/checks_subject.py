@@ -42,7 +42,7 @@ class Subject:
 
     @property
     def sampled(self) -> bool:
-        """Whether there are signals to judge; of fewer samples T08 says all there is to say."""
+        """Return whether there are signals to judge; of fewer samples T08 says all there is to say."""
         return not self.planned and self.log.n_samples >= FEWEST
 
     @property

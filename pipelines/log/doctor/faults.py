@@ -168,7 +168,7 @@ def spikes(x: Array, smooth: bool, floor: Array) -> Mask:
 
 
 def _stands_out_locally(off: Array, candidate: Mask) -> Mask:
-    """Whether each candidate is 4 times what 90 % of the 50 samples around it are: fast parts of a log are noisier."""
+    """Return whether each candidate is 4 times what 90 % of the 50 samples around it are: fast parts of a log are noisier."""
     row, column = np.nonzero(candidate)
     around = np.clip(row[:, None] + np.concatenate([np.arange(-29, -4), np.arange(5, 30)]), 0, len(off) - 1)
     values = np.where(np.isfinite(near := off[around, column[:, None]]), near, 0.0)

@@ -84,7 +84,7 @@ def _summed(table: RawTable, spec: TimeSpec, step: float | None) -> tuple[Array,
 
 
 def _contradict(header: str, declared: str) -> bool:
-    """Whether two units of time differ; a header that names none of them says nothing."""
+    """Return whether two units of time differ; a header that names none of them says nothing."""
     header, declared = canonical_unit(header), canonical_unit(declared)
     known = header in UNITS and UNITS[header].quantity == "time"
     if declared in ("sample", "samples", "index"):

@@ -243,12 +243,12 @@ def quarter_turns(q: Array) -> dict[int, int]:
 
 
 def held(tau: Array, q: Array) -> Guess:
-    """Whether a torque is a command that is held: then it stands still over samples in which the position moves."""
+    """Return whether a torque is a command that is held: then it stands still over samples in which the position moves."""
     moving = np.abs(np.diff(q, axis=0)) > 0
     both = np.diff(tau, axis=0)[moving[:, :tau.shape[1]]] if tau.shape == q.shape else np.diff(tau, axis=0).ravel()
     share = float(np.mean(both == 0)) if both.size else 0.0
     if share > 0.4 and np.unique(tau).size > 50:
-        return Guess("held-command", "likely", f"{100 * share:.0f} % of the steps between samples are none while the position "
+        return Guess("held-command", "likely", f"{100 * share:.0f} % of the steps between samples are zero while the position "
                      "moves: a command, held over several samples")
     return Guess("measured", "unsure", 'nothing in the numbers tells; ask who recorded them: "held-command" where this is what '
                  "the drive was commanded, to be held until the next sample")
@@ -257,7 +257,7 @@ def held(tau: Array, q: Array) -> Guess:
 def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tuple[Guess, str]:
     why = "named so" if named else f"whole numbers over a range of {span:.5g}"
     if wrap is not None:
-        return (Guess("counts", "sure" if named else "likely", f"{why}; it starts again after {wrap:g}, taken as one revolution"),
+        return (Guess("counts", "sure" if named else "likely", f"{why}; it starts again after {wrap:g}, taken for a revolution"),
                 f", counts_per_rev = {wrap:g}, wrap = {wrap:g}")
     near = min(_RESOLUTIONS, key=lambda r: abs(span - r))
     if abs(span / near - 1.0) < _ONE_TURN:

@@ -165,7 +165,7 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, tuple[str, .
     if len(turns) > 1:
         starts = ", ".join(map(str, turns.values()))
         checks.append(Check.of("S07", "warn", f"declared in degrees, but the numbers start at {starts} times "
-                               "pi/2, to the last digit: radians of the motor side?", where=f"{part.where}, signal q",
+                               "pi/2, digit by digit: radians of the motor side?", where=f"{part.where}, signal q",
                                remedy='if so, declare unit = "rad" and add [drive] transmission = the gear ratios'))
     return Converted(signals, tuple(steps), tuple(altered), tuple(checks))
 

@@ -174,7 +174,7 @@ def _samples_of(arrays: Mapping[str, npt.NDArray[np.generic]], source: str) -> i
         name for name, array in arrays.items() if samples in array.shape and _either_way(array)
         and enough.get(sum(array.shape) - samples) == enough[samples]]
     if alike:
-        raise InputRejected("S11", f"'{alike[0]}' has shape {arrays[alike[0]].shape}: which side is time cannot be told",
+        raise InputRejected("S11", f"'{alike[0]}' has shape {arrays[alike[0]].shape}: which side is time is not known",
                             where=source, remedy="store one row a sample, with many more samples than columns")
     return samples
 

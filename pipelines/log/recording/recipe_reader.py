@@ -53,7 +53,7 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
         table = _dated(parse_toml(text), where)
     except (ValueError, RecursionError) as problem:
         raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where,
-                         remedy="correct that line; strings stand in quotes, tables in [ ]") from None
+                         remedy="correct that line; strings need quotes, tables [ ]") from None
     _blanks(table, where)
     if "where" in table:
         raise UsageError("C01", "'where' is not a key of a recipe", where=where, remedy="remove it")
@@ -151,7 +151,7 @@ def _explain(error: Any, where: object) -> UsageError:
     if error["type"] in ("missing", "missing_argument"):
         return UsageError("C02", f"'{place}' is missing", where=where, remedy="rrrid import --guess FILE drafts a recipe")
     return UsageError("C02", f"'{place}': {error['msg']}, not {error['input']!r}", where=where,
-                      remedy="correct the value; the keys stand in the module recipe.py")
+                      remedy="correct the value; the module recipe.py lists the keys")
 
 
 _LARGEST = 1e12

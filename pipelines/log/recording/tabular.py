@@ -156,7 +156,7 @@ def _numbers(body: list[Line], whole: bool, dialect: Dialect, names: tuple[str, 
     if not whole and len(body) - 1 not in torn:
         torn.add(len(body) - 1)
         checks.append(Check.of("F09", "warn",
-                               "the last line has no line end: whether its last number is whole cannot be told, it is left out",
+                               "the last line has no line end: whether its last number is whole is not known, it is left out",
                                where=f"{source}, line {body[-1][0]}", remedy="end the recording before the file is copied"))
     good = [i for i in range(len(body)) if i not in torn]
     if not good:

@@ -223,7 +223,7 @@ class ResidualRms:
 
 @dataclass(frozen=True)
 class Trial:
-    """One line of the ledger: a hypothesis with what it would have brought."""
+    """A candidate cause and the gain of it."""
 
     step: int  # from 1: the search for the first, second … finding
     cause: str
@@ -273,7 +273,7 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Evidence:
-    """The picture of what is wrong, before any name."""
+    """Residual analysis of one log."""
 
     log: str  # name of the log that is shown
     t: Array  # [s] (points,)
@@ -284,7 +284,7 @@ class Evidence:
     simulated_position_error: Array | None  # [rad] (points, joints) simulated minus measured
     curves: tuple[Curve, ...]
     spectra: tuple[Spectrum, ...]
-    above_floor: Array  # (joints,) share of the residual's power that is above the floor
+    above_noise_floor: Array  # (joints,) share of the residual's power that is above the floor
     band: Array  # (joints, 2) [Hz] in which most of that lies
     correlation: Array  # (joints, joints) of the residual of one joint with the torque of another
     torques: Array  # (joints, joints) each measured torque on every joint's modelled torque: near the identity
@@ -306,10 +306,10 @@ class Diagnosis:
     residual_rms: ResidualRms
     question: Literal["what is wrong", "what has changed"]
     held_out: JudgedBy
-    floor_origin: str  # "reference logs" | "blocks"
-    reason: str  # why "unknown" or "cannot-judge"; what "nothing wrong" cannot vouch for; what stands beside causes; else empty
+    noise_floor_origin: str  # "reference logs" | "blocks"
+    reason: str  # why "unknown" or "cannot-judge"; what "no-fault-found" cannot exclude; what remains beside causes; else empty
     after_rms: ResidualRms  # the same with all findings and standing effects
-    ledger: tuple[Trial, ...]
+    candidate_causes: tuple[Trial, ...]
     thresholds: tuple[Threshold, ...]
     evidence: tuple[Evidence, ...]
     nominal: Arm | None = field(default=None, metadata=NOT_STORED, repr=False)  # fitted before any finding, with what stands

@@ -51,7 +51,7 @@ class Backlash(Effect):
         Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
         Quantity("coefficient", "1", 0.0, 2.0, "share of its torque: 1 where the model of the gap is right"),
     )
-    signature = "A burst of torque each time the torque changes sign, whatever the speed, and a jump of the link by the gap."
+    signature = "A burst of torque each time the torque changes sign, at any speed, and a jump of the link by the gap."
     explanation = "Worn teeth, keys or couplings leave free play: motor and link part when the torque turns round, and meet again."
     remedy = "Adjust or replace the gear; a preload, by gravity or a spring, keeps one flank closed."
     experiment = "Move the joint to and fro over small angles, once where gravity loads it and once where it does not."

@@ -149,7 +149,7 @@ class Effect(Placed, ABC):
         return ()
 
     def again(self, motion: Motion) -> bool:
-        """Whether it may act more than once at its place, in different shapes that this motion tells apart."""
+        """Return whether it may act more than once at its place, in different shapes that this motion tells apart."""
         return False
 
     def moving(self, arm: ArmModel) -> Array | None:
@@ -157,7 +157,7 @@ class Effect(Placed, ABC):
         return None
 
     def beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
-        """Whether `motions` go where those it was fitted to, `known`, say nothing of it."""
+        """Return whether `motions` go where those it was fitted to, `known`, say nothing of it."""
         return False
 
     def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
@@ -181,7 +181,7 @@ class Effect(Placed, ABC):
         return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
 
     def possible(self, values: Values) -> bool:
-        """Whether every parameter lies in its range."""
+        """Return whether every parameter lies in its range."""
         return all(q.low <= values[q.name] <= q.high for q in self.parameters)
 
     def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
@@ -215,7 +215,7 @@ class Effect(Placed, ABC):
 
     @property
     def adds(self) -> bool:
-        """Whether all it does is to add its columns to the torque, so that nothing else has to be worked out with it."""
+        """Return whether all it does is to add its columns to the torque, so that nothing else has to be worked out with it."""
         return type(self).apply is Effect.apply and type(self).torque is Effect.torque
 
     def at(self, values: Values) -> Self:

@@ -1,4 +1,4 @@
-"""A base that gives way under the first joint's torque."""
+"""A base resonance under the first joint's torque."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class BaseResonance(Effect):
     damping_ratio: float = 0.05  # ζ
 
     name = "base_resonance"
-    title = "Base that gives way"
+    title = "Base resonance"
     scope = "arm"
     parameters = (
         Quantity("frequency", "Hz", 1.0, 200.0, "of the base alone: the pole", shape=True),

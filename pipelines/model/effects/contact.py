@@ -34,7 +34,7 @@ class Contact(Effect):
 
     name = "contact"
     healthy = "never"
-    title = "A touch at the tip"
+    title = "Contact at the tip"
     scope = "arm"
     parameters = (
         Quantity("start", "s", -1e12, 1e12, "when it begins, from the start of its log", shape=True),

@@ -18,7 +18,7 @@ class DriveLag(Effect):
     """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt: earlier than the arm feels it."""
 
     name = "drive_lag"
-    title = "A drive that lags"
+    title = "Drive lag"
     parameters = (Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command"),)
     signature = "The logged torque leads the torque that the arm feels, on one joint; more so the faster the torque changes."
     explanation = "The current loop is slow, or the amplifier filters its command."

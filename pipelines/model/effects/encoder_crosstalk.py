@@ -23,7 +23,7 @@ class EncoderCrosstalk(Effect):
     from_joint: float = 0.0  # i, 1-based
 
     name = "encoder_crosstalk"
-    title = "Encoder that follows another joint"
+    title = "Encoder crosstalk"
     parameters = (
         Quantity("coefficient", "1", -0.5, 0.5, "part of the other joint's angle in this one's reading"),
         Quantity("from_joint", "1", 1.0, 64.0, "the other joint", shape=True, discrete=True, joint=True),

@@ -100,7 +100,7 @@ def _tilted(arm: ArmModel, angle: float, direction: float) -> ArmModel:
 
 
 def _upright(arm: ArmModel) -> bool:
-    """Whether joint 1 does not feel gravity on a level base; elsewhere a fit of the arm tells S and C."""
+    """Return whether joint 1 does not feel gravity on a level base; elsewhere a fit of the arm tells S and C."""
     chain = chain_of(arm.body)
     leaning = float(np.linalg.norm(np.cross(chain.before[0].rotation[:, 2], _axes(arm)[1])))
     return chain.revolute[0] and leaning <= _UPRIGHT

@@ -40,7 +40,7 @@ class JointElasticity(Effect):
     )
     signature = ("A residual that grows with the fourth power of frequency; antiresonance and resonance that move with posture, "
                  "and above them the motor's inertia alone.")
-    explanation = "Gear, belt or shaft give way: the link does not stand where the motor's encoder says."
+    explanation = "Gear, belt or shaft are elastic: the link is not where the motor's encoder says."
     remedy = "Check belt, clamps and gear; keep the bandwidth below the antiresonance, compensate the deflection by the torque."
     experiment = "Measure the frequency response of this joint in two postures with different inertia."
     size = "frequency"

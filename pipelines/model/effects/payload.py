@@ -1,4 +1,4 @@
-"""A load at the tip."""
+"""Payload at the tip."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Payload(Effect):
 
     name = "payload"
     healthy = "never"
-    title = "A load at the tip"
+    title = "Payload at the tip"
     scope = "arm"
     parameters = (
         Quantity("mass", "kg", -1e3, 1e3, "that hangs at the tip; negative where it was taken off"),

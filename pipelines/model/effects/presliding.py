@@ -63,7 +63,7 @@ class Presliding(Effect):
         Quantity("breakaway", "1", 0.0, 5.0, "how much larger friction is at standstill than at speed", shape=True, unsaid=0.0),
         Quantity("breakaway_speed", "rad/s", 1e-3, 5.0, "speed over which it falls to that", shape=True, unsaid=0.1),
     )
-    signature = "After each reversal friction turns over along a loop against position, whatever the speed."
+    signature = "After each reversal friction turns over along a loop against position, at any speed."
     explanation = "Contacts, seals and gears bend before they slide, and bend back after a reversal."
     remedy = ("Every bearing has it, and nothing need be broken: simulate it where slow reversals matter; friction compensation "
               "by the sign of speed alone pushes too early.")

@@ -20,7 +20,7 @@ class TorqueLag(Effect):
     """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once."""
 
     name = "torque_lag"
-    title = "A torque that is logged late"
+    title = "Torque logging delay"
     parameters = (Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one"),)
     signature = "The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative."
     explanation = "The recorder, or the current measurement, filters the torque before it is logged."

@@ -29,7 +29,7 @@ class TorqueSaturation(Effect):
 
     name = "torque_saturation"
     healthy = "never"
-    title = "Torque that is clipped"
+    title = "Torque saturation"
     parameters = (
         Quantity("limit", "N m", 1e-3, 1e5, "largest torque that comes out", shape=True),
         Quantity("coefficient", "1", 0.0, 2.0, "share of the excess that is lost: 1 where the drive clips"),

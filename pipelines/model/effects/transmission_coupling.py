@@ -1,4 +1,4 @@
-"""A motor that turns with two joints."""
+"""Coupled transmission."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class TransmissionCoupling(Effect):
     sharpness: float = 100.0  # w [s/rad]
 
     name = "transmission_coupling"
-    title = "A motor that turns with two joints"
+    title = "Coupled transmission"
     parameters = (
         Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
         Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "of the motor, at joint side"),

@@ -19,7 +19,7 @@ class Asked(Protocol):
     """The settings that stages share; None where left open."""
 
     @property
-    def filter(self) -> float | None: ...  # [Hz]
+    def cutoff_hz(self) -> float | None: ...  # [Hz]
 
     @property
     def decimate(self) -> int | None: ...
@@ -40,8 +40,8 @@ def refuse_strange(asked: Asked) -> None:
         raise UsageError("C02", "a speed that is no number from zero up", where="--min-speed", remedy="give 0 or more [rad/s]")
     if asked.decimate is not None and asked.decimate < 1:
         raise UsageError("C02", f"every {asked.decimate}th sample", where="--decimate", remedy="give 1 or more")
-    if asked.filter is not None and not 0.0 < asked.filter < np.inf:
-        raise UsageError("C02", f"a low-pass at {asked.filter:g} Hz", where="--filter", remedy="give a frequency above 0")
+    if asked.cutoff_hz is not None and not 0.0 < asked.cutoff_hz < np.inf:
+        raise UsageError("C02", f"a low-pass at {asked.cutoff_hz:g} Hz", where="--cutoff-hz", remedy="give a frequency above 0")
 
 
 def refuse_unfit(asked: Asked, log: ExperimentLog) -> None:
@@ -50,6 +50,6 @@ def refuse_unfit(asked: Asked, log: ExperimentLog) -> None:
         raise UsageError("C02", f"{len(asked.min_speed)} values for {log.n_joints} joints", where="--min-speed",
                          remedy="give one, or one a joint")
     highest = HIGHEST / log.sample_time
-    if asked.filter is not None and not asked.filter < highest:
-        raise UsageError("C02", f"a low-pass at {asked.filter:g} Hz for {log.name}, sampled at {1.0 / log.sample_time:g} Hz",
-                         where="--filter", remedy=f"give a frequency above 0 and below {HIGHEST:g} of the rate, {highest:g} Hz")
+    if asked.cutoff_hz is not None and not asked.cutoff_hz < highest:
+        raise UsageError("C02", f"a low-pass at {asked.cutoff_hz:g} Hz for {log.name}, sampled at {1.0 / log.sample_time:g} Hz",
+                         where="--cutoff-hz", remedy=f"give a frequency above 0 and below {HIGHEST:g} of the rate, {highest:g} Hz")

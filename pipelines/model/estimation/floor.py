@@ -53,9 +53,9 @@ class Beside:
     torque: Array  # [N m]
     torque_low_pass: Array  # [N m] what the low-pass over equations leaves of it
     motion: Array  # [N m] what the noise of the positions does to the torque that the model asks for, in the mean period
-    floor: Array  # [N m] that noise leaves in the mean period: torque's, over the root of their number, and motion's
+    noise_floor: Array  # [N m] that noise leaves in the mean period: torque's, over the root of their number, and motion's
     residual: Array  # [N m] root mean square of what the estimate leaves in the mean period; where there is none, in every sample
-    ratio: Array  # residual over floor: 1 where the model explains all that repeats
+    ratio: Array  # residual over noise floor: 1 where the model explains all that repeats
     settling_time: float | None = None  # [s] left out at the start of the first period compared; None: not known
 
 

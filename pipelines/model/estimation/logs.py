@@ -155,7 +155,7 @@ def _enough(equations: Sequence[LogEquations], log: ExperimentLog, fewest: int) 
                             remedy="lower --min-speed or --decimate, or record longer")
     if counts.sum() < fewest:
         raise InputRejected("T08", f"{counts.sum():.0f} equations are left, too few for a fit", where=log.source or log.name,
-                            remedy="lower --decimate, filter higher with --filter, or record longer")
+                            remedy="lower --decimate, filter higher with --cutoff-hz, or record longer")
 
 
 def judge(fitted: Fitted, motions: Motions, blocks: int, rows: Sequence[Rows] | None = None) -> Judged:
@@ -206,7 +206,7 @@ def _of_log(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: C
     equations = LogEquations(columns, found, how, held=log.torque != "measured", known=recipe.known, chosen=rows)
     if not equations.runs:
         raise InputRejected("T04", f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz",
-                            where=log.source or log.name, remedy="filter higher with --filter, or record longer")
+                            where=log.source or log.name, remedy="filter higher with --cutoff-hz, or record longer")
     if equations.rows.out.all():
         raise none_left(log, found)
     return equations

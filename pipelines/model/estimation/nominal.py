@@ -26,7 +26,7 @@ _SYMMETRIC = ("p4", "p15")  # zero where the arm's links are mirror symmetric (K
 
 
 def geared(robot: RobotDescription) -> bool:
-    """Whether a drive with a gear is described: its rotor's inertia then shows at the joint."""
+    """Return whether a drive with a gear is described: its rotor's inertia then shows at the joint."""
     matrix = robot.drive.transmission if robot.drive else None
     return matrix is not None and bool(np.abs(np.diag(np.array(matrix))).max() > 1.5)
 

@@ -52,7 +52,7 @@ class Result:
     convergence: Array  # (counts, parameters)
     convergence_std: Array
     courses: tuple[Course, ...]
-    doctor: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False, kw_only=True)  # of the logs, but "ok"
+    data_quality: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False, kw_only=True)  # of the logs, but "ok"
     arm: Arm = field(metadata=NOT_STORED, repr=False)  # the model with the covariance of its numbers
     model: ModelFile = field(metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(metadata=NOT_STORED, repr=False)

@@ -14,7 +14,7 @@ class Asked(Protocol):
     """The numbers among the settings of a design; None where left open."""
 
     @property
-    def seconds(self) -> float: ...  # of the search
+    def time_limit(self) -> float: ...  # [s] of the search
 
     @property
     def evaluations(self) -> int | None: ...
@@ -50,7 +50,7 @@ class Asked(Protocol):
     def tip_box(self) -> tuple[float, ...] | None: ...  # [m]
 
     @property
-    def keep_out(self) -> tuple[float, ...]: ...  # [Hz] pairs
+    def stop_band(self) -> tuple[float, ...]: ...  # [Hz] pairs
 
     @property
     def seed(self) -> int: ...
@@ -62,17 +62,17 @@ def refuse_strange(settings: Asked) -> None:
     Raises:
         UsageError: C02, with the option.
     """
-    positive = (("--seconds", settings.seconds), ("--evaluations", settings.evaluations), ("--cond-max", settings.cond_max),
+    positive = (("--time-limit", settings.time_limit), ("--evaluations", settings.evaluations), ("--cond-max", settings.cond_max),
                 ("--periods", settings.periods), ("--tip-speed", settings.tip_speed), ("sample_time", settings.sample_time),
                 ("torque_share", settings.torque_share), ("speed_share", settings.speed_share),
                 ("mode_factor", settings.mode_factor), *(("noise", value) for value in settings.noise or ()))
     for where, value in positive:
         if value is not None and not 0.0 < value < math.inf:
             raise UsageError("C02", f"{value:g} is not positive and finite", where=where, remedy="give a positive number")
-    if not all(map(math.isfinite, (*(settings.home or ()), *(settings.tip_box or ()), *settings.keep_out))):
-        raise UsageError("C02", "a number is not finite", where="--home, --tip-box, --keep-out", remedy="give finite numbers")
-    if any(not 0.0 <= low <= high for low, high in zip(settings.keep_out[::2], settings.keep_out[1::2], strict=False)):
-        raise UsageError("C02", "a band begins below 0 Hz, or ends before it begins", where="--keep-out", remedy="write 5,8 [Hz]")
+    if not all(map(math.isfinite, (*(settings.home or ()), *(settings.tip_box or ()), *settings.stop_band))):
+        raise UsageError("C02", "a number is not finite", where="--home, --tip-box, --stop-band", remedy="give finite numbers")
+    if any(not 0.0 <= low <= high for low, high in zip(settings.stop_band[::2], settings.stop_band[1::2], strict=False)):
+        raise UsageError("C02", "a band begins below 0 Hz, or ends before it begins", where="--stop-band", remedy="write 5,8 [Hz]")
     for where, share in (("torque_share", settings.torque_share), ("speed_share", settings.speed_share)):
         if share > 1.0:
             raise UsageError("C02", f"{share:g} of the limits is more than there is", where=where, remedy="give 1 at most")

@@ -88,7 +88,7 @@ def refuse_one(pair: Pair, written: Sequence[str]) -> None:
     first, second = (start.items() for start in pair.starts)
     if (pair.first.name, pair.first.joint) == (pair.second.name, pair.second.joint) and (first <= second or second <= first):
         why = "are one cause" if first == second else "are not two causes: one is the other with a number given"
-        raise UsageError("C02", f"{' and '.join(written)} {why}; no motion tells a cause from itself", where="--tell-apart",
+        raise UsageError("C02", f"{' and '.join(written)} {why}; no motion tells a cause from itself", where="--discriminate",
                          remedy="name another cause or joint, or give both another number")
 
 
@@ -100,14 +100,14 @@ def refuse_hidden(task: Task, pair: Pair, seed: int) -> None:
     """
     if task.arm is None:
         raise UsageError("C02", "what a cause looks like depends on the torque, and neither a model nor the links are known",
-                         where="--tell-apart", remedy="name a model: --model model.json")
+                         where="--discriminate", remedy="name a model: --model model.json")
     problem, rng = landscape(task), np.random.default_rng([seed, 9])
     seen = _judged(task, task.arm, problem, problem.start(rng), pair)
     hidden = [name for name, eta in zip(_names(pair), seen.identifiability, strict=True) if eta < _RANK]
     if hidden:
         show, them = ("show", "them") if len(hidden) > 1 else ("shows", "it")
         raise UsageError("C02", f"{' and '.join(hidden)} {show} in no motion: the base parameters take {them} up",
-                         where="--tell-apart",
+                         where="--discriminate",
                          remedy="the report of diagnose says what would tell it, under 'What these logs cannot tell'")
 
 

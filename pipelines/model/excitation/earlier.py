@@ -47,6 +47,6 @@ def first_mode(results: Iterable[Mapping[str, Any]]) -> float | None:
     except (KeyError, TypeError, ValueError):
         found = [math.nan]
     if not all(0.0 < value < math.inf for value in found):
-        raise UsageError("C02", "a result of frf does not say the frequencies of its modes", where="--after",
+        raise UsageError("C02", "a result of frf does not say the frequencies of its modes", where="--prior-logs",
                          remedy="run frf again, or leave its result out")
     return min(found, default=None)

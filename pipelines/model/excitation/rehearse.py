@@ -195,7 +195,7 @@ def _smaller(task: Task, found: Design, last: Rehearsal, seed: int, tell: Callab
 
 
 def _nearer(now: Rehearsal, last: Rehearsal) -> bool:
-    """Whether what goes beyond its limits does so by clearly less than before."""
+    """Return whether what goes beyond its limits does so by clearly less than before."""
     before = {(one.joint, one.quantity): one.by for one in last.beyond}
     return all(one.by < _HELPS * before.get((one.joint, one.quantity), np.inf) for one in now.beyond)
 

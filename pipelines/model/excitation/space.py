@@ -45,7 +45,7 @@ class Harmonics:
         return Harmonics(self.period, self.used[:, :count])
 
 
-def plan_harmonics(frequency: Sequence[float], count: Sequence[int], keep_out: Sequence[tuple[float, float]] = ()) -> Harmonics:
+def plan_harmonics(frequency: Sequence[float], count: Sequence[int], stop_band: Sequence[tuple[float, float]] = ()) -> Harmonics:
     """The harmonics of fundamentals `frequency` [Hz], `count` of them, one a joint, but for bands [Hz] to stay out of.
 
     Raises:
@@ -68,10 +68,10 @@ def plan_harmonics(frequency: Sequence[float], count: Sequence[int], keep_out: S
     for row, m, n in zip(used, multiples, count, strict=True):
         row[m - 1:m * n:m] = True
     hertz = float(base) * np.arange(1, top + 1)
-    for low, high in keep_out:
+    for low, high in stop_band:
         used[:, (hertz >= low) & (hertz <= high)] = False
     if not (used.sum(axis=1) >= 2).all():
-        raise UsageError("C02", "the bands to stay out of leave a joint fewer than two harmonics", where="--keep-out",
+        raise UsageError("C02", "the bands to stay out of leave a joint fewer than two harmonics", where="--stop-band",
                          remedy="narrow the bands, or give more harmonics")
     return Harmonics(1.0 / float(base), used)
 

@@ -45,7 +45,7 @@ class Wishes:
     cond_max: float | None = None  # ceiling on the condition number; the default criterion's is 3
     harmonics: tuple[int, ...] | None = None  # one, or one a joint
     frequency: tuple[float, ...] = (0.1,)  # [Hz] fundamental, one, or one a joint
-    keep_out: tuple[tuple[float, float], ...] = ()  # [Hz] bands
+    stop_band: tuple[tuple[float, float], ...] = ()  # [Hz] bands
     top_hz: float | None = None  # no harmonic above
     rest: bool = True
     home: tuple[float, ...] | None = None  # [rad]
@@ -164,8 +164,8 @@ def _harmonics(wishes: Wishes, joints: int, top_hz: float) -> Harmonics:
         counts = tuple(min(int(n), int(wishes.top_hz / f + 1e-9)) for n, f in zip(counts, frequency, strict=True))
         if min(counts) < _FEWEST:
             raise UsageError("C08", f"the first mode leaves {wishes.top_hz:.3g} Hz at most, a joint has fewer than {_FEWEST} "
-                             "harmonics below", where="--after", remedy="give a lower --frequency, or a smaller mode_factor")
-    return plan_harmonics(frequency, tuple(int(n) for n in counts), wishes.keep_out)
+                             "harmonics below", where="--prior-logs", remedy="give a lower --frequency, or a smaller mode_factor")
+    return plan_harmonics(frequency, tuple(int(n) for n in counts), wishes.stop_band)
 
 
 def _each(values: Sequence[float], joints: int, where: str) -> tuple[float, ...]:

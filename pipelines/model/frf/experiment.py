@@ -143,7 +143,7 @@ def turned_joint(log: ExperimentLog) -> Turned:
     v = mended["v"][:, j]
     if not np.isfinite(v).any() or float(np.nanstd(v)) <= 0.0:
         raise InputRejected("D09", f"v does not excite joint {joint}", where=log.source or log.name,
-                            remedy="inject a multisine or noise at that joint (design-excitation --for frf plans it)")
+                            remedy="inject a multisine or noise at that joint (design-excitation --experiment frf plans it)")
     for name in (quantity, "q"):
         channel = mended[name][:, j]
         if not np.isfinite(channel).any() or float(np.nanstd(channel)) <= 0.0:

@@ -223,7 +223,7 @@ def _one_spring(joint: int, pairs: list[list[Pair]], inertia: list[float], unit:
     if _accepted(spring, config) and all(own[0].rise > config.heavy for own in pairs):
         assert spring.joint is not None
         words = (f"{told}. The postures do not tell base and joint apart, but the level above the resonance is {rise:.3g} times "
-                 f"that below: what drops out there outweighs what is left, {spring.joint[1]:.3g} {unit}. That is a link behind a "
+                 f"that below: what drops out there outweighs the rest, {spring.joint[1]:.3g} {unit}. That is a link behind a "
                  "spring, not a base lighter than its arm.")
         return [_as_joint(joint, spring, pairs, inertia, words)], []
     why = "one posture only" if len(pairs) == 1 else \
@@ -241,7 +241,7 @@ def _accepted(one: Explained, config: GroupingConfig) -> bool:
 
 
 def _moves(inertia: Sequence[float], config: GroupingConfig) -> bool:
-    """Whether postures differ enough in inertia to tell by."""
+    """Return whether postures differ enough in inertia to tell by."""
     return max(inertia) > config.moves * min(inertia)
 
 
@@ -419,7 +419,7 @@ def seen_elsewhere(sure: Sequence[Finding], unsure: Sequence[Open],
 
 
 def _absorbed(base: Finding, spring: Finding, config: GroupingConfig) -> bool:
-    """Whether all that stands still for the base does so where the link behind the spring would swing."""
+    """Return whether all that stands still for the base does so where the link behind the spring would swing."""
     own = spring.frequency
     return own is not None and bool(base.stands) and \
         all(abs(one.value - own.value) < config.locked * own.value for one in base.stands)

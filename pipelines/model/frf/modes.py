@@ -115,7 +115,7 @@ def _rigid(measured: Measured, frequency: Array) -> Complex:
 
 
 def tells(measured: Measured, band: tuple[float, float] = BAND) -> bool:
-    """Whether enough of `band` [Hz] is excited for a fit, and nothing has folded into it."""
+    """Return whether enough of `band` [Hz] is excited for a fit, and nothing has folded into it."""
     return not measured.aliased and len(_in_band(measured, relative_acceleration(measured), band).frequency) >= FEWEST
 
 

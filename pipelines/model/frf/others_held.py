@@ -13,7 +13,6 @@ squares of τ_j - Σ Z_jk a_k are weighted by its own variance, renewed with Z, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -81,10 +80,8 @@ class _Fit:
 
     shape: Array  # δ [s], then log ω [rad/s] and log ζ of each mode (1 + 2 modes,)
     gains: Array  # D_jk, b_jm b_km of each mode, friction and gravity of joint j (joints (1 + modes) + 2,)
-    impedance: Complex  # Z_jk e^(sδ) (bins, joints)
     rest: Array  # real and imaginary parts over their std (2 bins,)
     spread: Array  # that std (bins,)
-
     ratios: tuple[Array | None, ...] = ()  # b_km / b_jm of each mode (others,); None: found freely
     inside: bool = True  # every frequency and damping lies within its bounds: at one, it is not found
 
@@ -143,7 +140,7 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     if not fit.passive(bound) or alone.description(rows.independent) <= fit.description(rows.independent):
         return None
     fit = _unattenuated(rows, fit)
-    held = closed_loop(_less(responses, kept, fit.impedance[:, 1:] / rigid[:, None]))
+    held = closed_loop(_less(responses, kept, _impedance(rows, fit)[:, 1:] / rigid[:, None]))
     couplings = np.stack([one[:, 1:] for one in _drawn(rows, fit, config.draws)]) / rigid[:, None]
     rest = responses.response[:, torque] - np.einsum("dbk,bk->db", couplings, responses.response[:, list(others)])
     return Held(held, np.asarray(responses.response[:, position] / rest))
@@ -176,15 +173,16 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
     known = begun[0]
     best = min((one for one in begun if one.passive(most)), key=lambda one: one.description(rows.independent), default=known)
     low, high = np.log(np.abs(rows.s[[0, -1]]))  # a mode is 2 ζ ω wide: as close as that frequencies are tried
-    shapes = [np.array([w, np.log(z)]) for z in config.dampings for w in np.arange(low + z, high, 2.0 * z)]
+    shapes = np.array([(w, np.log(z)) for z in config.dampings for w in np.arange(low + z, high, 2.0 * z)]).reshape(-1, 2)
     for _ in range(config.modes):
         starts = []
         turned = known.gains[1:rows.acceleration.shape[1]] / known.gains[0]
         for kind in (turned, None) if len(turned) else (None,):
-            for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known.impedance))):
-                trials = (_linear(rows, np.concatenate([[delay], known.shape[1:], shape]), spread, (*known.ratios, kind))
-                          for shape in shapes)
-                starts.append(min((one for one in trials if one.passive(most)), key=lambda one: one.cost, default=None))
+            for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known))):
+                before = np.concatenate([[delay], known.shape[1:]])
+                cheapest = np.argsort(_costs(rows, before, shapes, spread, (*known.ratios, kind)), kind="stable")
+                trials = (_linear(rows, np.concatenate([before, shapes[k]]), spread, (*known.ratios, kind)) for k in cheapest)
+                starts.append(next((one for one in trials if one.passive(most)), None))
         found = [one for one in (_refined(rows, start, config) for start in starts if start is not None) if one.passive(most)]
         if not found:
             break
@@ -204,7 +202,7 @@ def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
     high = np.array([config.delay, *np.tile(np.log([abs(rows.s[-1]), 1.01 * config.dampings[-1]]), modes)])
     fit, mask = start, np.zeros(len(low), dtype=bool)
     for _ in range(config.weighings):
-        spread, ratios = _spread(rows, fit.impedance), _renewed(rows, fit)
+        spread, ratios = _spread(rows, fit), _renewed(rows, fit)
 
         def rest(x: Array, spread: Array = spread, ratios: tuple[Array | None, ...] = ratios) -> Array:
             return _linear(rows, x, spread, ratios).rest
@@ -224,22 +222,47 @@ def _renewed(rows: _Rows, fit: _Fit) -> tuple[Array | None, ...]:
     return tuple(None if one is None else own for one in fit.ratios)
 
 
-def _spread(rows: _Rows, impedance: Complex) -> Array:
+def _spread(rows: _Rows, fit: _Fit) -> Array:
     """Std of a part of τ_j - Σ Z_jk a_k (bins,)."""
-    to = np.concatenate([np.ones((len(impedance), 1)), -impedance], axis=1)
+    to = np.concatenate([np.ones((len(rows.s), 1)), -_impedance(rows, fit)], axis=1)
     variance = np.einsum("ba,bac,bc->b", to, rows.covariance, np.conj(to)).real
     return np.asarray(np.sqrt(0.5 * (variance + rows.floor**2)))
 
 
 def _linear(rows: _Rows, shape: Array, spread: Array, ratios: tuple[Array | None, ...] = ()) -> _Fit:
     """Least squares of the gains, `spread` (bins,) given."""
-    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in _shapes(rows, shape, ratios)], axis=1) / spread[:, None]
-    stacked, target = np.concatenate([columns.real, columns.imag]), rows.torque / spread
-    right = np.concatenate([target.real, target.imag])
-    size = np.maximum(np.sqrt((stacked**2).sum(axis=0)), 1e-300)
-    stacked /= size
-    gains = np.linalg.pinv(stacked.T @ stacked, rcond=1e-10, hermitian=True) @ (stacked.T @ right)
-    return _Fit(shape, gains / size, _impedance(rows, shape, gains / size, ratios), right - stacked @ gains, spread, ratios)
+    stacked, size = _scaled(_columns(rows, shape, ratios) / spread)
+    right = _parts(rows.torque / spread)
+    gains = np.linalg.pinv(stacked @ stacked.T, rcond=1e-10, hermitian=True) @ (stacked @ right)
+    return _Fit(shape, gains / size, right - gains @ stacked, spread, ratios)
+
+
+def _costs(rows: _Rows, before: Array, shapes: Array, spread: Array, ratios: tuple[Array | None, ...]) -> Array:
+    """The cost (trials,) of `_linear` with delay and modes `before` and one more of each of the `shapes` (trials, 2)."""
+    known, _ = _scaled(_columns(rows, before, ratios[:-1]) / spread)
+    moved = _directions(rows, ratios[-1]) @ (rows.acceleration.T * np.exp(before[0] * rows.s) / spread)
+    new, _ = _scaled(np.stack([_mode(rows.s, w, z) * moved for w, z in shapes]))  # (trials, columns of a mode, 2 bins)
+    right, count = _parts(rows.torque / spread), len(known)
+    normal = np.empty((len(shapes), count + len(moved), count + len(moved)))
+    normal[:, :count, :count] = known @ known.T
+    normal[:, count:, :count] = new @ known.T
+    normal[:, :count, count:] = normal[:, count:, :count].swapaxes(1, 2)
+    normal[:, count:, count:] = new @ new.swapaxes(1, 2)
+    target = np.concatenate([np.tile(known @ right, (len(shapes), 1)), new @ right], axis=1)[:, :, None]
+    taken = target.swapaxes(1, 2) @ np.linalg.pinv(normal, rcond=1e-10, hermitian=True) @ target
+    return np.asarray(right @ right - taken[:, 0, 0])
+
+
+def _parts(values: Complex) -> Array:
+    """Real parts, then imaginary parts, along the last axis."""
+    return np.concatenate([values.real, values.imag], axis=-1)
+
+
+def _scaled(columns: Complex) -> tuple[Array, Array]:
+    """Parts of columns (…, bins) of unit length (…, 2 bins), and their lengths (…)."""
+    parts = _parts(columns)
+    size = np.maximum(np.sqrt((parts**2).sum(axis=-1)), 1e-300)
+    return parts / size[..., None], size
 
 
 def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
@@ -247,7 +270,7 @@ def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
 
     Expected normal equations hold the covariance of the noise; it is known, and taken out (Söderström 2007, Automatica 43, §5.1).
     """
-    shapes, w = np.stack(_shapes(rows, fit.shape, fit.ratios)), 0.5 / fit.spread**2  # (gains, bins, joints)
+    shapes, w = _shapes(rows, fit.shape, fit.ratios), 0.5 / fit.spread**2
     columns = np.einsum("gbk,bk->gb", shapes, rows.acceleration)
     normal = ((columns * w) @ np.conj(columns.T)).real
     noise = np.einsum("gbk,bkl,hbl,b->gh", shapes, rows.covariance[:, 1:, 1:], np.conj(shapes), w, optimize=True).real
@@ -255,20 +278,21 @@ def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
         return fit
     cross = np.einsum("gbk,bk,b->g", shapes, rows.covariance[:, 1:, 0], w, optimize=True).real
     gains = np.linalg.solve(normal - noise, ((columns * w) @ np.conj(rows.torque)).real - cross)
-    return replace(fit, gains=gains, impedance=_impedance(rows, fit.shape, gains, fit.ratios))
+    return replace(fit, gains=gains)
 
 
 def _drawn(rows: _Rows, fit: _Fit, draws: int) -> list[Complex]:
     """Impedances (bins, joints) each, within what is known of shape and gains."""
     step, count = 1e-5, len(fit.shape)
     steps = step * np.array([1e-3, *np.ones(count - 1)])
-    moved = [(_impedance(rows, fit.shape + one, fit.gains, fit.ratios) - fit.impedance) / one.sum() for one in np.diag(steps)]
+    found = _impedance(rows, fit)
+    moved = [(_impedance(rows, replace(fit, shape=fit.shape + one)) - found) / one.sum() for one in np.diag(steps)]
     every = (*moved, *_shapes(rows, fit.shape, fit.ratios))
-    columns = np.stack([(one * rows.acceleration).sum(axis=1) for one in every]) / fit.spread
+    columns = (np.stack(every) * rows.acceleration).sum(axis=2) / fit.spread
     covariance = _inverse((columns @ np.conj(columns.T)).real)
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     about = np.random.default_rng(0).multivariate_normal(np.zeros(len(size)), covariance / np.outer(size, size), draws) * size
-    return [_impedance(rows, fit.shape + one[:count], fit.gains + one[count:], fit.ratios) for one in about]
+    return [_impedance(rows, replace(fit, shape=fit.shape + one[:count], gains=fit.gains + one[count:])) for one in about]
 
 
 def _inverse(normal: Array) -> Array:
@@ -277,16 +301,40 @@ def _inverse(normal: Array) -> Array:
     return np.asarray(np.linalg.pinv(normal / np.outer(size, size), rcond=1e-12, hermitian=True) / np.outer(size, size))
 
 
-def _impedance(rows: _Rows, shape: Array, gains: Array, ratios: tuple[Array | None, ...]) -> Complex:
-    return np.asarray(sum(gain * one for gain, one in zip(gains, _shapes(rows, shape, ratios), strict=True)))
+def _impedance(rows: _Rows, fit: _Fit) -> Complex:
+    """Z_jk e^(sδ) (bins, joints)."""
+    factors, directions = _factors(rows, fit.shape, fit.ratios)
+    return np.asarray((fit.gains[:, None] * factors).T @ directions)
 
 
-def _shapes(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> Sequence[Complex]:
-    """What each gain multiplies in Z e^(sδ), each (bins, joints)."""
+def _columns(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> Complex:
+    """The torque of each gain (gains, bins)."""
+    factors, directions = _factors(rows, shape, ratios)
+    return np.asarray(factors * (directions @ rows.acceleration.T))
+
+
+def _shapes(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> Complex:
+    """What each gain multiplies in Z e^(sδ) (gains, bins, joints)."""
+    factors, directions = _factors(rows, shape, ratios)
+    return np.asarray(factors[:, :, None] * directions[:, None, :])
+
+
+def _factors(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> tuple[Complex, Array]:
+    """The same as a factor (gains, bins) and a direction (gains, joints) each."""
     s, unit = rows.s, np.eye(rows.acceleration.shape[1])
-    late = np.exp(shape[0] * s)
-    found = [late[:, None] * one for one in unit]
+    factors, directions = [np.ones_like(s)] * len(unit), [*unit]
     for (w, z), ratio in zip(shape[1:].reshape(-1, 2), ratios, strict=True):
-        mode = -late * s**2 / (s**2 + 2.0 * np.exp(z + w) * s + np.exp(2.0 * w))
-        found += [mode[:, None] * one for one in (unit if ratio is None else [np.concatenate([[1.0], ratio])])]
-    return [*found, *((late / s**power)[:, None] * unit[0] for power in (1, 2))]
+        along = _directions(rows, ratio)
+        factors += [_mode(s, w, z)] * len(along)
+        directions += [*along]
+    return np.stack([*factors, 1.0 / s, 1.0 / s**2]) * np.exp(shape[0] * s), np.stack([*directions, unit[0], unit[0]])
+
+
+def _directions(rows: _Rows, ratio: Array | None) -> Array:
+    """b_k / b_j of a mode (columns, joints): each joint by itself where it is not known."""
+    return np.eye(rows.acceleration.shape[1]) if ratio is None else np.concatenate([[1.0], ratio])[None]
+
+
+def _mode(s: Complex, w: float, z: float) -> Complex:
+    """What b_jm b_km multiplies in Z for log ω = `w`, log ζ = `z` (bins,)."""
+    return np.asarray(-(s**2) / (s**2 + 2.0 * np.exp(z + w) * s + np.exp(2.0 * w)))

@@ -67,7 +67,7 @@ def unseen(covered: Coverage, ladder: Ladder) -> tuple[Unseen, ...]:
     found = []
     if not (covered.forth and covered.back):
         way = "negative" if covered.forth else "positive"
-        found.append(Unseen(f"the joint never moves in the {way} direction: Coulomb friction is not told from an offset", _WORDS))
+        found.append(Unseen(f"the joint never moves in the {way} direction: Coulomb friction is confounded with an offset", _WORDS))
     elif min(covered.forth, covered.back) < _SPEEDS or covered.decades < _DECADES:
         found.append(Unseen(f"speeds cover {covered.decades:.1f} decades, {covered.forth} steps of five a decade forth and "
                             f"{covered.back} back", _WORDS))

@@ -78,5 +78,5 @@ def _compensated(joint: JointFit, log: ExperimentLog) -> Check | None:
 def _one_way(joint: JointFit, log: ExperimentLog) -> Check | None:
     if joint.covered.forth and joint.covered.back:
         return None
-    return Check.of("D10", "warn", f"joint {joint.logs.joint} moves one way only: Coulomb friction is not told from an offset",
+    return Check.of("D10", "warn", f"joint {joint.logs.joint} moves one way only: Coulomb friction is confounded with an offset",
                     where=log.source or log.name, gate=True, remedy="record the joint in both directions")

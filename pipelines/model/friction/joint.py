@@ -169,7 +169,7 @@ class _Rows:
 
     @property
     def any_slide(self) -> bool:
-        """Whether rows of the fitted stretches slide."""
+        """Return whether rows of the fitted stretches slide."""
         return bool(self.sliding.slides[:sum(stretch.rows for stretch in self.stretches[:self.fitted])].any())
 
 

@@ -180,7 +180,7 @@ def _best(tried: Sequence[Tried]) -> Tried:
 
 
 def no_worse(one: Array, best: Array) -> bool:
-    """Whether residuals are not measurably larger than the best law's.
+    """Return whether residuals are not measurably larger than the best law's.
 
     Σ r² - Σ b² = Σ δ² + 2 Σ δ b with δ = r - b. Where the best law is right, b is noise, and the last sum is what chance
     does to the difference. Its deviation comes from sums over blocks, within which noise may remember itself.

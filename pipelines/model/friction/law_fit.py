@@ -32,7 +32,7 @@ class Number:
 
     @property
     def known(self) -> bool:
-        """Whether the logs tell it from the others; else its value is one of many that give the same curve."""
+        """Return whether the logs tell it from the others; else its value is one of many that give the same curve."""
         return self.seen >= _SEEN
 
 

@@ -79,7 +79,7 @@ class Law:
 
     @cached_property
     def pointwise(self) -> bool:
-        """Whether its torque at one moment depends on that moment alone: not on what went before, as presliding does."""
+        """Return whether its torque at one moment depends on that moment alone: not on what went before, as presliding does."""
         motion, arm = _trial()
         back = Motion(motion.t, motion.q[::-1], motion.dq[::-1], motion.ddq[::-1])
         theta = np.mean(self.bounds, axis=0)
@@ -87,7 +87,7 @@ class Law:
 
     @cached_property
     def sees_load(self) -> bool:
-        """Whether it depends on the torque that the joint carries."""
+        """Return whether it depends on the torque that the joint carries."""
         motion, arm = _trial()
         theta = np.mean(self.bounds, axis=0)
         return not np.array_equal(self.columns(motion, arm, theta), self.columns(motion, arm.carrying(2.0, (1.0, 3.0)), theta))
@@ -150,7 +150,7 @@ class Law:
 
     @cached_property
     def sloped(self) -> bool:
-        """Whether every effect with non-linear numbers says its slopes."""
+        """Return whether every effect with non-linear numbers says its slopes."""
         motion, _ = _trial()
         return self.slopes(motion, np.mean(self.bounds, axis=0), np.ones(self.amplitudes)) is not None
 

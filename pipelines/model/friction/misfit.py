@@ -53,7 +53,7 @@ def _unexplained(joint: JointResult, where: str) -> Check | None:
         return None
     return Check.of("D19", "warn", f"rigid body and friction leave {100.0 * error:.0f} % of the held-out torque of joint "
                     f"{joint.joint} (rms): neither this inertia nor this friction describes it", where=where, gate=True,
-                    remedy="let 'rrrid diagnose' say what the torque is made of beside them")
+                    remedy="let 'rrrid diagnose' look for further causes")
 
 
 def _rippling(joint: JointResult, where: str) -> Check | None:
@@ -83,7 +83,7 @@ def _waves_in_words(joint: JointResult, ripple: Rippled) -> str:
     if near and (order < _SEVERAL * apart or not ripple.largest_share >= _MOST):
         return ""
     length = f"a wave every {plain_number(2000.0 * math.pi / order)} mm"
-    size = f"about {plain_number(order)} waves a turn" if joint.revolute else length
+    size = f"about {plain_number(order)} cycles per revolution" if joint.revolute else length
     return f", mostly {size}" if others else f", {size}"
 
 

@@ -81,7 +81,7 @@ def _group(t: Array, window: int) -> int:
 
 
 def _steady(middle: Array, change: Array, little: float) -> tuple[npt.NDArray[np.bool_], Array, Array]:
-    """Whether the speed of each group of intervals keeps its sign, its mean and its standard deviation in time (groups,)."""
+    """Return whether the speed of each group of intervals keeps its sign, its mean and its standard deviation in time (groups,)."""
     each = np.full(middle.shape[1], 1.0 / middle.shape[1])
     mean = middle @ each
     square = np.square(middle - mean[:, None]) @ each + np.square(change) @ each / 12.0

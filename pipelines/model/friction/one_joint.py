@@ -82,7 +82,7 @@ def gravity_names(revolute: bool) -> tuple[str, ...]:
 
 
 def gravity_acts(robot: RobotDescription, joint: int, others: Sequence[float]) -> bool:
-    """Whether gravity has a moment about the axis of `joint`, counted from 1, or a part along it where that slides.
+    """Return whether gravity has a moment about the axis of `joint`, counted from 1, or a part along it where that slides.
 
     Args:
         others: (joints - 1,) positions of the other joints [rad].

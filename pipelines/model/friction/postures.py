@@ -28,7 +28,7 @@ def nearest(posture: tuple[float, ...], known: Sequence[tuple[float, ...]]) -> i
 
 
 def alike(a: tuple[float, ...], b: tuple[float, ...]) -> bool:
-    """Whether inertia and gravity may be taken as the same."""
+    """Return whether inertia and gravity may be taken as the same."""
     return _apart(a, b) < _ALIKE
 
 

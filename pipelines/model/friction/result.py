@@ -21,8 +21,8 @@ from pipelines.model.friction.several import SeveralFit
 from pipelines.model.friction.undecided import undecided
 from pipelines.model.friction.weak_form import moved
 
-__all__ = ["Drift", "Event", "JointResult", "Posture", "Result", "Rippled", "Rung", "Series", "Sticking", "Validation", "Value",
-           "drift_of_joint", "joint_result", "several_results"]
+__all__ = ["CandidateLaw", "Drift", "Event", "JointResult", "Posture", "Result", "Rippled", "Series", "Sticking", "Validation",
+           "Value", "drift_of_joint", "joint_result", "several_results"]
 
 _POINTS = 1500  # of a figure
 _CURVE = 401
@@ -50,7 +50,7 @@ class Validation:
 
 
 @dataclass(frozen=True)
-class Rung:
+class CandidateLaw:
     """A law of the ladder. Torques are means over windows."""
 
     law: str
@@ -162,7 +162,7 @@ class JointResult:
     gravity: dict[str, Value]  # c of sin q, c' of cos q; a prismatic joint's weight
     postures: tuple[Posture, ...]
     validation: Validation
-    ladder: tuple[Rung, ...]
+    candidate_laws: tuple[CandidateLaw, ...]
     judged_by: str  # "logs" | "blocks"
     unseen: tuple[Missing, ...]
     break_away: tuple[Event, ...]
@@ -177,7 +177,7 @@ class JointResult:
 
     @property
     def revolute(self) -> bool:
-        """Whether it turns; else it slides."""
+        """Return whether it turns; else it slides."""
         return self.inertia.unit == "kg m^2"
 
 
@@ -215,8 +215,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, n
     std |= {key: p.std for key, p in known.items() if p.std is not None}
     numbers = {key if len(members) > 1 else key.partition(".")[2]: Value(p.value, std.get(key), p.unit)
                for key, p in known.items() if key.partition(".")[0] in members}
-    rungs = tuple(Rung(one.law.name, one.law.size, one.identify_rms, one.validate_rms, ladder.alike(one), one is ladder.chosen,
-                       one.reason) for one in ladder.tried)
+    laws = _candidates(ladder)
     fastest, slowest = float(speed.max()), float(np.quantile(speed, 0.02))
     side = np.concatenate([[0.0], np.geomspace(1e-3 * fastest, fastest, _CURVE // 2)])
     axis = np.concatenate([-side[:0:-1], side])
@@ -229,7 +228,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array, n
              (Missing("the joint does not move in these logs: neither its inertia nor its friction is shown", _DRIVE),))
     return JointResult(j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
                        (Posture(tuple(map(float, middle)), inertia, {}),),
-                       Validation(None, None, "", False, _torque_error(ladder)), rungs, ladder.by, open_, (), None,
+                       Validation(None, None, "", False, _torque_error(ladder)), laws, ladder.by, open_, (), None,
                        (slowest, fastest), names, series, ripple if moves else None, moves)
 
 
@@ -256,12 +255,11 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
     postures = tuple(_posture(joint, k) for k in range(len(fit.postures)))
     driven = joint.driven
     errors = [_finite(driven.error(simulated)) for simulated in (driven.with_friction, driven.without)]
-    rungs = tuple(Rung(one.law.name, one.law.size, one.identify_rms, one.validate_rms, ladder.alike(one), one is ladder.chosen,
-                       one.reason) for one in ladder.tried)
+    laws = _candidates(ladder)
     events = tuple(Event(event.direction, Value(event.torque, event.std, unit), event.events) for event in joint.break_away)
     return JointResult(
         joint.logs.joint, name, fit.law.name, method, parameters, postures[0].inertia, postures[0].gravity, postures,
-        Validation(errors[0], errors[1], driven.stretch.name, driven.judging, _torque_error(ladder)), rungs, ladder.by,
+        Validation(errors[0], errors[1], driven.stretch.name, driven.judging, _torque_error(ladder)), laws, ladder.by,
         tuple(Missing(gap.what, gap.record) for gap in joint.unseen), events, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)), _series(joint),
@@ -307,6 +305,11 @@ def _stick_slips(joint: JointFit) -> int:
         again = (np.diff(moving) > 1) & (side[moving[1:]] == side[moving[:-1]])
         count += int(again.sum())
     return count
+
+
+def _candidates(ladder: Ladder) -> tuple[CandidateLaw, ...]:
+    return tuple(CandidateLaw(one.law.name, one.law.size, one.identify_rms, one.validate_rms, ladder.alike(one),
+                              one is ladder.chosen, one.reason) for one in ladder.tried)
 
 
 def _torque_error(ladder: Ladder) -> float | None:

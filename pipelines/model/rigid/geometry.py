@@ -39,7 +39,7 @@ class Placement:
 
     @cached_property
     def moves(self) -> bool:
-        """Whether the new frame differs from the old one at all."""
+        """Return whether the new frame differs from the old one at all."""
         return bool(np.any(self.rotation != np.eye(3)) or np.any(self.position))
 
     @cached_property

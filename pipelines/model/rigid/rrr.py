@@ -47,7 +47,7 @@ _PARAMETERS = (
 
 
 def fits(robot: RobotDescription) -> bool:
-    """Whether (A1)-(A5) describe `robot`: DH with alpha = (pi/2, 0, 0), a1 = 0, gravity along -z, no tool."""
+    """Return whether (A1)-(A5) describe `robot`: DH with alpha = (pi/2, 0, 0), a1 = 0, gravity along -z, no tool."""
     if robot.convention != "dh" or len(robot.joints) != 3 or not all(robot.revolute):
         return False
     one, two, three = robot.joints

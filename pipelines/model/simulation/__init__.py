@@ -60,7 +60,7 @@ def choose_steps(arm: Arm, experiments: Sequence[Experiment], noise: Noise | Non
 
 
 def runs_alone(arm: Arm, experiment: Experiment) -> bool:
-    """Whether each replica is simulated by itself, so that several at once save nothing."""
+    """Return whether each replica is simulated by itself, so that several at once save nothing."""
     return OneLoop.fits(Plant.of(arm), experiment)
 
 

@@ -33,7 +33,7 @@ class OneHooked:
 
     @staticmethod
     def fits(plant: Plant) -> bool:
-        """Whether its body is in closed form, with one set of parameters."""
+        """Return whether its body is in closed form, with one set of parameters."""
         return isinstance(plant.body, RRR) and plant.p.size == 15
 
     def advance(self, t: Array, state: Array, states: Array, command: Array) -> Array:

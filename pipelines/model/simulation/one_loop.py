@@ -65,7 +65,7 @@ class OneLoop:
 
     @staticmethod
     def fits(plant: Plant, experiment: Experiment) -> bool:
-        """Whether encoders see the angles as they are, and the torque hangs on nothing but reference and error."""
+        """Return whether encoders see the angles as they are, and the torque hangs on nothing but reference and error."""
         law = experiment.controller.law in ("pd", "pd+feedforward") and experiment.driven is None
         each = experiment.v is None or experiment.v.ndim == 2
         return law and each and OneRRR.fits(plant) and not any(hook.sensor for hook in plant.hooks)

@@ -122,7 +122,7 @@ class Plant:
 
 
 def _in_numbers(hook: Hooks) -> bool:
-    """Whether all that it does to torque is known in plain numbers."""
+    """Return whether all that it does to torque is known in plain numbers."""
     driven = hook.actuator is None or (hook.drive is not None and not hook.states)
     return driven and bool(hook.alone or hook.remembering or not (hook.load or hook.states))
 

@@ -102,7 +102,7 @@ def one_task(logs: Sequence[ExperimentLog], like: ExperimentLog) -> list[Experim
 
 
 def _same_reference(one: ExperimentLog, two: ExperimentLog) -> bool:
-    """Whether both follow one reference, counted from where it sets out."""
+    """Return whether both follow one reference, counted from where it sets out."""
     if not np.isclose(one.sample_time, two.sample_time, rtol=1e-9, atol=0.0):
         return False
     (a, first), (b, second) = ((log["q_ref"], _sets_out(log["q_ref"])) for log in (one, two))

@@ -93,7 +93,7 @@ class _Path:
         return np.stack([np.interp(s, self._s, column) for column in self._points.T], axis=-1)
 
     def holds(self, form: _Form, start: float) -> bool:
-        """Whether `form` lies on the path from `start` on."""
+        """Return whether `form` lies on the path from `start` on."""
         if start + form.length > self.length + _OFF:
             return False
         here = self.at(start + form.at)

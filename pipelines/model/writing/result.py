@@ -68,7 +68,7 @@ class Result:
     simulation_left_out: str
     imitation: Imitation | None
     design: Designed | None
-    doctor: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False)
+    data_quality: tuple[Check, ...] = field(default=(), metadata=NOT_STORED, repr=False)
     derived: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED, repr=False)
     table: ControllerTable | None = field(default=None, metadata=NOT_STORED, repr=False)
     online_seconds: tuple[float, ...] = field(default=(), metadata=NOT_STORED, repr=False)  # [s] a sample, of each log

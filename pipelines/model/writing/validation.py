@@ -113,7 +113,7 @@ def _cases(pairs: Pairs, parts: list[ArmTorque], arm: Arm, effort: Effort) -> tu
     missing = [case for case in _CASES if case not in cases]
     reason = ""
     if missing and not effort.simulate:
-        reason = "it was not asked to simulate those that nobody recorded"
+        reason = "it was not asked to simulate those that were not recorded"
     elif missing and not (reason := why_not(recording(base))):
         some, reason = possible(base, missing)
         try:

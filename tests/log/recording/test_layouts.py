@@ -24,7 +24,8 @@ def test_a_layout_is_drafted_right_or_asked_about(name: str, tmp_path: Path) -> 
     assert found.outcome == ("right" if name in RIGHT else "asks"), found.why
 
 
-@pytest.mark.parametrize("layout", outside_layouts.load(outside_layouts.TESTED), ids=lambda layout: layout.name)
+@pytest.mark.parametrize("layout", [pytest.param(layout, id=layout.name, marks=pytest.mark.slow if k % 4 else ())
+                                    for k, layout in enumerate(outside_layouts.load(outside_layouts.TESTED))])
 def test_a_draft_of_a_foreign_format_claims_nothing_untrue(layout: Layout, tmp_path: Path) -> None:
     """Formats that others chose: every column, unit, clock and sign that is filled in is the true one."""
     run, answer = written(layout, tmp_path, seed=77)

@@ -1,4 +1,4 @@
-"""Logs of a rotor that turns about a level axis: its ripple, its friction, and a torque that is logged late."""
+"""Logs of a rotor that turns about a level axis: its ripple, its friction, and torque logging delay."""
 
 from __future__ import annotations
 

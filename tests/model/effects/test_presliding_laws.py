@@ -105,10 +105,11 @@ def fitted(law: Law) -> tuple[Presliding, float]:
     (integrated(lambda z, s: (1.0 - s * z) / DISTANCE), 0.0, {"distance": DISTANCE}, 0.01),
     pytest.param(integrated(lambda z, s: (1.0 - s * z) / DISTANCE, damping=0.005), 0.0, {"distance": DISTANCE}, 0.01,
                  marks=pytest.mark.slow),
-    (integrated(lambda z, s: max(1.0 - s * z, 0.0) ** 0.5 / DISTANCE), 0.0, {}, 0.02),
+    pytest.param(integrated(lambda z, s: max(1.0 - s * z, 0.0) ** 0.5 / DISTANCE), 0.0, {}, 0.02, marks=pytest.mark.slow),
     pytest.param(integrated(dupont), 0.0, {"distance": DISTANCE}, 0.02, marks=pytest.mark.slow),
     (maxwell_slip, 1.0, {}, 0.03),
-    (breaking_away, 0.0, {"distance": DISTANCE, "breakaway": 0.5, "breakaway_speed": 0.1}, 0.02),
+    pytest.param(breaking_away, 0.0, {"distance": DISTANCE, "breakaway": 0.5, "breakaway_speed": 0.1}, 0.02,
+                 marks=pytest.mark.slow),
 ], ids=["dahl", "lugre", "dahl of exponent one half", "dupont", "maxwell slip", "lugre with breakaway"])
 def test_a_law_fitted_to_one_motion_holds_on_another(law: Law, inner: float, numbers: dict[str, float], share: float) -> None:
     """Torque within `share` of the amplitude (rms), the amplitude within 3 %, the law's other numbers within 5 %, and

@@ -142,7 +142,7 @@ def test_an_interruption_keeps_the_best() -> None:
     ({"velocity": np.inf, "acceleration": np.inf}, {}, "no limit of speed"),
     ({"position": (1.0, 2.0)}, {"home": (0.0, 1.5, 1.5)}, "home of joint 1"),
     ({}, {"cond_max": 1.2}, "below 1.22474"),
-    ({}, {"keep_out": ((0.0, 99.0),)}, "fewer than two harmonics"),
+    ({}, {"stop_band": ((0.0, 99.0),)}, "fewer than two harmonics"),
     ({}, {"criterion": "best"}, "no criterion"),
 ])
 def test_what_is_impossible_is_named(changes: dict[str, float], wishes: dict[str, object], named: str) -> None:

@@ -117,7 +117,7 @@ def test_rows_are_the_regressor_s(robot: RobotDescription) -> None:
 
 def test_steps_stay_in_the_space() -> None:
     """Whatever is added along a gradient, the motion starts at rest at home and uses no forbidden harmonic."""
-    task = plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(30,), keep_out=((1.0, 1.5),), home=(0.3, -1.2, 0.4)))
+    task = plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(30,), stop_band=((1.0, 1.5),), home=(0.3, -1.2, 0.4)))
     problem = _problem(task, 400)
     x = problem.start(np.random.default_rng(3))
     _, gradient, _ = problem.value(x, SHARP, WEIGHT)

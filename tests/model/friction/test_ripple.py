@@ -75,7 +75,7 @@ def test_cogging_is_told_with_its_size(seed: int) -> None:
     truth = float(np.std([cogging(angle, 0.0) for angle in np.linspace(q.min(), q.max(), 2000).tolist()]))
     assert float(np.std(ripple.along.waves)) == pytest.approx(truth, rel=0.02)
     assert ripple.share > 0.8
-    assert "about 12 waves a turn" in ripple_in_words(joint_result(found, "joint", "varpro"))
+    assert "about 12 cycles per revolution" in ripple_in_words(joint_result(found, "joint", "varpro"))
 
 
 def spring(q: float, v: float) -> float:
@@ -118,7 +118,7 @@ def test_a_hundred_and_twenty_waves_in_words() -> None:
     joint = joint_result(fitted(held_back(lambda q, v: 0.3 * math.sin(120.0 * q), seconds=10.0)), "joint", "varpro")
     (check,) = misfits((joint,), "log")
     for words in (ripple_in_words(joint), check.message):
-        assert "about 120 waves a turn" in words
+        assert "about 120 cycles per revolution" in words
 
 
 def test_value_and_deviation_end_at_one_place() -> None:

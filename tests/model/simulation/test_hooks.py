@@ -139,7 +139,7 @@ def test_an_arm_whose_drives_turn_the_wrong_way_runs_away(replicas: int) -> None
 
 
 def test_a_sensor_is_in_the_loop() -> None:
-    """An encoder that follows another joint."""
+    """An encoder crosstalk."""
     mix = np.array([[1.0, 0.0, 0.0], [0.02, 1.0, 0.0], [0.0, 0.0, 1.0]])
     found = simulated(lambda arm: Hooks(sensor=lambda q, _: q @ mix.T))
     expected = judge(sense=lambda q: mix @ q).position()

@@ -28,7 +28,7 @@ from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.one_rrr import OneRRR
 from tests.model.simulation.arms import KD, KP, TS, experiment, rrr
 
-SAMPLES, MANY = 400, 9  # more replicas than are run one after the other
+SAMPLES, MANY = 150, 9  # more replicas than are run one after the other
 LAWS = {
     "Dahl": Presliding(joint=2, distance=0.01),
     "LuGre": Presliding(joint=2, distance=0.01, damping_time=0.004),

@@ -54,7 +54,7 @@ def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
     """Return the errors of the nominal model on held-out motion, and the state of its floor."""
     judge = prepared.data if prepared.judge is None else prepared.judge
     left = found.residual_rms.validate
-    known = np.full(len(left), found.floor_origin != "blocks")
+    known = np.full(len(left), found.noise_floor_origin != "blocks")
     if not known.all():
         known = left <= _ABOVE * _noise(prepared)
     return Facts(left, judge.rms(judge.y), predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns))),

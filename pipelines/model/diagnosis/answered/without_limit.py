@@ -19,7 +19,7 @@ _NOMINAL = "it is part of the nominal model, whose friction is fitted to these l
 _LAW = "it is another law of friction for the nominal model, and no fault: fit-friction chooses among the laws"
 _RESPONSES = "the frequency responses show none at the joints that they are of, below the highest frequency that they excite"
 _STILL = "the base parameters are not found to have moved since the reference logs as it moves them"
-_NOT_ASKED = "it was looked for; how small a one would have been found was not worked out"
+_NOT_ASKED = "it was looked for; no detection limit was computed"
 
 
 def without_limit(told: Diagnosis, frf: bool, without: Collection[str] = ()) -> tuple[WithoutLimit, ...]:

@@ -2,7 +2,7 @@
 
     where(finding)                 " at joint 2 (from joint 1)"
     how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
-    beside(findings)               "; and a torque that is logged late (120 ms) at joint 1"
+    beside(findings)               "; and torque logging delay (120 ms) at joint 1"
     taken_in(finding, left)        ", most of which the nominal model had taken in"
     of_any_size(finding)           whether these logs leave open how large its torque is
 """
@@ -59,7 +59,7 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
 
 
 def beside(others: Sequence[Finding]) -> str:
-    """"; and a torque that is logged late (120 ms) at joint 1", and how many more where they are many; or nothing."""
+    """"; and torque logging delay (120 ms) at joint 1", and how many more where they are many; or nothing."""
     told = [f"{within(one.title)}{how_much(one)}{where(one)}" for one in others[:_TOLD]]
     if len(others) > _TOLD:
         told.append(f"{len(others) - _TOLD} more")
@@ -80,7 +80,7 @@ def taken_in(one: Finding, left: Array) -> str:
 
 
 def of_any_size(one: Finding) -> bool:
-    """Whether the largest torque among its numbers has no finite deviation: the model can take in any amount of it."""
+    """Return whether the largest torque among its numbers has no finite deviation: the model can take in any amount of it."""
     told = [(abs(float(np.nan_to_num(value.value))), value.std) for value in one.parameters.values()
             if value.unit in _TORQUES and isinstance(value.value, int | float)]
     _, std = max(told, key=lambda each: each[0], default=(0.0, None))

@@ -24,31 +24,31 @@ from pipelines.model.plausibility import mismatches
 __all__ = ["examined", "logs_of_roles"]
 
 
-def examined(logs: Iterable[ExperimentLog], allow_mismatch: bool = False) -> tuple[tuple[Check, ...], Boundary | None]:
+def examined(logs: Iterable[ExperimentLog], skip_sanity_checks: bool = False) -> tuple[tuple[Check, ...], Boundary | None]:
     """What the doctor says of the logs, checks that found nothing apart; and the torque boundary.
 
     Raises:
         InputRejected: its first reason to reject a log; S13, S23, S24, S25: the torque is not what the description takes it for;
-            S13, S14, S15, T06: torque and motion of a log do not belong together, with the repair, unless `allow_mismatch`.
+            S13, S14, S15, T06: torque and motion of a log do not belong together, with the repair, unless `skip_sanity_checks`.
     """
     every = list(logs)
-    said = shared_out(partial(_said, allow_mismatch=allow_mismatch), every)
+    said = shared_out(partial(_said, skip_sanity_checks=skip_sanity_checks), every)
     gates = [told for told in said if isinstance(told, Check)]
     if reject := next((told for told in gates if told.level == "reject"), None):
         raise reject.as_error()
     boundary = torque_boundary(every)
     findings = boundary_findings(boundary, every[0].source or every[0].name if every else "")
-    for told in (*(() if allow_mismatch else map(_with_way_out, findings)), *gates):
+    for told in (*(() if skip_sanity_checks else map(_with_way_out, findings)), *gates):
         raise told.as_error()
     checks = tuple(check for told in said if not isinstance(told, Check) for check in told)
     return (*(replace(check, gate=False) for check in findings), *without_followers(checks, findings)), boundary
 
 
 def _with_way_out(check: Check) -> Check:
-    return replace(check, remedy=f"{check.remedy}; if it is right as it is, say --allow-mismatch")
+    return replace(check, remedy=f"{check.remedy}; if it is right as it is, say --skip-sanity-checks")
 
 
-def _said(log: ExperimentLog, allow_mismatch: bool) -> tuple[Check, ...] | Check:
+def _said(log: ExperimentLog, skip_sanity_checks: bool) -> tuple[Check, ...] | Check:
     """Of one log; the check that rejects it, where one does."""
     subject = Subject(recording(log))
     checks = [check for check in check_log(subject) if check.level != "ok"]
@@ -57,7 +57,7 @@ def _said(log: ExperimentLog, allow_mismatch: bool) -> tuple[Check, ...] | Check
         exact = against_command(subject) if reject.code == "RRID-S05" else ()
         return next((check for check in exact if check.code == "RRID-S10"), reject)
     against = mismatches(subject)
-    if not allow_mismatch and (gate := next((check for check in against if check.gate), None)):
+    if not skip_sanity_checks and (gate := next((check for check in against if check.gate), None)):
         return _with_way_out(gate)
     return tuple(replace(check, gate=False) for check in (*checks, *against))
 

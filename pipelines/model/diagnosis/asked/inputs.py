@@ -164,7 +164,7 @@ def _all_rows(parts: Sequence[Motions], columns: Columns, recipe: Recipe, still:
 
 
 def _enough(rows: Sequence[Data | None]) -> bool:
-    """Whether every joint moves in the fitted logs for as many equations as a fit asks for."""
+    """Return whether every joint moves in the fitted logs for as many equations as a fit asks for."""
     data = rows[0]
     return data is not None and bool((np.bincount(data.joint[data.counts], minlength=data.n_joints) >= FEWEST_OF_JOINT).all())
 

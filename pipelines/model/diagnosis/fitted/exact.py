@@ -62,7 +62,7 @@ class Named:
 
     @property
     def possible(self) -> bool:
-        """Whether every number lies in its range, amplitudes of derived sign apart."""
+        """Return whether every number lies in its range, amplitudes of derived sign apart."""
         return self.effect.possible(self.values)
 
 

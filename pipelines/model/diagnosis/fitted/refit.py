@@ -178,7 +178,7 @@ def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
 
 
 def _beyond(model: Exact, which: Which, by: float) -> bool:
-    """Whether a shape stands at the end of its range, and `by` points out of it."""
+    """Return whether a shape stands at the end of its range, and `by` points out of it."""
     kind, place, name = which
     if name.isdigit():
         return False

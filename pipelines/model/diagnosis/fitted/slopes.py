@@ -77,7 +77,7 @@ def _with(model: Exact, data: Data, place: int, core: int, moved: Sequence[Named
 
 
 def _is_nothing(one: Named, name: str) -> bool:
-    """Whether a number is an amplitude that is 0."""
+    """Return whether a number is an amplitude that is 0."""
     return name.isdigit() and one.amplitudes[int(name)] == 0.0
 
 

@@ -26,8 +26,8 @@ __all__ = ["Compared", "Compliance", "compared", "compliance", "gaps_untold", "u
 
 _MOVED = 3.0  # standard deviations, by which a base's frequency or a joint's stiffness is another one
 _SAME = 0.03  # of it, within which two sessions show the same one: temperature, and how the arm stood
-_NO_RESPONSES = "a gap is told from a spring by frequency responses that show none, and there is no frf log"
-_GIVES_WAY = "the frequency responses name something that gives way, and beside it a gap is not told from it"
+_NO_RESPONSES = "a gap is distinguished from a spring by frequency responses that show none, and there is no frf log"
+_GIVES_WAY = "the frequency responses show compliance, and a gap is not distinguishable from it"
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from pipelines.signal.tuning import smoother_bandwidth
 
 __all__ = ["sharpened"]
 
-# Times the bandwidth. Over logs of the bench a motor that turns with two joints leaves 2.5 floors at 1, 1.2 at 1.8, 1.0 at 2.3,
+# Times the bandwidth. Over logs of the bench coupled transmission leaves 2.5 floors at 1, 1.2 at 1.8, 1.0 at 2.3,
 # and hardly less at 3.2.
 _WIDER = 2.3
 

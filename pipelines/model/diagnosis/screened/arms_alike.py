@@ -103,7 +103,7 @@ def _able(data: Data, own: Asked) -> list[Asked]:
 
 
 def _late(arm: Arm) -> bool:
-    """Whether something changes how every torque is recorded."""
+    """Return whether something changes how every torque is recorded."""
     return any(acting.effect.last for acting in arm.effects)
 
 

@@ -45,7 +45,7 @@ class Family:
 
     @property
     def event(self) -> bool:
-        """Whether it happens once, in one log: its non-linear numbers belong to that."""
+        """Return whether it happens once, in one log: its non-linear numbers belong to that."""
         one = self.shapes[0]
         return any(q.shape and q.name in one.per_log for q in one.parameters)
 
@@ -215,7 +215,7 @@ def _finite(table: Array) -> Array:
 
 
 def runs_away(table: Array) -> bool:
-    """Whether some of it is no number, or larger than any torque."""
+    """Return whether some of it is no number, or larger than any torque."""
     return not bool((np.abs(table) < _AWAY).all())
 
 

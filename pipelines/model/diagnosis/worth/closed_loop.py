@@ -24,7 +24,7 @@ T = TypeVar("T")
 
 
 def in_loop(arm: Arm, log: ExperimentLog) -> bool:
-    """Whether the log's controller is known, and the arm, where the log begins, has an inertia that can be moved."""
+    """Return whether the log's controller is known, and the arm, where the log begins, has an inertia that can be moved."""
     try:
         Plant.of(arm).refuse_unphysical(Experiment.of_log(log).q_ref[:1])
     except InputRejected:

@@ -201,7 +201,7 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
 
 
 def _open(first: Simulation, last: Simulation) -> bool:
-    """Whether both could be simulated, and the last is not nearer."""
+    """Return whether both could be simulated, and the last is not nearer."""
     return "none" not in (first.how, last.how) and first is not last and not nearer(first, last)
 
 
@@ -278,7 +278,7 @@ def _whole(windows: Windows, length: int) -> bool:
 
 def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_], sample_time: float,
              ) -> tuple[Motion, Array, npt.NDArray[np.bool_], int]:
-    """Every so-manieth sample of a motion, the mean torque (samples, joints) until the next, and where all of that is usable."""
+    """Every Nth sample of a motion, the mean torque (samples, joints) until the next, and where all of that is usable."""
     every = max(1, int(_FINE / sample_time * (1.0 + 1e-9)))
     if every == 1:
         return motion, tau, usable, 1

@@ -142,7 +142,7 @@ def _finite(std: dict[str, float]) -> dict[str, float]:
 
 
 def _untold(slope: Array, unseen: Mask) -> bool:
-    """Whether a number that is `unseen` moves it more than all that are seen."""
+    """Return whether a number that is `unseen` moves it more than all that are seen."""
     size = np.abs(slope)
     return bool(np.where(unseen, size, 0.0).max() > np.where(unseen, 0.0, size).max())
 

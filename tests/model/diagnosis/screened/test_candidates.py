@@ -1,4 +1,4 @@
-"""Columns of a cause beside a torque that is logged late: SciPy's low-pass says what the record makes of them."""
+"""Columns of a cause beside torque logging delay: SciPy's low-pass says what the record makes of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A torque that is logged late hides a rotor's inertia; the lag is named, and the inertia comes out. SciPy makes the logs."""
+"""Torque logging delay hides a rotor's inertia; the lag is named, and the inertia comes out. SciPy makes the logs."""
 
 from __future__ import annotations
 

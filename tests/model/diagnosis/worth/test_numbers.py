@@ -25,7 +25,7 @@ INERTIA, VISCOUS, COULOMB, SHARPNESS = 0.004, 0.03, 0.2, 90.0
 
 
 def _shared(one: int, other: int, motion: Motion) -> Array:
-    """A motor that turns with two joints."""
+    """Coupled transmission."""
     out = np.zeros_like(motion.q)
     speed = motion.dq[:, one] + motion.dq[:, other]
     load = INERTIA * (motion.ddq[:, one] + motion.ddq[:, other]) + VISCOUS * speed + COULOMB * np.tanh(SHARPNESS * speed)
