@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.engine import diagnose_prepared
-from pipelines.diagnosis.selection import Selection
+from pipelines.diagnosis.engine import Look, diagnose_prepared
+from pipelines.diagnosis.trained import Standing, train
 from pipelines.import_log import STAGE, Settings
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
@@ -38,6 +38,7 @@ TX40 = DiagnosisSettings(cutoff_hz=100.0, decimation=100, min_speed=(0.05, 0.05,
 _TX40_CAUSES = 8  # at most
 _ODRIVE = DiagnosisSettings(cutoff_hz=40.0)
 _ODRIVE_CAUSES = 9
+_FOLDS = 10  # unused where other rows judge
 _GUARD = 1  # rows to either side of a held-out block: the low-pass reaches half a row
 
 
@@ -56,9 +57,7 @@ class Judged:
 
     what: str
     power: float  # squared torque [N^2 m^2] of what judged
-    steps: tuple[Step, ...]  # of the search
-    kept: Step  # the model that `diagnose` keeps of it
-    causes: tuple[str, ...]  # in that
+    steps: tuple[Step, ...]  # nominal, and every cause that the search keeps
     seconds: float  # of CPU
 
     @property
@@ -86,28 +85,25 @@ def fold(data: Data, number: int, count: int) -> tuple[Data, Data]:
 
 def searched(
     prepared: Prepared, settings: DiagnosisSettings, most: int, exclude: Sequence[str] = ()
-) -> Selection:
-    """Return the causes that `diagnose` selects without reference logs, `most` at most."""
+) -> Look:
+    """Return what `diagnose` finds without reference logs, `most` causes at most."""
     usual = DiagnosisConfig()
     config = replace(usual, causes=most, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
-    return diagnose_prepared(prepared, config, exclude).look.selection
+    return diagnose_prepared(prepared, config, exclude).look
 
 
-def judged(what: str, found: Selection, judge: Data, seconds: float) -> Judged:
-    """Return what the model of every round leaves of `judge`, and that of the selection."""
-    models = [("nominal", found.start.model)]
-    models += [
-        (place(*one.cause.key), one.state.model)
-        for one in found.rounds
-        if one.cause is not None and one.state is not None
-    ]
+def judged(what: str, prepared: Prepared, look: Look, judge: Data, seconds: float) -> Judged:
+    """Return what the models of a search, without its standing dictionary, leave of `judge`."""
+    effects, standing = look.selection.end.model.effects, Standing(look.later.dataset.model)
+    trained = train(replace(prepared, judge=judge), look.later, effects, _FOLDS, standing)
+    names = ["nominal", *(place(one.effect.name, one.effect.joint) for one in effects)]
     steps = []
-    for name, model in (*models, ("kept", found.end.model)):
-        left = np.where(judge.counts, judge.y - model.torque(judge), 0.0)
+    for k, name in enumerate(names):
+        left = np.where(judge.counts, trained.held_out(k), 0.0)
         own = tuple(float(np.sum(left[judge.joint == j] ** 2)) for j in range(judge.n_joints))
         steps.append(Step(name, float(left @ left), own))
-    causes = tuple(place(one.effect.name, one.effect.joint) for one in found.end.model.effects)
-    return Judged(what, float(np.sum(np.where(judge.counts, judge.y, 0.0) ** 2)), tuple(steps[:-1]), steps[-1], causes, seconds)
+    power = float(np.sum(np.where(judge.counts, judge.y, 0.0) ** 2))
+    return Judged(what, power, tuple(steps), seconds)
 
 
 def place(cause: str, joint: int | None) -> str:
@@ -120,15 +116,17 @@ def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: Diagno
     out = []
     for number in numbers:
         begin = time.process_time()
-        train, judge = fold(prepared.data, number, count)
-        found = searched(replace(prepared, data=train), settings, _TX40_CAUSES)
-        out.append(judged(f"block {number + 1} of {count}", found, judge, time.process_time() - begin))
+        rest, judge = fold(prepared.data, number, count)
+        own = replace(prepared, data=rest)
+        found = searched(own, settings, _TX40_CAUSES)
+        seconds = time.process_time() - begin
+        out.append(judged(f"block {number + 1} of {count}", own, found, judge, seconds))
         print(f"  {out[-1].what}: " + ", ".join(f"{step.name} {100 * error:.2f} %"
                                               for step, error in zip(out[-1].steps, out[-1].errors, strict=True)), flush=True)
     return out
 
 
-def judged_odrive(data: Path, settings: DiagnosisSettings = _ODRIVE) -> tuple[Selection, list[Judged]]:
+def judged_odrive(data: Path, settings: DiagnosisSettings = _ODRIVE) -> tuple[Look, list[Judged]]:
     """The search on two runs, judged on the others, none of which it saw."""
     logs = imported("odrive", data)
     begin = time.process_time()
@@ -139,7 +137,7 @@ def judged_odrive(data: Path, settings: DiagnosisSettings = _ODRIVE) -> tuple[Se
     for name in ("nocomp_2", "comp_0", "slower_nocomp_0", "slower_comp_0"):
         other = prepare(Logs((logs["nocomp_0"],), (logs[name],)), settings)
         if other.judge is not None:
-            out.append(judged(name, found, other.judge, seconds))
+            out.append(judged(name, prepared, found, other.judge, seconds))
     return found, out
 
 
@@ -178,21 +176,18 @@ def _print_tx40(data: Path, count: int) -> None:
     folds = judged_tx40(data, range(count), count)
     before, after, joints = nested_error(folds)
     print(f"  relative torque error held out: nominal {100 * before:.2f} %, extended {100 * after:.2f} % (bar 5.0, aim 4.5)")
-    kept = np.sqrt(sum(one.kept.left for one in folds) / sum(one.power for one in folds))
-    print(f"  what diagnose keeps of it: {100 * kept:.2f} %;", "; ".join(", ".join(one.causes) for one in folds))
     print("  share of each joint:", ", ".join(f"{100 * x:.2f} %" for x in joints))
     for name, (times, taken) in sorted(payoff(folds).items(), key=lambda item: -item[1][1]):
-        stays = f"found in {times} of {count}, kept in {sum(name in one.causes for one in folds)}"
-        print(f"  {name:28s} {stays}, takes {100 * taken:6.2f} % off the squared error held out")
+        print(f"  {name:28s} found in {times} of {count}, takes {100 * taken:6.2f} % off the squared error held out")
     print(f"  {sum(one.seconds for one in folds):.0f} s of CPU")
 
 
 def _print_odrive(data: Path) -> None:
     print("ODrive")
     found, runs = judged_odrive(data)
-    for one in found.end.model.effects:
+    for one in found.selection.end.model.effects:
         print(f"  {one.effect.name:22s}", ", ".join(f"{name} {value:.4g}" for name, value in one.values.items()))
-    inertia = float(found.end.model.beta[0])
+    inertia = float(found.selection.end.model.beta[0])
     print(f"  inertia {inertia:.3g} kg m^2 (2.5e-4 within 30 %: 1.75e-4 to 3.25e-4)")
     for run in runs:
         print(f"  {run.what:18s} held-out error " + " -> ".join(f"{100 * error:.1f}" for error in run.errors) + " %")
