@@ -53,6 +53,7 @@ class Group:
     width: int
     standing: bool  # healthy machines have it in small
     kind: Kind
+    reads_torque: bool = False  # its columns hold the logged torque itself
 
     @property
     def family(self) -> str:
@@ -146,6 +147,7 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
                     width,
                     _standing(family, number),
                     kind,
+                    family.shapes[0].reads_torque and rows.data.logs[0].motion.tau is not None,
                 )
             )
             seen += width

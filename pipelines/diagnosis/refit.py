@@ -18,7 +18,7 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.score import block_losses
-from pipelines.diagnosis.screening import Screened, screen
+from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.effects.base import Effect
@@ -48,6 +48,7 @@ class State:
     )
     losses: Array  # (blocks,) squared error of each block, predicted from all others
     structure: Structure
+    read_off: float = 0.0  # price of rows that effects take from the log itself
 
     @property
     def rss(self) -> float:
@@ -55,11 +56,11 @@ class State:
 
     @cached_property
     def cost(self) -> float:
-        """‖r‖² + (θ - m)ᵀ A (θ - m)"""
+        """‖r‖² + (θ - m)ᵀ A (θ - m), and the price of rows that are read off."""
         theta, moment = self.theta, self.moment
         away = theta @ self.info @ theta - 2.0 * moment @ theta
         known = Arrow.of(self.info, self.structure).half(moment)
-        return self.rss + float(away + known @ known)
+        return self.rss + float(away + known @ known) + self.read_off
 
     @property
     def mean_squares(self) -> Array:
@@ -133,7 +134,7 @@ class Later:
     ) -> State:
         """Return the model with all its numbers fitted; those of effects have no prior."""
         residual = self._residual(model, theta)
-        now = self._cost(residual, theta, info, moment)
+        now = self._cost(residual, theta, info, moment) + self._read_off(model)
         for k in range(1 + steps):
             slopes, names = self._slopes(model) if k else self._none  # linear numbers first
             size = _unit(slopes.norms)
@@ -148,7 +149,7 @@ class Later:
                 tried = model.moved(np.r_[own, more], names)
                 with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
                     left = self._residual(tried, theta + way)
-                    cost = self._cost(left, theta + way, info, moment)
+                    cost = self._cost(left, theta + way, info, moment) + self._read_off(tried)
                 if np.isfinite(cost) and cost <= now:
                     model, theta, residual, now = tried, theta + way, left, cost
                     break
@@ -170,6 +171,7 @@ class Later:
             lasting,
             np.zeros(0),
             self.prior.structure,
+            self._read_off(model),
         )
         return replace(state, losses=self.losses(state))
 
@@ -181,7 +183,25 @@ class Later:
         slope = np.r_[state.moment - state.info @ state.theta, np.zeros(state.effects.width)]
         slope += both.moments(state.residual)  # zero where the fit has settled
         moments = self.candidates.moments(state.residual) - cross.T @ info.solve(slope)
-        return screen(self.dictionary.groups, info, cross, self.squares, moments)
+        found = screen(self.dictionary.groups, info, cross, self.squares, moments)
+        return [self._charged(one) if one.group.reads_torque else one for one in found]
+
+    def _charged(self, one: Screened) -> Screened:
+        """Return the candidate less the price of the rows that it reads off the log."""
+        torque = self.candidates.take(one.group.columns).times(one.amplitudes)
+        return replace(one, gain=one.gain - sum(price(x) for x in torque))
+
+    def _read_off(self, model: Exact) -> float:
+        """Return the price Σ ln(1 + x²) of rows whose torque x an effect reads off the log itself.
+
+        Such a row is not predicted: it is told by a number of its own, of the size x [noise].
+        """
+        asked = self.rows.data.logs[0].motion.tau is not None
+        effects = tuple(one for one in model.effects if not (asked and one.effect.reads_torque))
+        if len(effects) == len(model.effects):
+            return 0.0
+        both = (self.rows.torque(one) for one in (model, replace(model, effects=effects)))
+        return sum(price(a - b) for a, b in zip(*both, strict=True))
 
     def possible(self, state: State, explained: float, config: DiagnosisConfig) -> bool:
         """Return whether the last effect can be a cause with its numbers, each as uncertain as it is.

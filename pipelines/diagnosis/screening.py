@@ -17,7 +17,7 @@ from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.candidates import Group, Key
 from pipelines.diagnosis.table import Array
 
-__all__ = ["Screened", "best_of", "screen"]
+__all__ = ["Screened", "best_of", "price", "screen"]
 
 _VISIBLE = 1e-6  # numerics: eigenvalue of H in unit columns, below which a direction is absorbed
 
@@ -55,6 +55,11 @@ def screen(
         amplitudes = (vectors[:, seen] @ (z / values[seen])) / unit
         out.append(Screened(group, float(np.sum(z**2 / values[seen])), int(seen.sum()), amplitudes))
     return out
+
+
+def price(x: Array) -> float:
+    """Return Σ ln(1 + x²): what numbers x cost, each of a row of its own, in units of the noise."""
+    return float(np.sum(np.log1p(x**2)))
 
 
 def best_of(screened: Iterable[Screened]) -> dict[Key, Screened]:

@@ -100,6 +100,7 @@ class Effect(Placed, ABC):
     from_body: ClassVar[bool] = False  # from motion and rigid body alone, whatever else acts
     from_own_joint: ClassVar[bool] = False  # from these and what acts at its own joint, whatever adds its torque to others
     last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
+    reads_torque: ClassVar[bool] = False  # its columns hold the logged torque itself, where that is a held command
     in_drive: ClassVar[bool] = False  # all torque of its joint comes through it, whatever was found after it
     misread: ClassVar[bool] = False  # it changes what an encoder says: all but the record is felt where the joint truly is
     passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it

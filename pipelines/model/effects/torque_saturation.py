@@ -40,6 +40,7 @@ class TorqueSaturation(Effect):
     experiment = "Repeat the experiment slower, so that the torque stays below the limit."
     size = "limit"
     in_drive = True
+    reads_torque = True
     fixed_amplitudes = (1.0,)
     grows_with = "limit"
 
