@@ -7,13 +7,14 @@ state = later.fit(state.with_effect(...))
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from pipelines.diagnosis.arrow import Arrow, Structure
-from pipelines.diagnosis.candidates import Dictionary, Key
+from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior
@@ -277,6 +278,28 @@ class Later:
             unit[at, np.arange(len(at))] = 1.0
             out[j] = mean[at] @ np.linalg.solve(rows.solve(unit)[at], mean[at])
         return out
+
+    def taken(self, state: State, groups: Sequence[Group]) -> list[float]:
+        """Return what the standing numbers of candidates, or of their first shapes, save.
+
+        Of each s ((P⁻¹)_ss)⁻¹ s, by which the cost would rise without them.
+        """
+        factor, first, out = self._factor(state.info, state.effects), self.prior.n_nominal, []
+        for group in groups:
+            shapes = {g.shape for g in self.prior.groups if g.key == group.key}
+            shape = group.shape if group.shape in shapes else 0
+            own = [g.key == group.key and g.shape == shape for g in self.prior.groups]
+            at = first + np.flatnonzero(own)
+            unit = np.zeros((len(state.theta) + state.effects.width, len(at)))
+            unit[at, np.arange(len(at))] = 1.0
+            spread = factor.solve(unit)[at]
+            out.append(float(state.theta[at] @ np.linalg.solve(spread, state.theta[at])))
+        return out
+
+    def again(self, key: Key) -> bool:
+        """Return whether a cause may act more than once at its place."""
+        family, motion = self.dictionary.families.get(key), self.rows.data.logs[0].motion
+        return family is not None and family.shapes[0].again(motion)
 
     @cached_property
     def shares(self) -> Array:

@@ -7,7 +7,7 @@ selection.stopped             why the search ended, where it did not for lack of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -131,12 +131,16 @@ def _round(
     significant = _significant(
         later, state, [cause.key for cause in causes], explained, baseline, config
     )
-    tried = [
-        one
-        for one in _refitted(later, state, significant, responses, config)
-        if _loss(later, one.state) < _loss(later, state)
-        and not (one.event and one.gain < config.relevance * explained)
-    ]
+    tried = list[Candidate]()
+    for some in _by_promise(later, state, significant, config):
+        tried = [
+            one
+            for one in _refitted(later, state, some, responses, config)
+            if _loss(later, one.state) < _loss(later, state)
+            and not (one.event and one.gain < config.relevance * explained)
+        ]
+        if tried:
+            break
     others = _unnamed(later, state, significant, bool(responses))
     seen = Round(state, None, None, significant=tuple(significant.values()), tried=tuple(tried))
     if not tried:
@@ -171,7 +175,7 @@ def _significant(
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
-        if key not in taken
+        if (key not in taken or later.again(key))
         and one.gain > inexact[one.group]
         and one.gain > baseline.threshold(one.group, one.freedom, rows)
     }
@@ -225,18 +229,35 @@ def _nearly(
     return [best] if missing < config.relevance * (_loss(later, state) - free) else []
 
 
+def _by_promise(
+    later: Later, state: State, significant: Mapping[Key, Screened], config: DiagnosisConfig
+) -> Iterator[list[Screened]]:
+    """Return the significant causes, the most promising ones first, those alike together.
+
+    A cause that healthy machines have in small is compared with a machine without it: what the
+    standing numbers have taken of it is a part of what it explains.
+    """
+    named = {key: one for key, one in significant.items() if one.group.kind == "named"}
+    taken = later.taken(state, [one.group for one in named.values()])
+    worth = {key: named[key].gain + more for key, more in zip(named, taken, strict=True)}
+    order = sorted(worth, key=lambda key: -worth[key])
+    while True:
+        least = config.promising * worth[order[0]] if order else 0.0
+        alike = [key for key in order[: config.refits] if worth[key] > least]
+        yield [named[key] for key in alike]  # once if there is none: of events and responses
+        order = order[len(alike) :]
+        if not order:
+            return
+
+
 def _refitted(
     later: Later,
     state: State,
-    significant: dict[Key, Screened],
+    named: Sequence[Screened],
     responses: Sequence[Acting],
     config: DiagnosisConfig,
 ) -> list[Candidate]:
-    """Return the most promising causes with all their numbers fitted exactly."""
-    named = sorted(
-        (one for one in significant.values() if one.group.kind == "named"),
-        key=lambda one: -one.gain,
-    )[: config.refits]
+    """Return causes with all their numbers fitted exactly, beside the best window of an event."""
     out = []
     touch = standing_out(later.rows, later.dictionary, later.dataset.arm, state.residual, config)
     if touch is not None:
@@ -254,11 +275,10 @@ def _refitted(
         )
     top = max([one.gain for one in named], default=0.0)
     for one in named:
-        if one.gain > config.promising * top:
-            effect = later.dictionary.families[one.group.key].shapes[one.group.shape].full()
-            out.append(
-                _candidate(later, state, one.group.key, one.gain, effect, one.amplitudes, config)
-            )
+        effect = later.dictionary.families[one.group.key].shapes[one.group.shape].full()
+        out.append(
+            _candidate(later, state, one.group.key, one.gain, effect, one.amplitudes, config)
+        )
     for acting in responses:
         effect = acting.effect.at(acting.values)
         out.append(
