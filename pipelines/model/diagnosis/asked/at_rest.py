@@ -24,13 +24,13 @@ from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
+from pipelines.model.estimation.rests import RestConfig
 
 __all__ = ["rests", "sticking"]
 
 Mask = npt.NDArray[np.bool_]
 
-_SLOW, _STILL = 0.02, 1e-3  # of the joint's largest speed: it may creep into a rest and out of it; three decades below, it stands
-_MOSTLY = 0.5  # of a slow stretch that it has to stand: slow turns, which tell friction, do not
+_STILL = 1e-3  # of the joint's largest speed: it may creep into a rest and out of it; three decades below, it stands
 _MORE = 2.0  # times what is left where the joint moves
 
 
@@ -41,17 +41,20 @@ def rests(motions: Motions, cutoff_hz: float | None, fastest: Array) -> list[Mas
     Args:
         fastest: (joints,) [rad/s] largest speed in all logs.
     """
-    return [_rests(np.abs(found.motion.dq[found.good.kept]), 1.0 / ((cutoff_hz or np.inf) * log.sample_time), fastest)
-            for log, found in motions]
+    parts = [[np.abs(x[found.good.kept]) for x in (found.motion.dq, found.motion.ddq)] for _, found in motions]
+    rms = [np.maximum(np.sqrt(np.mean(np.vstack(part) ** 2, axis=0)), 1e-300) for part in zip(*parts, strict=True)]
+    return [_rests(speed, np.hypot(speed / rms[0], acceleration / rms[1]) < RestConfig().still,
+                   1.0 / ((cutoff_hz or np.inf) * log.sample_time), fastest)
+            for (log, _), (speed, acceleration) in zip(motions, parts, strict=True)]
 
 
-def _rests(speed: Array, least: float, fastest: Array) -> Mask:
+def _rests(speed: Array, every_slow: Mask, least: float, fastest: Array) -> Mask:
     out, reach = np.zeros(speed.shape, dtype=bool), math.ceil(least)
     for j in range(speed.shape[1]):
-        slow, still = speed[:, j] < _SLOW * fastest[j], np.cumsum(np.append(0, speed[:, j] < _STILL * fastest[j]))
+        slow, still = every_slow[:, j], np.cumsum(np.append(0, speed[:, j] < _STILL * fastest[j]))
         edges = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(np.int8)))
         for start, stop in edges.reshape(-1, 2):
-            if stop - start > least and still[stop] - still[start] > _MOSTLY * (stop - start):
+            if still[stop] - still[start] > least:  # slow turns, which tell friction, do not stand
                 out[max(0, start - reach):stop + reach, j] = True
     return out
 
