@@ -34,11 +34,16 @@ def decide(
     rows, causes = later.rows.count, selection.causes
     first, last = selection.start.cost / rows, selection.end.cost / rows
     gained = max(selection.explained / rows, 1e-12)
-    explained = gained / max(first - baseline.usual_fit, gained) if causes else 0.0
     left = selection.end.mean_squares * later.dataset.noise_ratio
     bound = max(config.excess * max(1.0, baseline.usual_fit), baseline.worst_fit)
+    missing, followed = _missing(later, selection.end, config), _followed(later, selection, config)
     fits = bool(max(float(left.max()), last) < bound)
-    if causes and not fits and explained < config.share:
+    power = np.array([float(y @ y) for y in later.rows.y])
+    excess = max(
+        0.0 if fits else first - baseline.usual_fit, gained + float(missing**2 @ power) / rows
+    )
+    explained = gained / excess if causes else 0.0
+    if causes and explained < config.share:
         return Decision(
             "unknown",
             f"{causes[0].key[0]} explains {explained:.0%} of the excess residual",
@@ -49,7 +54,6 @@ def decide(
         return Decision("unknown", "several causes explain it", causes, explained)
     if causes:
         return Decision("cause", "", causes, explained)
-    missing, followed = _missing(later, selection.end, config), _followed(later, selection, config)
     if selection.stopped and (missing.any() or followed or not fits):
         return Decision("unknown", selection.stopped, (), explained)
     more = f"; it follows {selection.follows}" if selection.follows else ""

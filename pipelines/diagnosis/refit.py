@@ -30,6 +30,7 @@ _RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
 _DAMPING = (_RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = 81  # numerics: amplitudes that may be possible
+_HALF = 0.5  # numerics: of the time
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
 _FREE = 1e-6  # numerics: of the information along a direction that is freed, or not held
 
@@ -223,6 +224,8 @@ class Later:
         deviations = np.sqrt(max(config.deviations**2, config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within = last.possible
+        if last.effect.reads_torque and self._mostly_acting(last.effect):
+            return False
         for (of_effect, which, name), by, reach in zip(names, step, deviations * std, strict=True):
             if not of_effect or which != place:
                 continue
@@ -237,6 +240,12 @@ class Later:
                 amplitudes[int(name)] += way
                 within |= last.effect.possible(last.effect.values(amplitudes))
         return within
+
+    def _mostly_acting(self, effect: Effect) -> bool:
+        """Return whether an effect acts most of the time: a joint that is clipped so follows nothing."""
+        logs, arm = self.rows.data.logs, self.dataset.arm
+        acting = [effect.columns(one.motion, arm).any(axis=(1, 2)) for one in logs]
+        return float(np.concatenate(acting).mean()) > _HALF
 
     def _slope(self, state: State) -> Array:
         """Return the slope (k,) of -cost / 2 by nominal and standing numbers."""

@@ -7,7 +7,7 @@ selection.stopped             why the search ended, where it did not for lack of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -131,16 +131,14 @@ def _round(
     significant = _significant(
         later, state, [cause.key for cause in causes], explained, baseline, config
     )
-    tried = list[Candidate]()
-    for some in _by_promise(later, state, significant, config):
-        tried = [
-            one
-            for one in _refitted(later, state, some, responses, config)
-            if _loss(later, one.state) < _loss(later, state)
-            and not (one.event and one.gain < config.relevance * explained)
-        ]
-        if tried:
-            break
+    tried = [
+        one
+        for one in _refitted(
+            later, state, _promising(later, state, significant, config), responses, config
+        )
+        if _loss(later, one.state) < _loss(later, state)
+        and not (one.event and one.gain < config.relevance * explained)
+    ]
     others = _unnamed(later, state, significant, bool(responses))
     seen = Round(state, None, None, significant=tuple(significant.values()), tried=tuple(tried))
     if not tried:
@@ -229,10 +227,10 @@ def _nearly(
     return [best] if missing < config.relevance * (_loss(later, state) - free) else []
 
 
-def _by_promise(
+def _promising(
     later: Later, state: State, significant: Mapping[Key, Screened], config: DiagnosisConfig
-) -> Iterator[list[Screened]]:
-    """Return the significant causes, the most promising ones first, those alike together.
+) -> list[Screened]:
+    """Return the significant causes that are the most promising ones, the best first.
 
     A cause that healthy machines have in small is compared with a machine without it: what the
     standing numbers have taken of it is a part of what it explains.
@@ -240,14 +238,8 @@ def _by_promise(
     named = {key: one for key, one in significant.items() if one.group.kind == "named"}
     taken = later.taken(state, [one.group for one in named.values()])
     worth = {key: named[key].gain + more for key, more in zip(named, taken, strict=True)}
-    order = sorted(worth, key=lambda key: -worth[key])
-    while True:
-        least = config.promising * worth[order[0]] if order else 0.0
-        alike = [key for key in order[: config.refits] if worth[key] > least]
-        yield [named[key] for key in alike]  # once if there is none: of events and responses
-        order = order[len(alike) :]
-        if not order:
-            return
+    order = sorted(worth, key=lambda key: -worth[key])[: config.refits]
+    return [named[key] for key in order if worth[key] > config.promising * worth[order[0]]]
 
 
 def _refitted(
