@@ -1,7 +1,6 @@
 """Rows that were laid before: the columns of an effect that follow from the motion alone are the same whatever was fitted since.
 
     kept.of(key, lay)                       what `lay()` makes, made once as long as there is room
-    together(stores, work, pieces)          [work(piece) for piece in pieces] by two processes, what either lays kept for both
 """
 
 from __future__ import annotations
@@ -9,21 +8,15 @@ from __future__ import annotations
 import os
 import weakref
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable, Sequence
-from functools import partial
-from typing import Any, TypeVar
+from collections.abc import Callable, Hashable
+from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.shared_work import shared_out
-
-__all__ = ["Kept", "together"]
+__all__ = ["Kept"]
 
 Rows = npt.NDArray[Any]
 
-P = TypeVar("P")
-A = TypeVar("A")
 
 _ROOM = 192 << 20  # [bytes]
 
@@ -61,30 +54,3 @@ class Kept:
         self._count += 1
         self._numbered.append((weakref.ref(thing), (os.getpid(), self._count)))
         return self._numbered[-1][1]
-
-    def keys(self) -> frozenset[Hashable]:
-        """Of all there is."""
-        return frozenset(self._rows)
-
-    def since(self, before: frozenset[Hashable]) -> list[tuple[Hashable, Rows]]:
-        """What came in after `before`, the newest last."""
-        return [(key, rows) for key, rows in self._rows.items() if key not in before]
-
-    def take(self, more: Iterable[tuple[Hashable, Rows]]) -> None:
-        for key, rows in more:
-            self.of(key, partial(np.asarray, rows))
-
-
-def together(stores: Iterable[Kept], work: Callable[[P], A], pieces: Sequence[P]) -> list[A]:
-    """What `work` makes of each piece, in order; rows that another process lays for it come into the `stores` of this one."""
-    own = list({id(store): store for store in stores}.values())
-    before = [store.keys() for store in own]
-
-    def left() -> list[list[tuple[Hashable, Rows]]]:
-        return [store.since(keys) for store, keys in zip(own, before, strict=True)]
-
-    def take(more: list[list[tuple[Hashable, Rows]]]) -> None:
-        for store, rows in zip(own, more, strict=True):
-            store.take(rows)
-
-    return shared_out(work, pieces, left=left, take=take)
