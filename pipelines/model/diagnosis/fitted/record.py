@@ -2,7 +2,6 @@
 
     recorded(arm, table, motion)                  columns over a motion, by everything in `arm` that changes the record
     recorded_of(changing(arm, joint), x, motion)  the same of torque of one joint
-    passed_rows(data, effect, amplitude, x)       rows, which are far apart: enough to see what is worth an exact fit
 """
 
 from __future__ import annotations
@@ -13,11 +12,9 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["changing", "passed_rows", "recorded", "recorded_of"]
+__all__ = ["changing", "recorded", "recorded_of"]
 
 
 def changing(arm: Arm, joint: int) -> tuple[Acting, ...]:
@@ -45,19 +42,3 @@ def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
             own, table = np.ascontiguousarray(table[:, joint - 1].T), table.copy()
             table[:, joint - 1] = recorded_of(through, own, motion).T
     return table
-
-
-def passed_rows(data: Data, effect: Effect, amplitude: float, x: Array, whole: bool = False, own: bool = False) -> Array:
-    """(…, rows) with the rows of the effect's joint as they come out of it; `whole` torque begins where the log does.
-
-    Args:
-        own: `x` has the rows of that joint alone.
-    """
-    out, first, joint = x.copy(), 0, (effect.joint or 1) - 1
-    for one in data.logs:
-        before, count = (0, 1) if own else (joint, one.n_joints)
-        here = slice(first + before * one.rows, first + (before + 1) * one.rows)
-        start = None if one.motion.logged is None else float(one.y[joint, 0]) if whole else 0.0
-        out[..., here] = effect.passed(amplitude, x[..., here], one.t, start)
-        first += count * one.rows
-    return out

@@ -21,12 +21,11 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.fitted.record import changing, recorded, recorded_of
 from pipelines.model.diagnosis.rows.data import Data, LogData
-from pipelines.model.diagnosis.screened.arms_alike import Asked
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Arms", "Family", "Laid", "families", "lay_family", "place_of", "runs_away", "whole_motion"]
+__all__ = ["Family", "Laid", "families", "lay_family", "place_of", "runs_away", "whole_motion"]
 
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
@@ -48,36 +47,6 @@ class Family:
         """Whether it happens once, in one log: its non-linear numbers belong to that."""
         one = self.shapes[0]
         return any(q.shape and q.name in one.per_log for q in one.parameters)
-
-
-@dataclass(frozen=True, eq=False)
-class Arms:
-    """By whose columns causes are screened."""
-
-    now: Arm  # with all that was found
-    start: Arm  # for what just adds its torque, whatever else acts
-    rigid: tuple[Asked, ...] = ()  # at each joint: for what just adds what follows from the rigid body alone
-    body: Asked | None = None  # for what follows from that and does more
-    moving: tuple[Asked, ...] = ()  # at each joint: for what follows from that and from what acts at the joint
-
-    @property
-    def asked(self) -> tuple[Asked, ...]:
-        """Those that stand for others that are nearly the same."""
-        return (*self.rigid, *self.moving, *(() if self.body is None else (self.body,)))
-
-    @property
-    def every(self) -> tuple[Arm, ...]:
-        return (self.now, self.start, *(one.arm for one in self.asked))
-
-    def of(self, family: Family) -> Arm:
-        effect = family.shapes[0]
-        if self.rigid and effect.from_body and effect.adds and family.joint:
-            return self.rigid[family.joint - 1].arm
-        if self.body is not None and effect.from_body:
-            return self.body.arm
-        if self.moving and effect.from_own_joint and family.joint:
-            return self.moving[family.joint - 1].arm
-        return self.start if effect.adds else self.now
 
 
 @dataclass(frozen=True, eq=False)
@@ -222,5 +191,3 @@ def runs_away(table: Array) -> bool:
 def _first_samples(data: Data) -> Motion:
     motion = data.logs[0].motion
     return Motion(motion.t[:8], motion.q[:8], motion.dq[:8], motion.ddq[:8], None if motion.tau is None else motion.tau[:8])
-
-

@@ -1,10 +1,7 @@
 """What a finding is worth on what was held out: torque residual, simulated position, tip.
 
-    torque_gain(before, after, case)        with its bootstrap interval
-    surely_less(before, after, own, ...)    of all joints together
+    torque_gain_of(data, before, after)     with its bootstrap interval
     simulation_errors(arms, logs)           position error of each arm, in closed loop or over short windows
-    farther(before, after)                  whether the second is worse than chance does
-    no_nearer(before, after)                whether it is no better
 """
 
 from __future__ import annotations
@@ -22,20 +19,16 @@ from pipelines.fit.bootstrap import apart
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.result import BeforeAfter, Gain, SimulatedSpan, TipError, TorqueGain
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.worth.closed_loop import Positions, in_loop, in_loops
-from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, Windows, simulate_windows
 
-__all__ = ["Simulation", "Strayed", "farther", "gain_of", "nearer", "no_nearer", "simulation_errors", "surely_less", "torque_gain",
-           "torque_gain_of", "worse_log"]
+__all__ = ["Simulation", "Strayed", "gain_of", "nearer", "simulation_errors", "torque_gain_of", "worse_log"]
 
-Mask = npt.NDArray[np.bool_]
 
 _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
@@ -48,7 +41,6 @@ _FINE = 1e-3  # [s] between torques that drive a window: a faster log's are aver
 _EXACT = 1e-3  # of the position error, to which it is worked out
 _ROUGH = 1e-2  # the same, where something moves beside the joints: a hundredth is far less than what chance does to the error
 _LOGS = 2  # that are simulated
-_THERE = 0.5  # of the share that all joints together fall by, by which those have to where a cause acts or is seen
 _WORSE = 1.1  # times the error of a held-out log, that an extension must not exceed
 
 
@@ -86,15 +78,8 @@ def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
                 TipError(before.tip_rms, after.tip_rms) if known else None, after.span if known else ())
 
 
-def torque_gain(before: Refined, after: Refined, judge: Data | None, blocks: int) -> TorqueGain:
-    """Root mean square of the held-out torque residual, joint by joint, and how sure its change is."""
-    data = after.data if judge is None else judge
-    one, other = (held_out_left(x, judge, blocks) for x in (before, after))
-    return torque_gain_of(data, one, other)
-
-
 def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
-    """The same of residuals (rows,) [N m] of held-out rows."""
+    """Root mean square of held-out residuals (rows,) [N m], joint by joint, and how sure its change is."""
     place = data.blocks(_BLOCKS)
     count = int(place.max()) + 1
     ci = []
@@ -104,21 +89,6 @@ def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
                 for values in (before[own] ** 2, after[own] ** 2, np.ones(int(own.sum())))]
         ci.append(apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED)))
     return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
-
-
-def surely_less(before: Refined, after: Refined, own: Mask, judge: Data | None, blocks: int) -> bool:
-    """Whether the held-out torque error of all joints together falls beyond chance, each in units of what `before` leaves of it,
-    and at the joints `own` (joints,) together by half of that share at least."""
-    data = after.data if judge is None else judge
-    left = [held_out_left(x, judge, blocks) for x in (before, after)]
-    scale = np.maximum(data.rms(left[0]), 1e-12)[data.joint]
-    place = data.blocks(_BLOCKS)
-    ours, theirs, rows = (np.asarray(np.bincount(place, np.where(data.counts, x, 0.0), minlength=int(place.max()) + 1), dtype=float)
-                          for x in (np.square(left[0] / scale), np.square(left[1] / scale), np.ones(len(scale))))
-    _, high = apart(ours, theirs, rows, np.random.default_rng(_SEED))
-    here = data.counts & own[data.joint]
-    there = float(np.sum(np.square(left[1] / scale)[here]) / max(np.sum(np.square(left[0] / scale)[here]), 1e-300))
-    return high < 0.0 and 1.0 - there >= _THERE * (1.0 - float(theirs.sum() / max(ours.sum(), 1e-300)))
 
 
 def worse_log(data: Data, before: Array, after: Array) -> str:
@@ -134,34 +104,8 @@ def worse_log(data: Data, before: Array, after: Array) -> str:
     return ""
 
 
-def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str:
-    """Why the second simulated arm is farther from the measured one than chance explains; empty where it is not.
-
-    Args:
-        late: the log's torque is not what the arm felt: windows, which it drives, tell nothing then.
-    """
-    if before.how == "none" or (late and before.how == "windowed"):
-        return ""
-    if after.how == "none":
-        return "the simulated arm runs away with it"
-    low, _ = apart(before.power, after.power, before.samples, np.random.default_rng(_SEED))
-    return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
-
-
-def no_nearer(before: Simulation, after: Simulation, *, late: bool = False) -> str:
-    """Why an extension by what the second arm has more is not accepted: the simulated one has to come nearer, chance or not; empty
-    where it does, and where nothing can be simulated. `late` as in `farther`."""
-    if why := farther(before, after, late=late):
-        return why
-    if before.how == "none" or (late and before.how == "windowed") or nearer(before, after, late=late):
-        return ""
-    return "the simulated arm with it comes no nearer to the measured one"
-
-
-def nearer(before: Simulation, after: Simulation, *, late: bool = False) -> bool:
-    """Whether the second simulated arm is nearer to the measured one than the first, chance or not; `late` as in `farther`."""
-    if late and before.how == "windowed":
-        return False
+def nearer(before: Simulation, after: Simulation) -> bool:
+    """Whether the second simulated arm is nearer to the measured one than the first, chance or not."""
     return "none" not in (before.how, after.how) and float(after.power.sum()) < float(before.power.sum())
 
 
