@@ -88,11 +88,6 @@ class Exact:
     def without(self, place: int) -> Exact:
         return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
 
-    def beside(self, nominal: Exact) -> Exact:
-        """Its effects beside another nominal model."""
-        own = tuple(_following(one, nominal.columns.laws) for one in self.effects)
-        return replace(nominal, effects=own, standing=self.standing)
-
     @cached_property
     def nominal(self) -> Arm:
         """One and the same for models that differ in their effects: what it has worked out serves all of them."""

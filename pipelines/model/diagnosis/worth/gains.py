@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -60,15 +60,13 @@ class Simulation:
     how: Literal["closed-loop", "windowed", "none"]
     position_rms: Array  # [rad] (joints,)
     tip_rms: float  # [m]
-    power: Array  # (blocks,) squared error summed over the joints, in units of each, and the samples of each block of time
-    samples: Array  # (blocks,)
+    power: Array  # (blocks,) of time: squared error summed over the joints, in units of each
     first: Strayed | None = None  # in the first of the logs; None where no controller is known
     span: tuple[SimulatedSpan, ...] = ()  # of each log that was simulated
-    longest: float = np.nan  # [s] of a log, at most
 
     @classmethod
     def none(cls, joints: int) -> Simulation:
-        return cls("none", np.full(joints, np.nan), np.nan, np.zeros(0), np.zeros(0))
+        return cls("none", np.full(joints, np.nan), np.nan, np.zeros(0))
 
 
 def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
@@ -109,14 +107,11 @@ def nearer(before: Simulation, after: Simulation) -> bool:
     return "none" not in (before.how, after.how) and float(after.power.sum()) < float(before.power.sum())
 
 
-def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int, Simulation] | None = None) -> list[Simulation]:
+def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
     """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else.
 
     Without logs nothing is simulated. In a loop the stretches are short, and longer ones where they leave it open whether the last
     arm comes nearer than the first: what the amplifiers' noise moves, no simulated arm follows.
-
-    Args:
-        known: of arms, by their places, that were simulated already beside others with the same effects as these.
     """
     none = [Simulation.none(arm.n_joints) for arm in arms]
     if not motions:
@@ -125,13 +120,6 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
     hooks = [hook for arm in arms for hook in Plant.of(arm).hooks]
     soft = any(hook.rate for hook in hooks)
     slow = soft or any(hook.actuator and hook.states for hook in hooks)
-    if known:
-        one, left = next(iter(known.values())), [k for k in range(len(arms)) if k not in known]
-        if one.how == "none":
-            return none
-        found = _each([arms[k] for k in left], logs, soft, one.longest, closed=one.how == "closed-loop")
-        every = {**known, **dict(zip(left, found, strict=True))}
-        return [every[k] for k in range(len(arms))]
     if all(in_loop(arms[0], log) for log, _ in logs):
         longest = _SOFT if slow else _LONGEST
         found = _each(arms, logs, soft, longest)
@@ -153,11 +141,11 @@ def _each(arms: Sequence[Arm], motions: Motions, soft: bool, longest: float, *, 
     """`soft`: something moves beside the joints of one of them; `longest` [s] of a log in a loop."""
     every = (in_loops(arms, motions, longest) if closed else
              shared_out(partial(_in_windows, motions=motions, exact=_ROUGH if soft else _EXACT), arms))
-    return [Simulation.none(arm.n_joints) if pairs is None else _all(arm, motions, pairs, closed, longest)
+    return [Simulation.none(arm.n_joints) if pairs is None else _all(arm, motions, pairs, closed)
             for arm, pairs in zip(arms, every, strict=True)]
 
 
-def _all(arm: Arm, motions: Motions, pairs: Sequence[Positions], closed: bool, longest: float) -> Simulation:
+def _all(arm: Arm, motions: Motions, pairs: Sequence[Positions], closed: bool) -> Simulation:
     square, away, span = [], [], []
     for (q, seen, between), (log, _) in zip(pairs, motions, strict=True):
         known = np.isfinite(q + seen).all(axis=1)
@@ -168,12 +156,10 @@ def _all(arm: Arm, motions: Motions, pairs: Sequence[Positions], closed: bool, l
     block = np.arange(len(each)) * _BLOCKS // max(len(each), 1)
     units = _units(arm, np.concatenate([seen[np.isfinite(seen).all(axis=1)] for _, seen, _ in pairs]))
     power = np.asarray(np.bincount(block, each @ units**-2, minlength=_BLOCKS), dtype=np.float64)
-    samples = np.asarray(np.bincount(block, minlength=_BLOCKS), dtype=np.float64)
     (log, _), (q, seen, _) = motions[0], pairs[0]
     first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
     return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
-                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first, tuple(span),
-                      longest)
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, first, tuple(span))
 
 
 def _units(arm: Arm, q: Array) -> Array:

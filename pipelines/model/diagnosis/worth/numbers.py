@@ -43,9 +43,9 @@ def told(acting: Acting) -> dict[str, Value]:
     return found
 
 
-def parameters(done: Refined, place: int, covariance: Array | None = None) -> dict[str, Value]:
+def parameters(done: Refined, place: int) -> dict[str, Value]:
     """What is reported of effect number `place`."""
-    return told(_with(done, place, _of_effect(done, place, done.covariance() if covariance is None else covariance)))
+    return told(_with(done, place, _of_effect(done, place, done.covariance())))
 
 
 def standard_deviations(done: Refined, place: int, covariance: Array) -> dict[str, float]:
