@@ -28,6 +28,7 @@ __all__ = ["Acting", "Arm", "ArmTorque"]
 # Torque without effects that was asked for last, by body, base, friction and motion: an effect's slopes ask for it once a number.
 _KEPT: list[tuple[str, tuple[object, ...], Array]] = []
 _KEEP = 16
+_ORDER = ("load", "encoder", "drive", "record")  # of `Effect.acts_on`, from the innermost to the outermost
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,7 @@ class Arm:
     @cached_property
     def unrecorded(self) -> Arm:
         """The arm as it is, without what only changes the record."""
-        kept = tuple(acting for acting in self.effects if not acting.effect.last)
+        kept = tuple(acting for acting in self.effects if acting.effect.acts_on != "record")
         return self if len(kept) == len(self.effects) else replace(self, effects=kept)
 
     def with_body(self, body: RigidBody, p: Array) -> Arm:
@@ -122,8 +123,7 @@ class Arm:
     def extended(self, *more: Acting) -> Arm:
         """With more effects, each around those before it; what misreads an angle around all that act there, what all torque of a
         joint comes through around that, and what changes the record outermost."""
-        outer = sorted((*self.effects, *more),
-                       key=lambda acting: (acting.effect.last, acting.effect.in_drive, acting.effect.misread))
+        outer = sorted((*self.effects, *more), key=lambda acting: _ORDER.index(acting.effect.acts_on))
         return replace(self, effects=tuple(outer))
 
     def torque(self, motion: Motion, inside: Callable[[Motion, ArmModel], Array] | None = None) -> Array:
@@ -245,9 +245,9 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
                             remedy="update rrrid, or correct the name")
     effect = find_effect(stored.effect)
     if stored.joint not in (effect.joints(revolute) if effect.scope == "joint" else (None,)):
+        turning = " that turns" if effect.scope == "joint" and not effect.joints((False,)) else ""
         raise InputRejected("S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where,
-                            remedy=f"it belongs to one {effect.scope}{' that turns' if effect.turns else ''}, "
-                            f"and the arm has {len(revolute)} joints")
+                            remedy=f"it belongs to one {effect.scope}{turning}, and the arm has {len(revolute)} joints")
     kind_of_joint = stored.joint is None or revolute[stored.joint - 1]
     unsaid = {q.name: StoredValue(q.unsaid, None, q.unit_at(kind_of_joint), "assumed") for q in effect.parameters
               if q.unsaid is not None}

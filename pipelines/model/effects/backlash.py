@@ -57,7 +57,6 @@ class Backlash(Effect):
     experiment = "Move the joint to and fro over small angles, once where gravity loads it and once where it does not."
     size = "gap"
     evidence = "reversals"
-    from_body = True
     fixed_amplitudes = (1.0,)
     grows_with = "gap"
 

@@ -50,7 +50,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.model.effects.placed import Placed
 from pipelines.model.effects.terms import (
@@ -72,7 +71,7 @@ from pipelines.model.effects.terms import (
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LARGE", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
-           "SpeedCurve", "Values", "friction_at"]
+           "SpeedCurve", "Values", "friction_at", "predicted"]
 
 
 @dataclass(frozen=True)
@@ -96,18 +95,12 @@ class Effect(Placed, ABC):
     evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
     shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
+    acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"  # also the order in which effects compose
     from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
-    from_body: ClassVar[bool] = False  # from motion and rigid body alone, whatever else acts
-    from_own_joint: ClassVar[bool] = False  # from these and what acts at its own joint, whatever adds its torque to others
-    last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
-    in_drive: ClassVar[bool] = False  # all torque of its joint comes through it, whatever was found after it
-    misread: ClassVar[bool] = False  # it changes what an encoder says: all but the record is felt where the joint truly is
-    passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
     slight: ClassVar[float] = 0.0  # of its amplitude, if it has one alone: what surely is less, instruments in order have as well
-    turns: ClassVar[bool] = False  # only a joint that turns can have it
     healthy: ClassVar[Literal["first shape", "every shape", "never"]] = "first shape"  # that healthy machines have in small
     ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken
 
@@ -148,10 +141,6 @@ class Effect(Placed, ABC):
         """Other laws of the same cause, each to be tried in place of this one, which is the most likely."""
         return ()
 
-    def again(self, motion: Motion) -> bool:
-        """Whether it may act more than once at its place, in different shapes that this motion tells apart."""
-        return False
-
     def moving(self, arm: ArmModel) -> Array | None:
         """(base parameters, k): directions in which it moves them beyond its columns, each by a number that nobody knows."""
         return None
@@ -159,10 +148,6 @@ class Effect(Placed, ABC):
     def beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
         """Whether `motions` go where those it was fitted to, `known`, say nothing of it."""
         return False
-
-    def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
-        """The samples in which it acts, where it acts for a moment only."""
-        return None
 
     @property
     def strength(self) -> float:
@@ -204,7 +189,7 @@ class Effect(Placed, ABC):
     @classmethod
     def joints(cls, revolute: Sequence[bool]) -> tuple[int, ...]:
         """Those that can have it, 1-based."""
-        return tuple(k for k, turns in enumerate(revolute, 1) if turns or not cls.turns)
+        return tuple(range(1, len(revolute) + 1))
 
     def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
         """Of its torque on its own joint, by the logarithm of each non-linear number, in order: (samples, numbers) [N m].
@@ -280,7 +265,3 @@ class Effect(Placed, ABC):
         """The same where `simulate` has one state, and its rate follows from it and the speed of its own joint, and the load from
         both."""
         return None
-
-    def predicted(self, motion: Motion, arm: ArmModel) -> Array:
-        """`arm.torque(motion)`, kept from one effect and shape to the next; not to be written to."""
-        return predicted(arm, motion)

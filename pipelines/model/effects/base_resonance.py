@@ -43,7 +43,6 @@ class BaseResonance(Effect):
     experiment = "Measure the frequency response of the first joint in two postures with different inertia."
     size = "frequency"
     evidence = "frequency responses"
-    from_body = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

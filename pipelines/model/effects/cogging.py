@@ -16,9 +16,6 @@ from pipelines.model.rigid.orders import NEARLY, orders_along
 __all__ = ["Cogging"]
 
 _ROUNDED = 1e-11  # difference of orders that is rounding
-# Of the squared error that the whole order leaves, at most. A recorded drive with orders 7, 12 and 28 left .9 by a free one in
-# place of the first, made-up waves of 12, 13 and 14 a turn .74; one of 6.8 alone on its joint leaves noise.
-_ALL_BUT = 0.25
 _FEWEST = 1.25  # waves in the travel: a search begins at one and a half, and a fit may move it; half a wave is a spring
 _STILL = 1e-3  # [rad or m] of travel: none
 _LEADS = 0.1  # of its largest harmonic, that the first wave has at least: else the order is that of the harmonic
@@ -93,10 +90,6 @@ class Cogging(Effect):
             whole = around and order.is_integer()
             yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel if whole else 0.0,
                           fewest=0.0 if around else _FEWEST * 2.0 * math.pi / max(travel, _STILL))
-
-    def again(self, motion: Motion) -> bool:
-        """Magnets, teeth and poles each have their own order; a turn tells them apart, on much less any curve is a few waves."""
-        return self.goes_round(motion, NEARLY)
 
     @property
     def free(self) -> tuple[str, ...]:

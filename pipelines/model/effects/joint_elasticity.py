@@ -45,7 +45,6 @@ class JointElasticity(Effect):
     experiment = "Measure the frequency response of this joint in two postures with different inertia."
     size = "frequency"
     evidence = "frequency responses"
-    from_body = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

@@ -15,7 +15,6 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["Spring"]
 
 _DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
-_ANY = 11  # of what a polynomial leaves of a spring that hardens and gives way again
 _BEYOND = 0.1  # of the range in which it was seen: behind that nobody knows how it goes on
 _FAR = 1e3  # [rad] where nobody says how far it was seen
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …

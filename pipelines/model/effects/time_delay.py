@@ -34,8 +34,7 @@ class TimeDelay(Effect):
     remedy = "Stamp positions where they are taken, or move this joint's signal by the delay before it is used; lower the gains."
     experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
     size = "delay"
-    from_own_joint = True
-    misread = True
+    acts_on = "encoder"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         dq, ddq = self.own(motion.dq), self.own(motion.ddq)

@@ -138,7 +138,7 @@ class Exact:
     @property
     def core(self) -> int:
         """How many of the effects the torque has to be worked out with as a whole: all up to the last that does not just add."""
-        if any(one.effect.last or one.effect.in_drive or one.effect.misread for one in self.effects):
+        if any(one.effect.acts_on != "load" for one in self.effects):
             return len(self.effects)
         return max((k + 1 for k, one in enumerate(self.effects) if not one.effect.adds), default=0)
 

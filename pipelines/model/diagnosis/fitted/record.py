@@ -19,7 +19,7 @@ __all__ = ["changing", "recorded", "recorded_of"]
 
 def changing(arm: Arm, joint: int) -> tuple[Acting, ...]:
     """What in `arm` all recorded torque of `joint`, from 1, passes through, in that order."""
-    return tuple(acting for acting in arm.effects if acting.effect.passing and (acting.effect.joint or 1) == joint)
+    return tuple(acting for acting in arm.effects if acting.effect.acts_on == "record" and (acting.effect.joint or 1) == joint)
 
 
 def recorded_of(through: Sequence[Acting], x: Array, motion: Motion) -> Array:
