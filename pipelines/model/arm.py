@@ -19,6 +19,7 @@ from pipelines.log.model_file import ModelFile, Source, StoredEffect, StoredPara
 from pipelines.log.robot import RobotDescription, format_robot, parse_robot
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve
+from pipelines.model.effects.fast import speed_curve
 from pipelines.model.parameter import Origin, Parameter, Uncertainty
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
@@ -168,7 +169,7 @@ class Arm:
         rigid = replace(self, friction=(), effects=())
         torque = np.zeros_like(motion.q)
         for law in self.friction:
-            curve = law.effect.speed_curve(law.values)
+            curve = speed_curve(law.effect, law.values)
             if curve is not None and law.effect.joint is not None:
                 torque[:, law.effect.joint - 1] += curve.torque(motion.dq[:, law.effect.joint - 1])
             else:
@@ -177,7 +178,7 @@ class Arm:
 
     def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
         """The friction laws at a joint (1-based) as curves of its speed; None where one of them is more than that."""
-        curves = [law.effect.speed_curve(law.values) for law in self.friction if law.effect.joint in (joint, None)]
+        curves = [speed_curve(law.effect, law.values) for law in self.friction if law.effect.joint in (joint, None)]
         known = tuple(curve for curve in curves if curve is not None)
         return known if len(known) == len(curves) else None
 

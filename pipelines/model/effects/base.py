@@ -96,7 +96,6 @@ class Effect(Placed, ABC):
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
     shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
     acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"  # also the order in which effects compose
-    from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
@@ -112,14 +111,6 @@ class Effect(Placed, ABC):
     @abstractmethod
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         """Its torque per unit of each amplitude, to first order, (samples, joints, amplitudes)."""
-
-    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
-        """`columns` of several shapes of itself."""
-        return [shape.columns(motion, arm) for shape in shapes]
-
-    def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
-        """Of several shapes at this joint that act on it alone: (shapes, amplitudes, samples)."""
-        return np.stack([shape.columns(motion, arm)[:, self._index].T for shape in shapes])
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Itself with every combination of non-linear numbers worth trying on this motion."""
@@ -191,13 +182,6 @@ class Effect(Placed, ABC):
         """Those that can have it, 1-based."""
         return tuple(range(1, len(revolute) + 1))
 
-    def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
-        """Of its torque on its own joint, by the logarithm of each non-linear number, in order: (samples, numbers) [N m].
-
-        None where nobody wrote it down: then it is found by differences.
-        """
-        return None
-
     @property
     def adds(self) -> bool:
         """Whether all it does is to add its columns to the torque, so that nothing else has to be worked out with it."""
@@ -249,19 +233,3 @@ class Effect(Placed, ABC):
         """How it enters the forward simulation; by default as a load."""
         shaped, amplitudes = self.at(values), self.amplitudes(values)
         return Hooks(load=lambda motion, _: summed(shaped.columns(motion, arm), amplitudes))
-
-    def speed_curve(self, values: Values) -> SpeedCurve | None:
-        """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
-        return None
-
-    def own_load(self, values: Values) -> OwnLoad | None:
-        """What `simulate` has as load, as a function of angle and speed of its own joint, where it follows from these alone.
-
-        A simulation of one robot asks it: plain numbers are several times faster there than arrays.
-        """
-        return None
-
-    def own_memory(self, values: Values) -> OwnMemory | None:
-        """The same where `simulate` has one state, and its rate follows from it and the speed of its own joint, and the load from
-        both."""
-        return None

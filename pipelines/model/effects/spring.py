@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import ArmModel, OwnLoad, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Spring"]
@@ -21,7 +22,7 @@ _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "se
 
 
 @dataclass(frozen=True)
-class Spring(Effect):
+class Spring(Fast):
     """τ = k x + b x² + c x³ + d x⁴ + e x⁵ (+ f x⁶ + g x⁷), x = q - q0: a polynomial in q, whose coefficients are the amplitudes.
 
     A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its linear part is q0. Where gravity

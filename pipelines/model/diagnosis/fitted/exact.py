@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.fitted.nominal import Fit, effect_rows, law_rows,
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.mixed import mixable, mixed
 from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.fast import from_motion
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 
@@ -177,7 +178,7 @@ class Exact:
         return np.asarray(rows - sum(stands))
 
     def _nominal_rows(self, data: Data) -> Array:
-        if not all(law.from_motion for law in self.columns.laws):
+        if not all(from_motion(law) for law in self.columns.laws):
             return data.lay(self.nominal.torque)
         kept = len(self.columns.kept)
         torque, first = self.beta[:kept] @ rigid_rows(data, self.columns), kept

@@ -19,6 +19,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.fast import from_motion, several_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
 
@@ -136,16 +137,16 @@ def law_rows(data: Data, law: Effect, columns: Columns) -> Array:
 
 def effect_rows(data: Data, effect: Effect, arm: ArmModel) -> Array:
     """(k, rows) columns of an effect in one shape."""
-    if effect.from_motion:
+    if from_motion(effect):
         return data.lay_kept(effect, lambda motion: effect.columns(motion, arm))
     return data.lay(lambda motion: effect.columns(motion, arm))
 
 
 def several_rows(data: Data, shapes: Sequence[Effect], arm: ArmModel) -> list[Array]:
     """The same of several shapes of an effect, each (k, rows)."""
-    if not shapes or shapes[0].from_motion:
+    if not shapes or from_motion(shapes[0]):
         return [effect_rows(data, shape, arm) for shape in shapes]
-    laid = data.lay(lambda motion: np.concatenate(shapes[0].several(shapes, motion, arm), axis=2))
+    laid = data.lay(lambda motion: np.concatenate(several_columns(shapes, motion, arm), axis=2))
     return np.split(laid, len(shapes))
 
 

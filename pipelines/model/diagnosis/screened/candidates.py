@@ -23,6 +23,7 @@ from pipelines.model.diagnosis.fitted.record import changing, recorded, recorded
 from pipelines.model.diagnosis.rows.data import Data, LogData
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.fast import from_motion, own_columns, several_columns
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["Family", "Laid", "families", "lay_family", "place_of", "runs_away", "whole_motion"]
@@ -109,7 +110,7 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
 def _lay_some(data: Data, family: Family, first: int, size: int, whole: Arm) -> Laid:
     some, arm = family.shapes[first:first + size], whole.unrecorded
     with np.errstate(all="ignore"):
-        own = some[0].from_motion and family.joint
+        own = from_motion(some[0]) and family.joint
         acting, parts = _own(data, some, arm, whole) if own else _anywhere(data, some, arm, whole, not family.event)
     rows = np.flatnonzero(acting[data.joint])
     return Laid(first, data.clear(np.concatenate(parts, axis=2), rows), rows)
@@ -139,7 +140,7 @@ def _own(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm) -> tuple[Mask
 
 
 def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm, through: Sequence[Acting]) -> Array:
-    table = some[0].own_columns(some, one.motion, arm)
+    table = own_columns(some, one.motion, arm)
     for shape in table:
         shape[...] = _finite(shape)
     flat = recorded_of(through, table.reshape(-1, table.shape[2]), one.motion)
@@ -166,7 +167,7 @@ def _acting(laid: Array) -> Mask:
 def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -> Array:
     """(shapes, k, joints, rows)"""
     tables = [recorded(whole, _finite(table), one.motion).transpose(2, 1, 0)
-              for table in some[0].several(some, one.motion, arm)]
+              for table in several_columns(some, one.motion, arm)]
     k, joints, samples = tables[0].shape
     acting = np.flatnonzero([any(table[:, j].any() for table in tables) for j in range(joints)])
     flat = np.empty((len(some), k, len(acting), samples))
