@@ -109,12 +109,6 @@ class Arm:
         """The arm without its further effects: rigid body and friction."""
         return replace(self, effects=()) if self.effects else self
 
-    @cached_property
-    def unrecorded(self) -> Arm:
-        """The arm as it is, without what only changes the record."""
-        kept = tuple(acting for acting in self.effects if acting.effect.acts_on != "record")
-        return self if len(kept) == len(self.effects) else replace(self, effects=kept)
-
     def with_body(self, body: RigidBody, p: Array) -> Arm:
         """The same arm with another rigid body; its base parameters then are assumed."""
         base = tuple(Parameter(known.name, float(value), None, known.unit, origin="assumed")
