@@ -59,7 +59,6 @@ class Backlash(Fast):
     size = "gap"
     evidence = "reversals"
     fixed_amplitudes = (1.0,)
-    grows_with = "gap"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

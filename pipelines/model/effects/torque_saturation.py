@@ -40,7 +40,6 @@ class TorqueSaturation(Effect):
     size = "limit"
     acts_on = "drive"
     fixed_amplitudes = (1.0,)
-    grows_with = "limit"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self._excess(motion, self.own(self._asked(motion, arm)), self.limit))
