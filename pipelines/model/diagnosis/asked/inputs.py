@@ -77,7 +77,6 @@ class Prepared:
     recipe: Recipe
     motions: Motions  # of the logs that are fitted
     judging: Motions
-    referring: Motions
     data: Data
     judge: Data | None  # None: blocks of the fitted ones judge
     reference: Data | None
@@ -127,7 +126,7 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
         for (log, found), one in zip(part, laid.logs if laid else (), strict=True):
             if not one.y.size:
                 raise none_left(log, found, few=True)
-    return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
+    return Prepared(logs, columns, recipe, fitted, judging, data, judge, reference)
 
 
 def _without_rests(parts: Sequence[Motions], columns: Columns, recipe: Recipe, held: Sequence[Joints], at_rest: Sequence[Joints],
