@@ -20,7 +20,6 @@ from __future__ import annotations
 from benchmarks.side_by_side import HEADER, race, row  # isort: skip  # before numpy
 
 import argparse
-import math
 import time
 import tracemalloc
 from collections.abc import Callable
@@ -30,8 +29,7 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from pipelines.signal.chain import held_input, transition
-from pipelines.signal.long_logs import smooth_in_parts
-from pipelines.signal.observer import Observer, Start, design, observe
+from pipelines.signal.observer import Start, design, observe
 from pipelines.signal.smoother import Smoother, smooth
 
 T, STEP = 1e-3, 1e-5
@@ -149,8 +147,6 @@ def grow(largest: int) -> None:
         peak = tracemalloc.get_traced_memory()[1] - y.size * 24
         tracemalloc.stop()
         print(f"{name}: {peak / 1e6:.1f} MB beside the result at {sizes[-1]:.0e} samples")
-    for n in (sizes[-1] // 4, sizes[-1]):
-        print(f"smoother in parts, {n:.1e}: {parts_memory(observer, n):.1f} MB in all")
 
 
 def best(run: Callable[[], object], repeats: int = 15) -> float:
@@ -161,22 +157,6 @@ def best(run: Callable[[], object], repeats: int = 15) -> float:
         run()
         times.append(time.perf_counter() - begin)
     return min(times)
-
-
-def parts_memory(observer: Observer, samples: int) -> float:
-    tracemalloc.start()
-    total = math.fsum(float(states[2].sum()) for _, states in
-                      smooth_in_parts(_slice, samples, observer))
-    peak = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert math.isfinite(total)
-    return peak / 1e6
-
-
-def _slice(first: int, last: int) -> np.ndarray:
-    """Samples first .. last - 1 of the swing, made when they are asked for."""
-    t = np.arange(first, last)[:, None] * T
-    return np.asarray(np.round(np.sin(2 * np.pi * np.array([1.0, 2.3, 4.1]) * t) / STEP) * STEP)
 
 
 def main() -> None:

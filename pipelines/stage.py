@@ -16,7 +16,6 @@ import sys
 import time
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
@@ -43,7 +42,6 @@ from pipelines.log.places import (
 )
 from pipelines.log.results import encode, headed, json_text, write_series
 from pipelines.log.robot_files import robot_sources
-from pipelines.log.shared_work import errand
 from pipelines.report.report import Report
 
 __all__ = ["Beside", "Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "footer_of", "read_by_role",
@@ -177,8 +175,7 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
     hashes = _hashes(inputs.sources, inputs.hashes) | described
     # Equal inputs give equal bytes, wherever they lie: no path of this machine goes into a result.
     names = short_names(request.named)
-    with nullcontext() if request.no_report else errand(_ready_to_draw):
-        result = renamed(stage.compute(inputs, settings), names)
+    result = renamed(stage.compute(inputs, settings), names)
     checks = (*_remade(changed), *inputs.checks, *(c for opened in inputs.logs for c in opened.checks), *stage.checks(result))
     if request.strict and (repair := next((c for c in checks if c.level == "repair"), None)):
         raise repair.as_error()
@@ -201,12 +198,6 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
     finally:
         remove_folder(staging)
     return Outcome(result, object_, report, out, stage.exit_code(result, request.check), (*moved, *renamed(checks, names)))
-
-
-def _ready_to_draw() -> None:
-    from pipelines.report.side_by_side import get_ready
-
-    get_ready()
 
 
 def _remade(changed: Iterable[str]) -> Iterable[Check]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,16 +33,6 @@ class Reference:
     @property
     def n(self) -> int:
         return int(self.q.shape[1])
-
-    def then(self, more: Reference) -> Reference:
-        """One motion after the other; where this one ends, `more` has to begin."""
-        t = np.concatenate([self.t, self.t[-1] + (self.t[1] - self.t[0]) + more.t - more.t[0]])
-        return Reference(t, *(np.concatenate(pair) for pair in ((self.q, more.q), (self.dq, more.dq), (self.ddq, more.ddq))))
-
-    def of_joint(self, index: int) -> Reference:
-        """The same motion of one joint (0-based), the others held at their start."""
-        only = np.arange(self.n) == index
-        return replace(self, q=np.where(only, self.q, self.q[0]), dq=self.dq * only, ddq=self.ddq * only)
 
 
 def times(duration: float) -> Array:

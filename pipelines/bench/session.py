@@ -1,14 +1,11 @@
-"""Record experiments on a machine, and write down apart what ails it.
+"""Record experiments on a machine, and name its faults.
 
     logs = record(machine, faults, experiments, seed)
-    seal("answers.json", {"case-1": faults})
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -18,11 +15,10 @@ from pipelines.bench.fault import Fault
 from pipelines.bench.machine import SAMPLE_TIME, Machine
 from pipelines.bench.plant import Recording, run
 from pipelines.log import schema
-from pipelines.log.atomic import write_file
 from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.robot import format_robot
 
-__all__ = ["answer", "as_log", "peak_torque", "record", "seal"]
+__all__ = ["answer", "as_log", "peak_torque", "record"]
 
 
 def record(machine: Machine, faults: Sequence[Fault], experiments: Iterable[Experiment], seed: int = 0) -> list[ExperimentLog]:
@@ -56,13 +52,3 @@ def answer(faults: Iterable[Fault]) -> list[dict[str, object]]:
     """Cause, joint and parameters of each fault, named as findings name them; "unknown" for one outside the library."""
     return [{"cause": fault.name if fault.known else "unknown", "kind": fault.name, "joint": fault.joint,
              "parameters": fault.parameters()} for fault in faults]
-
-
-def seal(path: Path | str, cases: Mapping[str, Sequence[Fault]]) -> None:
-    """Write the answers of `cases` (folder of logs -> faults) to a file of their own, which no log names."""
-    text = json.dumps({name: answer(faults) for name, faults in cases.items()}, indent=1, sort_keys=True) + "\n"
-
-    def fill(draft: Path) -> None:
-        draft.write_text(text, encoding="utf-8")
-
-    write_file(Path(path), fill)

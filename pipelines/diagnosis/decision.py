@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_law
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.config import DiagnosisConfig
@@ -81,6 +80,8 @@ def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
     them the noise is what differs between rows of one state. Where both parts of a pair are noise,
     common over differing has an F distribution; 0 below its bound and below `config.misfit`.
     """
+    from scipy.stats import f as f_law
+
     rows = later.rows
     if later.dataset.reference is not None:
         return np.zeros(rows.n_joints)

@@ -22,7 +22,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
-from pipelines.model.diagnosis.given.compliance import Compliance, compared, compliance
+from pipelines.model.diagnosis.given.compliance import Compliance, compliance, new_causes
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
@@ -123,4 +123,4 @@ def _new(
     if now is None:
         return ()
     before = compliance(prepared.logs.frf_before, rough.model.nominal, exclude)
-    return now.named if before is None else compared(now, before).new
+    return now.named if before is None else new_causes(now, before)

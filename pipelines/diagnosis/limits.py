@@ -126,7 +126,7 @@ def _told(
     turning = joint is None or later.dataset.arm.robot.revolute[joint - 1]
     beyond = NotIdentifiable(effect.name, joint, _TOO_MUCH, effect.experiment)
     if effect.fixed_amplitudes is not None:
-        q = next(q for q in effect.parameters if q.name == effect.grows_with)
+        q = next(q for q in effect.parameters if q.name == effect.size)
         size = Value(values[q.name], None, q.unit_at(turning))
         less = effect.strength < 0.0
         return DetectionLimit(effect.name, joint, q.name, size, {}, "analytic", visible, less)

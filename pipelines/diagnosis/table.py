@@ -104,10 +104,3 @@ class Table:
     def times(self, coefficients: Array) -> tuple[Array, ...]:
         """Return Aᵀ c, one array of rows for each joint."""
         return tuple(coefficients[i] @ v for i, v in zip(self.index, self.values, strict=True))
-
-    def dense(self, joint: int, rows: Indices | slice = slice(None)) -> Array:
-        """Return all columns (k, rows) on the rows of one joint."""
-        own = self.values[joint][:, rows]
-        out = np.zeros((self.width, own.shape[1]))
-        out[self.index[joint]] = own
-        return out

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "Block", "Chosen", "Flags", "Indices", "rows_of", "split"]
+__all__ = ["Array", "Block", "Flags", "Indices", "rows_of", "split"]
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -64,23 +64,6 @@ class Block:
         """y - A β (channels, samples)."""
         return np.array([y - beta[index] @ values
                          for index, values, y in zip(self.columns, self.values, self.y, strict=True)])
-
-
-@dataclass(frozen=True, eq=False)
-class Chosen:
-    """Equations with some of their parameters only, the others being zero; iterate as often as the equations allow."""
-
-    equations: Iterable[Block]
-    columns: tuple[int, ...]  # in the order that the parameters shall have
-
-    def __iter__(self) -> Iterator[Block]:
-        for block in self.equations:
-            place = np.full(block.width, -1, dtype=np.intp)
-            place[list(self.columns)] = np.arange(len(self.columns))
-            kept = [place[index] >= 0 for index in block.columns]
-            yield Block(len(self.columns), tuple(place[index][k] for index, k in zip(block.columns, kept, strict=True)),
-                        tuple(v if k.all() else v[k] for v, k in zip(block.values, kept, strict=True)), block.y, block.used,
-                        block.noise)
 
 
 def rows_of(table: Array, index: Indices) -> Array:

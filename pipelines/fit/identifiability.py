@@ -1,12 +1,10 @@
 """What a log can show of the parameters, and what it cannot.
 
     condition_number(statistics)         of Φ itself: no weights, no scaling
-    resolved_rank(solution)              directions that stand out of the noise
     unresolved(solution, names)          which parameters cannot be separated, in words
     not_separated(solution, std, names)  groups of parameters that are determined only together
     hard_to_see(solution, names)         the weakest directions, strongest columns first
     visible(value, std, typical)         parameters worth printing as a number
-    identifiability(statistics, ...)          how much of a further column the model cannot absorb
 
 Directions are those of columns scaled to unit length: what one of them weighs is its torque, not its unit.
 """
@@ -23,19 +21,8 @@ from pipelines.fit.equations import Array
 from pipelines.fit.least_squares import Solution
 from pipelines.fit.statistics import Statistics
 
-__all__ = [
-    "Direction",
-    "Separation",
-    "Unresolved",
-    "condition_number",
-    "hard_to_see",
-    "identifiability",
-    "not_separated",
-    "resolved_rank",
-    "typical_size",
-    "unresolved",
-    "visible",
-]
+__all__ = ["Direction", "Separation", "Unresolved", "condition_number", "hard_to_see", "not_separated", "typical_size",
+           "unresolved", "visible"]
 
 _WHOLE = 3.0  # a direction is lost if three standard deviations of it are as large as all that was measured
 _SURE = 3.0  # standard deviations that a value must stand from zero
@@ -97,11 +84,6 @@ def condition_number(statistics: Statistics, columns: Sequence[int] | None = Non
     a = statistics.root(np.ones(len(statistics.power)))[:, :-1]
     s = np.linalg.svd(a if columns is None else a[:, list(columns)], compute_uv=False)
     return float(s[0] / s[-1]) if s[-1] > statistics.floor * s[0] else float("inf")
-
-
-def resolved_rank(solution: Solution, inflation: float = 1.0) -> int:
-    """Number of directions in which the noise leaves something to see."""
-    return int(_resolved(solution, inflation).sum())
 
 
 def _resolved(solution: Solution, inflation: float) -> npt.NDArray[np.bool_]:
@@ -206,22 +188,3 @@ def visible(value: Array, std: Array, typical: Array | None = None) -> npt.NDArr
     if typical is not None:
         known |= (typical > 0.0) & (std <= _SMALL * typical)
     return known
-
-
-def identifiability(statistics: Statistics, weights: Array, nominal: Sequence[int], extra: Sequence[int]) -> Array:
-    """η = ‖c⊥‖/‖c‖ of each extra column c, c⊥ being what the nominal columns cannot absorb; 0 where c is zero.
-
-    From the triangular factor: with the nominal columns first, what stands below their triangle is c⊥.
-    """
-    a = statistics.root(weights)[:, :-1]
-    q, _ = np.linalg.qr(_unit_columns(a[:, list(nominal)]))
-    c = a[:, list(extra)]
-    length = np.linalg.norm(c, axis=0)
-    rest = c - q @ (q.T @ c)
-    rest -= q @ (q.T @ rest)
-    return np.asarray(np.linalg.norm(rest, axis=0) / np.where(length > 0.0, length, 1.0))
-
-
-def _unit_columns(a: Array) -> Array:
-    length = np.linalg.norm(a, axis=0)
-    return np.asarray(a[:, length > 0.0] / length[length > 0.0])

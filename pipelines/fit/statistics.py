@@ -10,8 +10,8 @@ samples.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -56,11 +56,6 @@ class Gram:
     def information(self) -> Array:
         """AᵀA of each channel (channels, k, k)."""
         return self.gram[:, :-1, :-1]
-
-    def chosen(self, columns: Sequence[int]) -> Gram:
-        """What is left when the other parameters are zero."""
-        index = [*columns, self.width]
-        return replace(self, gram=self.gram[:, index][:, :, index])
 
     def root(self, weights: Array) -> Array:
         """A square matrix F with FᵀF = Σ w_j [A y]ᵀ[A y]; found with unit columns, so that units do not matter."""
@@ -109,10 +104,6 @@ class Triangles:
     def information(self) -> Array:
         a = self.factor[:, :, :-1]
         return np.asarray(a.transpose(0, 2, 1) @ a)
-
-    def chosen(self, columns: Sequence[int]) -> Triangles:
-        """What is left when the other parameters are zero."""
-        return replace(self, factor=np.asarray(np.linalg.qr(self.factor[:, :, [*columns, self.width]], mode="r")))
 
     def root(self, weights: Array) -> Array:
         return np.asarray(np.linalg.qr((np.sqrt(weights)[:, None, None] * self.factor).reshape(-1, self.width + 1), mode="r"))

@@ -2,12 +2,6 @@
 
     answers = shared_out(work, pieces)        [work(piece) for piece in pieces]
 
-    with meanwhile(work) as answer:           a single piece, while this process goes on with something else
-        ...
-        found = answer()                      work()
-
-    with errand(prepare):                     something that is done when this process would have to wait for such an answer
-
 The other process is a copy of this one, made where there is a second processor and this is none of a batch's workers: what `work`
 needs it has already, and its answers are copied back. A piece gets the same answer in either: the outcome does not hang on how
 the pieces fell.
@@ -23,7 +17,6 @@ import struct
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from pipelines.log.guard import die_with_parent
@@ -33,40 +26,31 @@ if TYPE_CHECKING:
     from multiprocessing.connection import Connection
     from types import FrameType
 
-__all__ = ["errand", "meanwhile", "shared_out"]
+__all__ = ["shared_out"]
 
 P = TypeVar("P")
 A = TypeVar("A")
 
 _PLACE = struct.Struct("<I")
 _MOST = 10_000  # pieces: their places fit into a pipe that nobody reads yet
-_PATIENT = 10  # a tenth of a processor that another wants
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 _COPY = threading.Event()  # set in the other process: it makes no further one
 # Processes that have answered: what they hold is given back while this one goes on, for that takes 20 ms of half a gigabyte.
 _LEAVING: list[int] = []
-_ERRANDS: list[Callable[[], None]] = []
 
 
-def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[], Any] = lambda: None,
-               take: Callable[[Any], None] = lambda words: None) -> list[A]:
-    """What `work` makes of each piece, in order.
-
-    Args:
-        left: asked in the other process at its end, for what it leaves beside its answers; `take` is given that here.
-    """
+def shared_out(work: Callable[[P], A], pieces: Sequence[P]) -> list[A]:
+    """What `work` makes of each piece, in order."""
     if not 1 < len(pieces) < _MOST or not _second():
         return [work(piece) for piece in pieces]
     places = _places(len(pieces))
     other = _Other()
     found: dict[int, A] = {}
     try:
-        other.begin(lambda: ([(k, work(pieces[k])) for k in _next(places)], left()))
+        other.begin(lambda: [(k, work(pieces[k])) for k in _next(places)])
         found.update((k, work(pieces[k])) for k in _next(places))
         with contextlib.suppress(EOFError, OSError, MemoryError):  # it came to grief: its pieces are done here
-            answers, words = other.answer()
-            found.update(answers)
-            take(words)
+            found.update(other.answer())
     finally:
         with _undisturbed():
             other.end()
@@ -74,53 +58,8 @@ def shared_out(work: Callable[[P], A], pieces: Sequence[P], *, left: Callable[[]
     return [found[k] if k in found else work(piece) for k, piece in enumerate(pieces)]
 
 
-@contextlib.contextmanager
-def meanwhile(work: Callable[[], A], patient: bool = False) -> Iterator[Callable[[], A]]:
-    """Another process does `work` while the body runs, which asks for the answer; where there is none, it is done when it is asked
-    for. An answer that nobody asks for is not waited for.
-
-    Args:
-        patient: it takes the time in which others leave a processor alone, of a body that shares out work itself.
-    """
-    if not _second():
-        yield work
-        return
-    other = _Other()
-
-    def answer() -> A:
-        while _ERRANDS and not other.ready:
-            _ERRANDS.pop()()
-        with contextlib.suppress(EOFError, OSError, MemoryError):  # it came to grief
-            found: A = other.answer()
-            return found
-        return work()
-
-    try:
-        other.begin(partial(_patiently, work) if patient else work)
-        yield answer
-    finally:
-        with _undisturbed():
-            other.end()
-
-
-@contextlib.contextmanager
-def errand(prepare: Callable[[], None]) -> Iterator[None]:
-    """Where the body waits for what is done `meanwhile`, `prepare` is done; else it is not. Nothing may hang on it but time."""
-    _ERRANDS.append(prepare)
-    try:
-        yield
-    finally:
-        if prepare in _ERRANDS:
-            _ERRANDS.remove(prepare)
-
-
-def _patiently(work: Callable[[], A]) -> A:
-    os.nice(_PATIENT)
-    return work()
-
-
 def _second() -> bool:
-    """Return whether another process may be made: not among the workers of a batch, which have every processor already."""
+    """Whether another process may be made: not among the workers of a batch, which have every processor already."""
     alone = multiprocessing.parent_process() is None and threading.current_thread() is threading.main_thread()
     return alone and not _COPY.is_set() and processors() > 1
 
@@ -160,11 +99,6 @@ class _Other:
                 self._theirs.close()  # or nobody would ever be told that no answer comes
                 signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
-    @property
-    def ready(self) -> bool:
-        """Return whether its answer is there, or none will come."""
-        return self._ours.poll()
-
     def answer(self) -> Any:
         """What it has made of its work.
 
@@ -189,7 +123,7 @@ class _Other:
 
 
 def _is_there(process: int) -> bool:
-    """Return whether it has not ended yet; of one that has nothing is left."""
+    """Whether it has not ended yet; of one that has nothing is left."""
     try:
         return os.waitpid(process, os.WNOHANG) == (0, 0)
     except ChildProcessError:  # somebody else has waited for it

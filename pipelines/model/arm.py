@@ -19,6 +19,7 @@ from pipelines.log.model_file import ModelFile, Source, StoredEffect, StoredPara
 from pipelines.log.robot import RobotDescription, format_robot, parse_robot
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve
+from pipelines.model.effects.fast import speed_curve
 from pipelines.model.parameter import Origin, Parameter, Uncertainty
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
@@ -28,6 +29,7 @@ __all__ = ["Acting", "Arm", "ArmTorque"]
 # Torque without effects that was asked for last, by body, base, friction and motion: an effect's slopes ask for it once a number.
 _KEPT: list[tuple[str, tuple[object, ...], Array]] = []
 _KEEP = 16
+_ORDER = ("load", "encoder", "drive", "record")  # of `Effect.acts_on`, from the innermost to the outermost
 
 
 @dataclass(frozen=True)
@@ -107,12 +109,6 @@ class Arm:
         """The arm without its further effects: rigid body and friction."""
         return replace(self, effects=()) if self.effects else self
 
-    @cached_property
-    def unrecorded(self) -> Arm:
-        """The arm as it is, without what only changes the record."""
-        kept = tuple(acting for acting in self.effects if not acting.effect.last)
-        return self if len(kept) == len(self.effects) else replace(self, effects=kept)
-
     def with_body(self, body: RigidBody, p: Array) -> Arm:
         """The same arm with another rigid body; its base parameters then are assumed."""
         base = tuple(Parameter(known.name, float(value), None, known.unit, origin="assumed")
@@ -122,8 +118,7 @@ class Arm:
     def extended(self, *more: Acting) -> Arm:
         """With more effects, each around those before it; what misreads an angle around all that act there, what all torque of a
         joint comes through around that, and what changes the record outermost."""
-        outer = sorted((*self.effects, *more),
-                       key=lambda acting: (acting.effect.last, acting.effect.in_drive, acting.effect.misread))
+        outer = sorted((*self.effects, *more), key=lambda acting: _ORDER.index(acting.effect.acts_on))
         return replace(self, effects=tuple(outer))
 
     def torque(self, motion: Motion, inside: Callable[[Motion, ArmModel], Array] | None = None) -> Array:
@@ -168,7 +163,7 @@ class Arm:
         rigid = replace(self, friction=(), effects=())
         torque = np.zeros_like(motion.q)
         for law in self.friction:
-            curve = law.effect.speed_curve(law.values)
+            curve = speed_curve(law.effect, law.values)
             if curve is not None and law.effect.joint is not None:
                 torque[:, law.effect.joint - 1] += curve.torque(motion.dq[:, law.effect.joint - 1])
             else:
@@ -177,7 +172,7 @@ class Arm:
 
     def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
         """The friction laws at a joint (1-based) as curves of its speed; None where one of them is more than that."""
-        curves = [law.effect.speed_curve(law.values) for law in self.friction if law.effect.joint in (joint, None)]
+        curves = [speed_curve(law.effect, law.values) for law in self.friction if law.effect.joint in (joint, None)]
         known = tuple(curve for curve in curves if curve is not None)
         return known if len(known) == len(curves) else None
 
@@ -245,9 +240,9 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
                             remedy="update rrrid, or correct the name")
     effect = find_effect(stored.effect)
     if stored.joint not in (effect.joints(revolute) if effect.scope == "joint" else (None,)):
+        turning = " that turns" if effect.scope == "joint" and not effect.joints((False,)) else ""
         raise InputRejected("S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where,
-                            remedy=f"it belongs to one {effect.scope}{' that turns' if effect.turns else ''}, "
-                            f"and the arm has {len(revolute)} joints")
+                            remedy=f"it belongs to one {effect.scope}{turning}, and the arm has {len(revolute)} joints")
     kind_of_joint = stored.joint is None or revolute[stored.joint - 1]
     unsaid = {q.name: StoredValue(q.unsaid, None, q.unit_at(kind_of_joint), "assumed") for q in effect.parameters
               if q.unsaid is not None}

@@ -19,6 +19,7 @@ import numpy as np
 
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect, Hooks, SpeedCurve
+from pipelines.model.effects.fast import speed_curve
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.chain_online import ChainOnline
@@ -49,7 +50,7 @@ class _Rigid(Protocol):
 class OnlineModel:
     """An arm's model, one sample at a time.
 
-    What depends on speed alone (`Effect.speed_curve`) or adds to D(q) (`Hooks.inertia`) is computed in plain numbers; for
+    What depends on speed alone (`speed_curve`) or adds to D(q) (`Hooks.inertia`) is computed in plain numbers; for
     anything else the arm itself is asked with one row. An effect that needs more than the moment, a delay or a state, then
     sees a motion of one sample.
     """
@@ -93,7 +94,7 @@ class _Sum:
         rest = []
         for one in acting:
             effect = one.effect.at(one.values)
-            if effect.joint is not None and (curve := effect.speed_curve(one.values)) is not None:
+            if effect.joint is not None and (curve := speed_curve(effect, one.values)) is not None:
                 self._curves.append((effect.joint - 1, _curve(curve)))
             elif (inertia := _only_inertia(effect.simulate(arm, one.values))) is not None:
                 added += inertia

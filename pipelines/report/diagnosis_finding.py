@@ -115,11 +115,6 @@ def _extending(some: Sequence[Finding]) -> str:
     return f"\"rrrid extend LOGS {' '.join(f'--with {cause}' for cause in causes)}\""
 
 
-def _frequency(one: Finding) -> float:
-    found = one.parameters["frequency"].value
-    return found if isinstance(found, float) else math.nan
-
-
 def _happens_once(one: Finding) -> bool:
     kind = find_effect(one.cause)
     return any(q.shape and q.name in kind.per_log for q in kind.parameters)

@@ -1,7 +1,6 @@
 """Draw many figures in two processes: half of the time of a long report is theirs.
 
     pictures = drawn({"friction": figure, ...}, draw)       the same bytes as one after the other
-    get_ready()                                             what it needs is loaded
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from pipelines.log.shared_work import shared_out
 from pipelines.report.report import Figure
 from pipelines.report.style import prepare_matplotlib
 
-__all__ = ["Picture", "drawn", "get_ready"]
+__all__ = ["Picture", "drawn"]
 
 Picture = tuple[str, bytes]  # SVG and PNG
 
@@ -26,12 +25,12 @@ def drawn(figures: Mapping[str, Figure], draw: Callable[[Figure, str], Picture])
 
     if len(figures) < _MANY:
         return {name: one(name) for name in figures}
-    get_ready()  # once, before there are two
+    _load()  # once, before there are two
     return dict(zip(figures, shared_out(one, list(figures)), strict=True))
 
 
-def get_ready() -> None:
-    """Load what draws, which takes as long as two figures."""
+def _load() -> None:
+    """Import what draws, which takes as long as two figures."""
     prepare_matplotlib()
     import matplotlib.backends.backend_agg
     import matplotlib.backends.backend_svg

@@ -19,10 +19,10 @@ from pipelines.bench.faults.relative_damper import RelativeDamper
 from pipelines.bench.faults.self_heating import SelfHeating
 from pipelines.bench.faults.sloshing_load import SloshingLoad
 from pipelines.bench.faults.sticking_seal import StickingSeal
-from pipelines.bench.link_model import LinkModel
 from pipelines.bench.machine import paper_machine
 from pipelines.bench.plant import run
 from pipelines.bench.reference import Reference, at_rest, times
+from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable
 from tests.bench.test_fault_signs import arm_of, measured, turned
 

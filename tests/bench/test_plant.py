@@ -13,11 +13,11 @@ from pipelines.bench.controllers import ComputedTorque, Decentralised, FeedForwa
 from pipelines.bench.fault import Floats, Hooks, Run
 from pipelines.bench.faults import make
 from pipelines.bench.faults.base_resonance import BaseResonance
-from pipelines.bench.link_model import LinkModel
 from pipelines.bench.machine import draw_machine, paper_machine
 from pipelines.bench.plant import run
 from pipelines.bench.reference import at_rest
 from pipelines.errors import UsageError
+from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from pipelines.fit.equations import Array, Block, Chosen, split
+from pipelines.fit.equations import Array, Block, split
 from pipelines.fit.least_squares import errors, fit, solve
 from pipelines.fit.statistics import Gram, Triangles, gather, gather_growing, triangulate
 from tests.fit.problems import CHANNELS, SIGMA, WIDTH, Problem, problem, white
@@ -154,17 +154,6 @@ def test_held_out_error_needs_no_samples() -> None:
     residual = other - one.Y @ truth
     assert seen.relative_error == pytest.approx(np.linalg.norm(residual) / np.linalg.norm(other), rel=1e-9)
     np.testing.assert_allclose(seen.rms, np.sqrt(np.mean(residual**2, axis=0)), rtol=1e-9)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_parameters_held_at_zero(method: type) -> None:
-    """Leaving parameters out, of the stream or of what is remembered of it, is a fit of the other columns."""
-    one, y = noisy()
-    kept = (12, 0, 3, 5, 6, 7, 10)
-    weights = 1 / SIGMA**2
-    truth = whole(one.Y[:, :, list(kept)], y, weights)
-    for statistics in (method(Chosen(one.blocks(y, 900), kept)), method(one.blocks(y, 900)).chosen(kept)):
-        np.testing.assert_allclose(solve(statistics, weights=weights).beta, truth, rtol=1e-10)
 
 
 def test_silence_is_answered_with_zero() -> None:

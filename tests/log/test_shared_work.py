@@ -15,7 +15,7 @@ import pytest
 
 from pipelines.errors import Interrupted
 from pipelines.log import shared_work
-from pipelines.log.shared_work import errand, meanwhile, shared_out
+from pipelines.log.shared_work import shared_out
 
 PIECES = list(range(9))
 
@@ -43,19 +43,6 @@ def test_large_arrays_come_back_as_they_were() -> None:
         return np.random.default_rng(seed).normal(size=200_000)
 
     assert all((got == noise(seed)).all() for seed, got in zip(PIECES, shared_out(noise, PIECES), strict=True))
-
-
-def test_what_the_other_leaves_is_taken_here() -> None:
-    seen, taken = list[int](), list[int]()
-
-    def note(piece: int) -> int:
-        time.sleep(0.02)
-        seen.append(piece)
-        return piece
-
-    assert shared_out(note, PIECES, left=lambda: seen, take=taken.extend) == PIECES
-    assert sorted([*seen, *taken]) == PIECES
-    assert taken
 
 
 def test_there_is_no_third_process() -> None:
@@ -208,96 +195,3 @@ def test_a_process_that_has_answered_leaves_by_itself(monkeypatch: pytest.Monkey
 def test_workers_of_a_batch_share_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("multiprocessing.parent_process", lambda: object())
     assert {process for _, process in shared_out(slowly, PIECES[:3])} == {os.getpid()}
-
-
-def test_another_process_works_meanwhile() -> None:
-    with meanwhile(lambda: slowly(7)) as answer:
-        here = slowly(8)
-        found = answer()
-    assert (found[0], here) == (7, (8, os.getpid()))
-    assert found[1] != os.getpid()
-
-
-def test_work_is_shared_while_another_process_does_its_own() -> None:
-    with meanwhile(lambda: slowly(7)) as answer:
-        assert [piece for piece, _ in shared_out(slowly, PIECES)] == PIECES
-        assert answer()[0] == 7
-
-
-def test_alone_it_is_done_when_it_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shared_work, "processors", lambda: 1)
-    done = list[int]()
-    with meanwhile(lambda: done.append(os.getpid())) as answer:
-        assert not done
-        answer()
-    assert done == [os.getpid()]
-
-
-def _children(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    started, fork = list[int](), os.fork
-    monkeypatch.setattr(os, "fork", lambda: started.append(child := fork()) or child)
-    return started
-
-
-def _all_gone(started: list[int]) -> bool:
-    for child in started:
-        with pytest.raises(ChildProcessError):
-            os.waitpid(child, os.WNOHANG)
-    return bool(started)
-
-
-def test_what_comes_to_grief_meanwhile_is_done_here_and_its_error_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    here, started = os.getpid(), _children(monkeypatch)
-
-    def only_here() -> int:
-        if os.getpid() != here:
-            os._exit(3)
-        return 5
-
-    def fails() -> int:
-        raise ValueError("seven")
-
-    with meanwhile(only_here) as answer:
-        assert answer() == 5
-    with pytest.raises(ValueError, match="seven"), meanwhile(fails) as answer:
-        answer()
-    assert _all_gone(started)
-
-
-def test_an_answer_that_nobody_asks_for_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nor where the body fails: no process is left."""
-    started, begun = _children(monkeypatch), time.monotonic()
-    with meanwhile(lambda: time.sleep(60.0)):
-        pass
-    with pytest.raises(KeyError), meanwhile(lambda: time.sleep(60.0)):
-        raise KeyError
-    assert time.monotonic() - begun < 30.0
-    assert _all_gone(started)
-
-
-def test_an_errand_is_done_while_an_answer_is_waited_for() -> None:
-    """Once; not where the answer is there already, and never after its body."""
-    done = list[float]()
-
-    def slowly_made() -> float:
-        time.sleep(0.3)
-        return time.perf_counter()
-
-    with errand(lambda: done.append(time.perf_counter())), meanwhile(slowly_made) as answer:
-        ended = answer()
-    assert len(done) == 1
-    assert done[0] < ended
-    with errand(lambda: done.append(0.0)):
-        with meanwhile(os.getpid) as answer:
-            time.sleep(0.3)
-            answer()
-        assert len(done) == 1
-    with meanwhile(slowly_made) as answer:
-        answer()
-    assert len(done) == 1
-
-
-def test_patient_work_gives_way_to_what_others_do() -> None:
-    with meanwhile(lambda: os.getpriority(os.PRIO_PROCESS, 0), patient=True) as later, \
-            meanwhile(lambda: os.getpriority(os.PRIO_PROCESS, 0)) as now:
-        assert later() > now() == os.getpriority(os.PRIO_PROCESS, 0)

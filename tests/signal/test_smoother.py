@@ -8,7 +8,6 @@ from scipy.integrate import quad
 
 from pipelines.errors import InputRejected
 from pipelines.signal.kalman import Textbook
-from pipelines.signal.long_logs import smooth_in_parts
 from pipelines.signal.observer import Start, design, observe
 from pipelines.signal.smoother import Smoother, smooth, twicing_growth
 from tests.signal.chains import assert_near, exact_smoother, swing, walk, with_gaps
@@ -84,25 +83,6 @@ def test_time_reversed_data_give_time_reversed_states() -> None:
     std = Smoother(observer).std[:, 0]
     assert np.sqrt(np.mean((forward[0] - backward[0, ::-1]) ** 2)) < 0.1 * std[0]
     assert np.sqrt(np.mean((forward[1] + backward[1, ::-1]) ** 2)) < 0.1 * std[1]
-
-
-def test_parts_of_a_log_join_to_the_whole() -> None:
-    """Smoothed 1000 samples at a time, with gaps at the joints, the states are those of the whole log."""
-    y = swing(7000, 3, STEP)
-    y[990:1020, 0] = np.nan
-    y[2400:2900, 1] = np.nan
-    observer = design(T, np.array([50.0, 500.0, 3770.0]), R)
-    asked = []
-
-    def read(first: int, last: int) -> np.ndarray:
-        asked.append(last - first)
-        return y[first:last]
-
-    parts = list(smooth_in_parts(read, len(y), observer, 1000))
-    assert [first for first, _ in parts] == list(range(0, 7000, 1000))
-    joined = np.concatenate([states for _, states in parts], axis=1)
-    assert_near(joined.transpose(1, 0, 2), smooth(y, observer).states.transpose(1, 0, 2), 1e-10)
-    assert max(asked) < 5000
 
 
 @pytest.mark.parametrize("samples", [2, 3, 31, 32, 33, 63, 64, 65])

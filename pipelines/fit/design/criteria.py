@@ -13,7 +13,6 @@ Pukelsheim 1993, ch. 6 (E, D and A are members of one family of matrix means); S
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,7 +54,6 @@ def spectrum(information: Array) -> Spectrum:
     return Spectrum(np.maximum(values, 1e-15 * max(float(values[-1]), _TINY)), vectors)
 
 
-Criterion = Callable[[Spectrum], tuple[float, Array]]  # value, and its derivative by M: df = tr(G dM)
 
 
 def condition(found: Spectrum, p: float) -> tuple[float, Array]:

@@ -8,14 +8,15 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["AsymmetricFriction"]
 
 
 @dataclass(frozen=True)
-class AsymmetricFriction(Effect):
+class AsymmetricFriction(Fast):
     """τ = ½ s (ΔFc tanh(w v) + ΔFv v), with Δ the positive direction's minus the negative one's and s the direction.
 
     Beside Fc tanh(w v) + Fv v these are Fc ± ½ ΔFc and Fv ± ½ ΔFv in the two directions: s = sign v, each to the last; or they

@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, friction_at
+from pipelines.model.effects.base import ArmModel, Hooks, Quantity, Values, friction_at
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart
 from pipelines.model.rigid.gap import Gaps, followed
@@ -29,7 +30,7 @@ _CROSSINGS = (3e-3, 1e-2, 3e-2)  # [s] that the joint's usual torque needs to ca
 
 
 @dataclass(frozen=True)
-class Backlash(Effect):
+class Backlash(Fast):
     """With x = q_link - q, the link's angle against the motor's, torque passes only where |x| > gap/2.
 
         (D - J_m) ẍ = -(τ_j - J_m q̈_j) - c ẋ - flank,    flank = k (|x| - gap/2) sign x + d ẋ, never pulling
@@ -57,9 +58,7 @@ class Backlash(Effect):
     experiment = "Move the joint to and fro over small angles, once where gravity loads it and once where it does not."
     size = "gap"
     evidence = "reversals"
-    from_body = True
     fixed_amplitudes = (1.0,)
-    grows_with = "gap"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

@@ -1,4 +1,4 @@
-"""What every effect offers: a physical cause is data plus one function.
+"""The contract of an effect: a physical cause is data plus one function.
 
 An effect is written by giving its words, its parameters and `columns`; all else has a default in `Effect`.
 
@@ -8,38 +8,34 @@ An effect is written by giving its words, its parameters and `columns`; all else
     An encoder fault     columns to screen with; `apply` = predict(corrected motion, arm)
     Tilted gravity       columns to screen with; `apply` = predict(motion, arm.with_body(tilted body, p))
 
-An object is the effect in one place and one shape: `joint` and the *non-linear* numbers (speeds, orders, delays) are
-its fields. The *linear* numbers, its amplitudes, stay outside, for they are what a fit solves for:
+An object is the effect in one place and one shape: `joint` and the *non-linear* parameters (speeds, orders, delays) are
+its fields. The *linear* parameters, its amplitudes, are not: a fit solves for them.
 
     torque = columns(motion, arm) @ amplitudes      to first order; exactly for most
 
-Torque is a load: measured torque = torque of the model + torques of the effects. Everything is computed from the motion
-and the *predicted* torque, never from measured torque, whose noise would bias it. One exception: what a drive kept back above
-its limit only the commanded torque tells, which travels with the motion as `Motion.tau`.
+Torque is a load: measured torque = torque of the model + torques of the effects. Columns are computed from the motion and the
+*predicted* torque, never from measured torque, whose noise would bias them. One exception: the torque that a drive keeps back
+above its limit follows from the commanded torque alone, which is `Motion.tau`.
 
-What a search over effects asks, so that it need not know any of them:
+What a diagnosis reads:
 
-    shapes, promising    a grid of non-linear numbers; the few of them that a residual speaks for, where the grid is large
-    full                 the form a finding is refitted with: more harmonics, a cubic term. `shapes` are the screening form
-    forms                other laws of the same cause, in place of that form where they leave decidedly less
-    free                 the non-linear numbers that an exact refit may move; the others are discrete, or follow from these
-    shared               non-linear numbers that are those of the friction at its joint: one surface changes sign over one speed
-    fixed_amplitudes     amplitudes that physics gives: screening fits them, an exact refit holds them
-    slight               how much of it arms in order have: as a cause, so little has no name
-    possible             whether values lie in their ranges: a lag of negative time is no lag, but perhaps another cause
-    believable           whether an arm with it could have moved as it did: one that is clipped all the time follows nothing
-    per_log              parameters that belong to one log: an event, or a phase where encoders are zeroed at each start
-    again                whether one place may have it more than once: waves of several orders along one turn
-    moving               ways in which it moves base parameters that its own numbers do not say: reference logs show these
-    beyond               whether logs go where those that it was fitted to say nothing of it
-    acting               the samples in which an effect of a moment acts, which a fit of the arm may leave out
+    shapes, promising    a grid of non-linear parameters; the event windows that a residual suggests
+    full, forms          the form that is refitted, with more amplitudes than the one screened; other laws of the same cause
+    free, shared         non-linear parameters that a refit may move; those that equal the friction law's at the same joint
+    fixed_amplitudes     amplitudes given by physics: screening fits them, a refit holds them; `size` then tells how much there is
+    possible, at_end     whether values lie in their ranges, and whether a step would leave them
+    per_log              parameters that belong to one log: the window of an event, the phase of encoders zeroed at each start
+    moving               directions in which the effect changes base parameters beyond its columns (nuisance)
+    beyond               whether logs contain motion that the fit of the effect says nothing of
+    again                whether one place may have it more than once: cogging of several orders
+    reads_torque         whether its columns hold the logged torque
+    healthy, slight      what healthy machines have in small
+    acts_on              load, encoder, drive or record: effects compose in this order, the record outermost
+    passed, mixing       torque after the record's filter; the matrix by which drives mix the torques of one instant
     reported             the parameters as causes.md names them
-    from_motion          whether its columns hang on the motion alone; from_body: on the rigid body as well, and nothing else;
-                         from_own_joint: on these and on what acts at its joint
-    mixing               the matrix by which it mixes the torques of a moment, where that is all it does
 
-The columns of an effect need not be independent of each other, nor all seen, on every arm: solve with a rank threshold. Each
-motion handed in is one log from its first sample (time in a log counts from motion.t[0]), complete but for gaps.
+Speed-ups are in `fast`. Columns need not be independent, nor all visible, on every arm: solve with a rank threshold. Each motion
+is one log from its first sample (time in a log counts from motion.t[0]), complete but for gaps.
 """
 
 from __future__ import annotations
@@ -50,7 +46,6 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.model.effects.placed import Placed
 from pipelines.model.effects.terms import (
@@ -72,7 +67,7 @@ from pipelines.model.effects.terms import (
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LARGE", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
-           "SpeedCurve", "Values", "friction_at"]
+           "SpeedCurve", "Values", "friction_at", "predicted"]
 
 
 @dataclass(frozen=True)
@@ -91,24 +86,16 @@ class Effect(Placed, ABC):
     experiment: ClassVar[str]  # what to record to be sure
     size: ClassVar[str] = ""  # the number that a verdict tells beside the title, if one alone says how much of it there is
     fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
-    grows_with: ClassVar[str] = ""  # where physics gives all amplitudes: the number that says how much of it there is
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
     evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
     # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
     shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
-    from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, whatever the arm
-    from_body: ClassVar[bool] = False  # from motion and rigid body alone, whatever else acts
-    from_own_joint: ClassVar[bool] = False  # from these and what acts at its own joint, whatever adds its torque to others
-    last: ClassVar[bool] = False  # it changes the record of what everything else did, whatever was found after it
-    reads_torque: ClassVar[bool] = False  # its columns hold the logged torque itself, where that is a held command
-    in_drive: ClassVar[bool] = False  # all torque of its joint comes through it, whatever was found after it
-    misread: ClassVar[bool] = False  # it changes what an encoder says: all but the record is felt where the joint truly is
-    passing: ClassVar[tuple[float, ...]] = ()  # amplitudes beyond first order to try, where all torque of its joint passes it
+    acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"  # also the order in which effects compose
     plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
     # names of what it consists of: taken in its place where logs do not tell its terms apart
+    reads_torque: ClassVar[bool] = False  # its columns hold the logged torque itself, where that is a held command
     friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
     slight: ClassVar[float] = 0.0  # of its only amplitude: what surely is less, arms in order have as well
-    turns: ClassVar[bool] = False  # only a joint that turns can have it
     healthy: ClassVar[Literal["first shape", "every shape", "never"]] = "first shape"  # that healthy machines have in small
     ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken
 
@@ -120,14 +107,6 @@ class Effect(Placed, ABC):
     @abstractmethod
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         """Its torque per unit of each amplitude, to first order, (samples, joints, amplitudes)."""
-
-    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
-        """`columns` of several shapes of itself."""
-        return [shape.columns(motion, arm) for shape in shapes]
-
-    def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
-        """Of several shapes at this joint that act on it alone: (shapes, amplitudes, samples)."""
-        return np.stack([shape.columns(motion, arm)[:, self._index].T for shape in shapes])
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Itself with every combination of non-linear numbers worth trying on this motion."""
@@ -161,14 +140,10 @@ class Effect(Placed, ABC):
         """Return whether `motions` go where those it was fitted to, `known`, say nothing of it."""
         return False
 
-    def acting(self, motion: Motion) -> npt.NDArray[np.bool_] | None:
-        """The samples in which it acts, where it acts for a moment only."""
-        return None
-
     @property
     def strength(self) -> float:
-        """How much of it there is, where physics gives the amplitudes; negative for what grows as its number falls."""
-        return float(getattr(self, self.grows_with)) if self.grows_with else 0.0
+        """How much of it there is, by `size`, where physics gives the amplitudes; negative for what grows as `size` falls."""
+        return float(getattr(self, self.size)) if self.fixed_amplitudes else 0.0
 
     @property
     def free(self) -> tuple[str, ...]:
@@ -190,10 +165,10 @@ class Effect(Placed, ABC):
         return {q.name: int(values[q.name]) if q.discrete else values[q.name] for q in self.parameters}
 
     def passed(self, amplitude: float, x: Array, t: Array, start: Array | float | None = None, since: int = 0) -> Array:
-        """Any torque `x` (…, samples) of its joint as it comes out of it, where `passing` says that all of it goes through.
+        """Return any torque `x` (…, samples) of its joint as it is recorded, of an effect that acts on the record.
 
         Args:
-            start: what comes out up to sample `since`; None: as if `x` had been so before.
+            start: the output up to sample `since`; None: as if `x` had been constant before.
         """
         return x
 
@@ -205,14 +180,7 @@ class Effect(Placed, ABC):
     @classmethod
     def joints(cls, revolute: Sequence[bool]) -> tuple[int, ...]:
         """Those that can have it, 1-based."""
-        return tuple(k for k, turns in enumerate(revolute, 1) if turns or not cls.turns)
-
-    def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
-        """Of its torque on its own joint, by the logarithm of each non-linear number, in order: (samples, numbers) [N m].
-
-        None where nobody wrote it down: then it is found by differences.
-        """
-        return None
+        return tuple(range(1, len(revolute) + 1))
 
     @property
     def adds(self) -> bool:
@@ -265,23 +233,3 @@ class Effect(Placed, ABC):
         """How it enters the forward simulation; by default as a load."""
         shaped, amplitudes = self.at(values), self.amplitudes(values)
         return Hooks(load=lambda motion, _: summed(shaped.columns(motion, arm), amplitudes))
-
-    def speed_curve(self, values: Values) -> SpeedCurve | None:
-        """Its torque as a `SpeedCurve`, where it is one and nothing else: `simulate` then is not asked."""
-        return None
-
-    def own_load(self, values: Values) -> OwnLoad | None:
-        """What `simulate` has as load, as a function of angle and speed of its own joint, where it follows from these alone.
-
-        A simulation of one robot asks it: plain numbers are several times faster there than arrays.
-        """
-        return None
-
-    def own_memory(self, values: Values) -> OwnMemory | None:
-        """The same where `simulate` has one state, and its rate follows from it and the speed of its own joint, and the load from
-        both."""
-        return None
-
-    def predicted(self, motion: Motion, arm: ArmModel) -> Array:
-        """`arm.torque(motion)`, kept from one effect and shape to the next; not to be written to."""
-        return predicted(arm, motion)

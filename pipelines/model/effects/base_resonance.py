@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, friction_at
+from pipelines.model.effects.base import ArmModel, Hooks, Predict, Quantity, Values, friction_at
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_by, rigid_slopes, shifted
 
@@ -19,7 +20,7 @@ _FIRST = 0  # the joint whose axis the base turns about
 
 
 @dataclass(frozen=True)
-class BaseResonance(Effect):
+class BaseResonance(Fast):
     """I (ẍ + 2 ζ w ẋ + w² x) = -τ_1, w = 2πf: the base turns by x about the first joint's axis, and the arm with it.
 
     τ_1 is the rigid arm's torque on that joint; its encoder and its friction turn with the base. To first order
@@ -43,7 +44,6 @@ class BaseResonance(Effect):
     experiment = "Measure the frequency response of the first joint in two postures with different inertia."
     size = "frequency"
     evidence = "frequency responses"
-    from_body = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

@@ -9,16 +9,14 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import NEARLY, orders_along
 
 __all__ = ["Cogging"]
 
 _ROUNDED = 1e-11  # difference of orders that is rounding
-# Of the squared error that the whole order leaves, at most. A recorded drive with orders 7, 12 and 28 left .9 by a free one in
-# place of the first, made-up waves of 12, 13 and 14 a turn .74; one of 6.8 alone on its joint leaves noise.
-_ALL_BUT = 0.25
 _FEWEST = 1.25  # waves in the travel: a search begins at one and a half, and a fit may move it; half a wave is a spring
 _STILL = 1e-3  # [rad or m] of travel: none
 _LEADS = 0.1  # of its largest harmonic, that the first wave has at least: else the order is that of the harmonic
@@ -26,7 +24,7 @@ _APART = 0.25  # of what the range tells apart: nearer to a whole order it is 45
 
 
 @dataclass(frozen=True)
-class Cogging(Effect):
+class Cogging(Fast):
     """τ = Σ A_m sin(m k q + φ_m), m = 1, 2, 3: the same at all speeds and in both directions.
 
     The columns are sin mkq, cos mkq; their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks for m = 1 alone. Magnets, slots
@@ -95,7 +93,7 @@ class Cogging(Effect):
                           fewest=0.0 if around else _FEWEST * 2.0 * math.pi / max(travel, _STILL))
 
     def again(self, motion: Motion) -> bool:
-        """Magnets, teeth and poles each have their own order; a turn tells them apart, on much less any curve is a few waves."""
+        """Magnets, teeth and poles each have their own order, which a turn shows; on much less any curve is a few waves."""
         return self.goes_round(motion, NEARLY)
 
     @property

@@ -8,7 +8,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, SpeedCurve, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ConcaveFriction"]
@@ -19,7 +20,7 @@ _BLUNTEST = 0.3  # below it levels off over many decades: no recorded speeds tel
 
 
 @dataclass(frozen=True)
-class ConcaveFriction(Effect):
+class ConcaveFriction(Fast):
     """τ = A tanh(v/v_0), or A x (1 + |x|^a)^(-1/a), x = v/v_0, beside Coulomb and viscous friction.
 
     The second is the shear of a lubricant whose viscosity falls as 1/|v| far above v_0: Yasuda, Armstrong & Cohen 1981, with the

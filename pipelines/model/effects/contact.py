@@ -71,9 +71,6 @@ class Contact(Effect):
 
         return Hooks(load=load, states=1, start=lambda motion, _: motion.t[:, None], update=lambda motion, _, states: states)
 
-    def acting(self, motion: Motion) -> npt.NDArray[np.bool_]:
-        return self._acting(motion.t - motion.t[0])
-
     def _acting(self, t: Array) -> npt.NDArray[np.bool_]:
         return np.asarray((t > self.start) & (t < self.start + self.duration))
 

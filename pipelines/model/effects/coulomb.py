@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Coulomb"]
@@ -19,7 +20,7 @@ _BETWEEN = 1.5  # tanh and the root: a roundness that is fitted begins there
 
 
 @dataclass(frozen=True)
-class Coulomb(Effect):
+class Coulomb(Fast):
     """τ = Fc ((2 - r) tanh(x) + (r - 1) x/√(1 + x²)), x = w v; from r = 2 on Fc ((3 - r) x/√(1 + x²) + (r - 2) (2/π) arctan x).
 
     tanh(w v) stands for sign(v) in fits and in simulation alike. In a fit, a reconstructed speed passes zero a little

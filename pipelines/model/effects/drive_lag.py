@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import rate_of_change
 
@@ -25,10 +25,10 @@ class DriveLag(Effect):
     remedy = "Tune the current loop; lead the feed-forward by the time constant."
     experiment = "Repeat an experiment at two speeds, or record the joint's frequency response."
     size = "time_constant"
-    in_drive = True
+    acts_on = "drive"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, rate_of_change(self.own(self.predicted(motion, arm)), motion.t))
+        return self.on_own_row(arm, rate_of_change(self.own(predicted(arm, motion)), motion.t))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque lags, other effects included."""

@@ -33,8 +33,7 @@ class EncoderCrosstalk(Effect):
     remedy = "Take the part found off the reading; look at what couples the two encoders."
     experiment = "Hold this joint still against a stop or a level and move the other over its range."
     size = "coefficient"
-    from_own_joint = True
-    misread = True
+    acts_on = "encoder"
 
     @classmethod
     def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:

@@ -34,9 +34,12 @@ class EncoderEccentricity(Effect):
     remedy = "Correct the reading by the sine found, or centre the disc; two opposite heads cancel it."
     experiment = "Turn the joint over a full turn at three constant speeds."
     size = "amplitude"
-    from_own_joint = True
-    misread = True
-    turns = True
+    acts_on = "encoder"
+
+    @classmethod
+    def joints(cls, revolute: Sequence[bool]) -> tuple[int, ...]:
+        """Return those that turn."""
+        return tuple(k for k, turns in enumerate(revolute, 1) if turns)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         q, v, u = (self.own(x) for x in (motion.q, motion.dq, motion.ddq))

@@ -41,7 +41,6 @@ class GravityTilt(Effect):
     remedy = "Level the base, or correct gravity in the robot description."
     experiment = "Hold the arm still, stretched out, in eight angles of joint 1, and with the elbow bent in the same eight."
     size = "angle"
-    from_body = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         size, _, first, second = _axes(arm)

@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, friction_at
+from pipelines.model.effects.base import ArmModel, Hooks, Predict, Quantity, Values, friction_at
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart
 from pipelines.model.rigid.perturbation import deflection, perturbed_by, rate_of, rigid_slopes, shifted
@@ -18,7 +19,7 @@ __all__ = ["JointElasticity"]
 
 
 @dataclass(frozen=True)
-class JointElasticity(Effect):
+class JointElasticity(Fast):
     """k x + d ẋ + τ_link(q + x) = 0, x = q_link - q: torque, friction and encoder sit on the motor's side.
 
     τ_link is the rigid torque of the joint without its motor, τ_j - J_m q̈_j. To first order, x = -(τ_j - J_m q̈_j)/k:
@@ -45,7 +46,6 @@ class JointElasticity(Effect):
     experiment = "Measure the frequency response of this joint in two postures with different inertia."
     size = "frequency"
     evidence = "frequency responses"
-    from_body = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

@@ -38,7 +38,6 @@ class LinkLength(Effect):
     remedy = "Measure the link and correct the robot description; the tip is off by as much."
     experiment = "Hold the arm in static poses with the elbow bent and straight, and move it fast in the same poses."
     size = "error"
-    from_body = True
 
     @classmethod
     def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:

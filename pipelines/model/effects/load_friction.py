@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, PlainDrive, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, PlainDrive, Predict, Quantity, Values, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LoadFriction"]
@@ -48,7 +48,7 @@ class LoadFriction(Effect):
     friction = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        load = self.own(self.predicted(motion, arm)) - (1.0 - self.behind) * self.own(arm.friction_torque(motion))
+        load = self.own(predicted(arm, motion)) - (1.0 - self.behind) * self.own(arm.friction_torque(motion))
         return self.on_own_row(arm, np.abs(load) * np.tanh(self.sharpness * self.own(motion.dq)))
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:

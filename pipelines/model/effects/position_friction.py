@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["PositionFriction"]
@@ -19,7 +20,7 @@ _HIGHEST = 8.0  # order that is searched for
 
 
 @dataclass(frozen=True)
-class PositionFriction(Effect):
+class PositionFriction(Fast):
     """τ = Σ A_m sin(m k q + φ_m) tanh(w v), m = 1, 2, 3: Coulomb friction that varies along the turn.
 
     Where it rubs in bands a wave is no sine, and its harmonics carry over to where one alone would not. The columns are

@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, OwnMemory, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Hooks, OwnMemory, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.bristles import ONE, Breaking, Bristles, Slips, sliding_level
 
@@ -22,7 +23,7 @@ _STRIBECK = 0.1  # of the fastest speed: where it looks for the speed over which
 
 
 @dataclass(frozen=True)
-class Presliding(Effect):
+class Presliding(Fast):
     """τ = A (u + T_d du/dt): friction that turns over with travel, not with speed. It takes the place of as much Coulomb friction.
 
     Along a stroke in direction s, y = s u bends with travel x = |q|/d by

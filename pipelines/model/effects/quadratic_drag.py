@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["QuadraticDrag"]
 
 
 @dataclass(frozen=True)
-class QuadraticDrag(Effect):
+class QuadraticDrag(Fast):
     """τ = c v |v|."""
 
     name = "quadratic_drag"

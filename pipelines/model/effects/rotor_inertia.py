@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Hooks, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["RotorInertia"]
 
 
 @dataclass(frozen=True)
-class RotorInertia(Effect):
+class RotorInertia(Fast):
     """τ = I ddq, on its own joint only: a rotor turns with its joint, whatever the arm's posture.
 
     At joint side: gear ratio squared times the rotor's own inertia. Its gyroscopic torques are small beside it.

@@ -9,20 +9,20 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import ArmModel, OwnLoad, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Spring"]
 
 _DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
-_ANY = 11  # of what a polynomial leaves of a spring that hardens and gives way again
 _BEYOND = 0.1  # of the range in which it was seen: behind that nobody knows how it goes on
 _FAR = 1e3  # [rad] where nobody says how far it was seen
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …
 
 
 @dataclass(frozen=True)
-class Spring(Effect):
+class Spring(Fast):
     """τ = k x + b x² + c x³ + d x⁴ + e x⁵ (+ f x⁶ + g x⁷), x = q - q0: a polynomial in q, whose coefficients are the amplitudes.
 
     A search looks for k x alone. Of several zeros of the polynomial the one nearest to that of its linear part is q0. Where gravity

@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Stribeck"]
@@ -20,7 +21,7 @@ _OVER = 2.0  # times the speed over which friction changes its sign: by then it 
 
 
 @dataclass(frozen=True)
-class Stribeck(Effect):
+class Stribeck(Fast):
     """τ = A (1 + (e^p - 1) |v/v_s|^n)^(-1/p) tanh(w v), beside Coulomb and viscous friction; 1/e of it is left at v_s.
 
     As p goes to 0 it is A exp(-|v/v_s|^n) tanh(w v): Armstrong-Hélouvry, Dupont & Canudas de Wit 1994, eq. (7); n = 1 is

@@ -182,8 +182,8 @@ class Hooks:
     """
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
-    alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based) in plain numbers: `Effect.own_load`
-    remembering: tuple[int, OwnMemory] | None = None  # or where it is one state that begins at zero: `Effect.own_memory`
+    alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based) in plain numbers: `Fast.own_load`
+    remembering: tuple[int, OwnMemory] | None = None  # or where it is one state that begins at zero: `Fast.own_memory`
     actuator: Callable[[Array, Motion, Array], Array] | None = None  # command, motion, states -> applied torque [N m]
     drive: PlainDrive | None = None  # the same of one robot in plain numbers, where speeds tell it
     sensor: Callable[[Array, Array], Array] | None = None  # true q, states -> measured q [rad]

@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ThreeSigmoid"]
@@ -18,7 +19,7 @@ _GRID = 8  # sharpnesses in the grid: 56 ordered triples
 
 
 @dataclass(frozen=True)
-class ThreeSigmoid(Effect):
+class ThreeSigmoid(Fast):
     """τ = Σ_k f_k (1 - 2/(exp(2 w_k v) + 1)) + b v = Σ_k f_k tanh(w_k v) + b v.
 
     Kostić et al. 2004, eq. (10); the two forms are equal, and tanh never overflows. For given w it is linear in f and

@@ -35,8 +35,7 @@ class TimeDelay(Effect):
     experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
     size = "delay"
     slight = 1e-4  # [s] a control program under Linux stamps its samples no better
-    from_own_joint = True
-    misread = True
+    acts_on = "encoder"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         dq, ddq = self.own(motion.dq), self.own(motion.ddq)

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueCrosstalk"]
@@ -31,7 +31,7 @@ class TorqueCrosstalk(Effect):
     remedy = "Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission."
     experiment = "Load one joint while the others carry nothing, each in turn."
     size = "coefficient"
-    in_drive = True
+    acts_on = "drive"
     slight = 0.002  # amplifiers that are in order lead over as much; between a turn and a slide it is one per metre
 
     def __post_init__(self) -> None:
@@ -44,7 +44,7 @@ class TorqueCrosstalk(Effect):
         return super().everywhere(revolute) if len(revolute) > 1 else ()
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, self.predicted(motion, arm)[:, int(self.from_joint) - 1])
+        return self.on_own_row(arm, predicted(arm, motion)[:, int(self.from_joint) - 1])
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         for other in range(1, arm.n_joints + 1):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueGain"]
@@ -30,11 +30,11 @@ class TorqueGain(Effect):
     remedy = "Where it fell, look at the motor's magnets and the amplifier; correct the torque constant."
     experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
     size = "gain_error"
-    in_drive = True
+    acts_on = "drive"
     slight = 0.0075  # a current sensor that is exact to a hundredth of its range may be off by so much
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, self.own(self.predicted(motion, arm)))
+        return self.on_own_row(arm, self.own(predicted(arm, motion)))
 
     def amplitudes(self, values: Values) -> Array:
         return np.array([1.0 / (1.0 + values["gain_error"]) - 1.0])

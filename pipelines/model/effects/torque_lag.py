@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import held_mean, lagging, rate_of_change
 
@@ -27,12 +27,10 @@ class TorqueLag(Effect):
     remedy = "Log the torque unfiltered, or filter position by the same low-pass; it is no fault of the arm."
     experiment = "Repeat an experiment at two speeds: a fit at one must hold at the other."
     size = "time_constant"
-    from_own_joint = True
-    last = True
-    passing = (0.01, 0.02, 0.04, 0.08, 0.16, 0.32)
+    acts_on = "record"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, -rate_of_change(self.own(self.predicted(motion, arm)), motion.t))
+        return self.on_own_row(arm, -rate_of_change(self.own(predicted(arm, motion)), motion.t))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque goes through the low-pass H, other effects included: y = H τ = τ - T H dτ/dt.

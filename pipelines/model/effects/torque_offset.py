@@ -6,14 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueOffset"]
 
 
 @dataclass(frozen=True)
-class TorqueOffset(Effect):
+class TorqueOffset(Fast):
     """τ = τ0."""
 
     name = "torque_offset"

@@ -8,12 +8,11 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueSaturation"]
 
-_MOST = 0.5  # of the time
 
 
 @dataclass(frozen=True)
@@ -39,10 +38,9 @@ class TorqueSaturation(Effect):
     remedy = "Correct the limit in the controller's settings, or ask for less acceleration; look at supply and temperature limits."
     experiment = "Repeat the experiment slower, so that the torque stays below the limit."
     size = "limit"
-    in_drive = True
+    acts_on = "drive"
     reads_torque = True
     fixed_amplitudes = (1.0,)
-    grows_with = "limit"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self._excess(motion, self.own(self._asked(motion, arm)), self.limit))
@@ -77,7 +75,7 @@ class TorqueSaturation(Effect):
         return Hooks(actuator=applied, drive=plain)
 
     def _asked(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.predicted(motion, arm) if motion.tau is None else motion.tau
+        return predicted(arm, motion) if motion.tau is None else motion.tau
 
     def _excess(self, motion: Motion, asked: Array, limit: float) -> Array:
         excess = _above(asked, limit)

@@ -9,7 +9,8 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TwoSigmoid"]
@@ -18,7 +19,7 @@ _GRID = 8  # sharpnesses in the grid: 28 ordered pairs
 
 
 @dataclass(frozen=True)
-class TwoSigmoid(Effect):
+class TwoSigmoid(Fast):
     """τ = f_1 tanh(w_1 v) + f_2 tanh(w_2 v) + b v.
 
     Kostić et al. 2004, eq. (10), with two terms of its three: a jump at zero speed, and a dip (f_2 < 0) or a slower rise

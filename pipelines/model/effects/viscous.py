@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Viscous"]
 
 
 @dataclass(frozen=True)
-class Viscous(Effect):
+class Viscous(Fast):
     """τ = b v."""
 
     name = "viscous"

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ViscousDrift"]
@@ -71,7 +71,7 @@ class ViscousDrift(Effect):
         """
         still = np.zeros((6, arm.n_joints))
         speed = self.on_own_row(arm, _FAST * np.array([1.0, 2.0, 3.0, -1.0, -2.0, -3.0]))[..., 0]
-        tau = self.own(self.predicted(Motion(np.arange(6.0), still, speed, still), arm))
+        tau = self.own(predicted(arm, Motion(np.arange(6.0), still, speed, still)))
         one, two, three = 0.5 * (tau[:3] - tau[3:])
         bent = 0.5 * (three - 2.0 * two + one)
         return float((two - one - 3.0 * bent) / _FAST)

@@ -19,7 +19,7 @@ from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.geometry import SerialChain
 from pipelines.signal import fourier
 
-__all__ = ["GRID", "Peak", "TorqueRange", "exceeded", "peaks", "torque_of", "worst"]
+__all__ = ["GRID", "Peak", "TorqueRange", "peaks", "torque_of", "worst"]
 
 GRID = 1e-4  # [s]
 TorqueRange = Callable[[Array], tuple[Array, Array]]  # lowest and highest τ (joints, samples) of a motion
@@ -89,8 +89,3 @@ def _peak(one: Limit, low: float, high: float) -> Peak:
 def worst(found: tuple[Peak, ...]) -> Peak | None:
     """What comes nearest to its limit."""
     return max(found, key=lambda peak: peak.share, default=None)
-
-
-def exceeded(found: tuple[Peak, ...]) -> tuple[Peak, ...]:
-    """What goes beyond its limit."""
-    return tuple(peak for peak in found if peak.share > 1.0)

@@ -22,12 +22,12 @@ from pipelines.errors import InputRejected
 from pipelines.fit.rational import Known
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.frf.grouping import Finding, Gaussian, GroupingConfig, Open, group_joint, seen_elsewhere
+from pipelines.model.frf.grouping import Finding, GroupingConfig, Open, group_joint, seen_elsewhere
 from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
 from pipelines.model.frf.responses import How, Measured, measured_responses
 from pipelines.model.frf.rigid import Expected, expected_rigid
 
-__all__ = ["Finding", "Findings", "Gaussian", "Known", "Open", "Seen", "findings_of", "frf_findings", "grouped"]
+__all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings", "grouped"]
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipelines.fit.rational import Known
-from pipelines.log.experiment import Array
 from pipelines.model.frf.compliant import Explained, explain
 from pipelines.model.frf.modes import Modes, Pair
 
@@ -59,15 +58,6 @@ class GroupingConfig:
     contact: float = 0.03
 
 
-@dataclass(frozen=True, eq=False)
-class Gaussian:
-    """Numbers that are known together: prior information of a later fit."""
-
-    names: tuple[str, ...]
-    mean: Array  # (numbers,) SI
-    covariance: Array  # (numbers, numbers)
-
-
 @dataclass(frozen=True)
 class Finding:
     """One thing that is sure."""
@@ -83,7 +73,6 @@ class Finding:
     faint: bool = False  # its pairs are so small that they may be a trace of what another joint does
     stands: tuple[Known, ...] = ()  # [Hz] of a base: the antiresonance in each posture
     frequencies: tuple[Known, ...] = ()  # [Hz] what `frequency` is in each posture
-    numbers: Gaussian | None = field(default=None, compare=False)  # `parameters` that follow from no others
 
 
 @dataclass(frozen=True)
@@ -251,12 +240,9 @@ def _as_base(one: Explained, pairs: list[list[Pair]], words: str, joint: int, co
     near = [min(own, key=lambda p: abs(p.resonance.frequency.value - frequency.value)) for own in pairs]
     each = tuple(p.resonance.frequency for p in near)
     measured, damping = _mean(each), _mean([p.resonance.damping for p in near])
-    together = np.diag([measured.std, damping.std, inertia.std]) ** 2
-    together[0, 2] = together[2, 0] = measured.std * inertia.std * one.covariance[0, 1] / max(one.std[0] * one.std[1], 1e-300)
     numbers = {"frequency": measured, "damping_ratio": damping, "inertia": inertia}
     return Finding("base", None, words, "base_resonance", measured, damping, numbers, (joint,),
-                   max(p.rise for p in near) < config.trace, tuple(p.antiresonance.frequency for p in near), each,
-                   Gaussian(tuple(numbers), np.array([v.value for v in numbers.values()]), together))
+                   max(p.rise for p in near) < config.trace, tuple(p.antiresonance.frequency for p in near), each)
 
 
 def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list[float], words: str) -> Finding:
@@ -272,18 +258,15 @@ def _as_joint(joint: int, one: Explained, pairs: list[list[Pair]], inertia: list
     slope = value * np.array([1.0 / max(abs(damping.value), 1e-9), 0.5, -0.5 * motor.value / mean_link])
     known = np.zeros((3, 3))
     known[0, 0], known[1:, 1:] = damping.std**2, one.covariance[-2:, -2:]  # of ζ, log k, log J_m
-    to = np.array([[0.0, stiffness.value, 0.0], slope, [0.0, 0.0, motor.value]])
-    together = to @ known @ to.T
+    std = float(np.sqrt(slope @ known @ slope))
     frequency = float(np.sqrt(stiffness.value / mean_link) / (2.0 * np.pi))
     each = tuple(p.antiresonance.frequency for p in near)
     scatter = float(np.std([v.value for v in each]))  # it moves with the posture: one number stands for all of them
     return Finding("joint", joint, words, "joint_elasticity",
                    Known(frequency, float(np.hypot(scatter, frequency * max(v.std / v.value for v in each)))),
-                   damping, {"stiffness": stiffness, "damping": Known(value, float(np.sqrt(together[1, 1]))),
+                   damping, {"stiffness": stiffness, "damping": Known(value, std),
                              "frequency": Known(frequency, float(np.hypot(scatter, 0.5 * frequency * one.std[-2]))),
-                             "motor_inertia": motor}, (joint,), frequencies=each,
-                   numbers=Gaussian(("stiffness", "damping", "motor_inertia"),
-                                    np.array([stiffness.value, value, motor.value]), together))
+                             "motor_inertia": motor}, (joint,), frequencies=each)
 
 
 def _mean(values: Sequence[Known]) -> Known:

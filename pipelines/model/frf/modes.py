@@ -99,12 +99,9 @@ class Modes:
     slack: float = _CONFIG.held_still  # relative deviation of a frequency that masses and springs are granted
 
 
-def relative_acceleration(measured: Measured, response: FrequencyResponse | None = None) -> FrequencyResponse:
-    """`response` over the double integrator, sampled and delayed as the loop was.
-
-    By default that of the plant, with the other joints held where they are not.
-    """
-    response = response or (measured.held.response if measured.held else measured.plant)
+def relative_acceleration(measured: Measured) -> FrequencyResponse:
+    """Return the plant's response over the double integrator, sampled and delayed as the loop was, the other joints held."""
+    response = measured.held.response if measured.held else measured.plant
     return response.times(np.asarray(1.0 / _rigid(measured, response.frequency)))
 
 

@@ -102,7 +102,6 @@ class Measured:
     indirect: FrequencyResponse | None  # None: the log does not describe the controller
     continuous: FrequencyResponse | None  # what (29) gives with k_p + k_d jω: shown, never used
     compliance: FrequencyResponse  # τ → q [rad/N m]
-    sensitivity: FrequencyResponse  # v → u
     with_reversal: FrequencyResponse | None  # u → q from the whole log, None where it is too short
     distortion: float | None  # what differs between realisations over what noise explains, median of variances; None of one
     detected: tuple[float | None, float | None]  # power of the position at even and odd lines that v leaves out, over the noise's
@@ -190,7 +189,7 @@ def _measured(turned: tuple[Turned, ...], how: How, inertia: dict[int, float]) -
     ratio = _torque_per_input(plant, compliance, band)
     return Measured(turned, plant, _held(several, first, band, ratio, inertia), ratio, aliased, band,
                     _direct([s.signals for s in stretches], turned, how), both[0], both[1],
-                    compliance, sensitivity, _with_reversal(turned, how), distortion, detected)
+                    compliance, _with_reversal(turned, how), distortion, detected)
 
 
 def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tuple[Array, float]:

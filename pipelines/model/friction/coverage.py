@@ -22,7 +22,6 @@ _CLASSES = 5  # of speed, a decade
 _ENOUGH = 5  # rows in a class
 _DECADES, _SPEEDS = 1.6, 7
 _STILL = 2e-3  # of the fastest speed
-_REST = 1.0  # [s] of standing still
 _VAGUE = 0.5  # of a value, its standard deviation: hardly known
 _WORDS = "drive the joint alone at 7 to 10 constant speeds over two decades, in both directions, with ramps from rest"
 

@@ -18,6 +18,7 @@ import numpy as np
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.fast import shape_slopes
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.rigid.body import Array, Motion
 
@@ -140,7 +141,7 @@ class Law:
             count = self._counts[k]
             own = [i for i, place in enumerate(self.places) if k in place.effects]
             if own:
-                part = effect.shape_slopes(motion, amplitudes[first:first + count])
+                part = shape_slopes(effect, motion, amplitudes[first:first + count])
                 if part is None:
                     return None
                 for i, column in zip(own, part.T, strict=True):

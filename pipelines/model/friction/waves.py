@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.base import ArmModel, Quantity
+from pipelines.model.effects.fast import Fast
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.rigid.body import Array, Motion
 
@@ -20,7 +21,7 @@ _FINEST = 1000.0  # order that a wave may have
 
 
 @dataclass(frozen=True)
-class Wave(Effect):
+class Wave(Fast):
     """a sin kq + b cos kq at one joint, beside the laws of an arm."""
 
     order: float = 1.0  # k [1/rev]

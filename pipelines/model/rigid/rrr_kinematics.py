@@ -5,7 +5,6 @@ corrected form with atan2, all four branches, and what to say where there is non
 
     geometry = rrr_geometry(robot)
     answer = inverse(geometry, tips)         every branch of every tip, with its status
-    q = continuous_branch(answer.q, start)   one of them, followed without jumps
 """
 
 from __future__ import annotations
@@ -20,8 +19,7 @@ import numpy.typing as npt
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, refuse_other_shapes
 
-__all__ = ["BRANCHES", "Geometry", "InverseKinematics", "Reach", "continuous_branch", "inverse", "orientation",
-           "rrr_geometry", "tip"]
+__all__ = ["BRANCHES", "Geometry", "InverseKinematics", "Reach", "inverse", "orientation", "rrr_geometry", "tip"]
 
 # (shoulder, elbow) of each branch. Shoulder +1 faces the tip, elbow -1 is then up; over the back (-1) elbow +1 is up.
 BRANCHES = ((1, -1), (1, 1), (-1, -1), (-1, 1))
@@ -163,29 +161,3 @@ def _reach(geometry: Geometry, rho: Array, V: Array) -> npt.NDArray[np.int8]:
 def _wrapped(q: Array) -> Array:
     """`q` within (-pi, pi], values already there untouched."""
     return np.asarray(q - 2 * math.pi * np.ceil((q - math.pi) / (2 * math.pi)))
-
-
-def continuous_branch(q: Array, start: Array) -> Array:
-    """The branch nearest to `start`, followed from sample to sample and unwrapped (joints may turn without end).
-
-    Args:
-        q: (branches, samples, 3) [rad] as `inverse` gives them, every sample reachable.
-        start: (3,) [rad] where the arm is before the first sample.
-
-    Returns:
-        (samples, 3) [rad].
-
-    Raises:
-        ValueError: a sample has no branch; look at `InverseKinematics.reachable` first.
-    """
-    if np.isnan(q).any():
-        first = int(np.flatnonzero(np.isnan(q).any(axis=(0, 2)))[0])
-        raise ValueError(f"sample {first} is unreachable, so no branch leads through it")
-    # nearest[k, b]: the branch of sample k + 1 that is nearest to branch b of sample k.
-    steps = _wrapped(q[None, :, 1:] - q[:, None, :-1])  # (from, to, samples - 1, 3)
-    nearest = np.argmin(np.linalg.norm(steps, axis=-1), axis=1).T
-    branch = [int(np.argmin(np.linalg.norm(_wrapped(q[:, 0] - start), axis=-1)))]
-    for row in nearest.tolist():
-        branch.append(row[branch[-1]])
-    path = q[branch, np.arange(q.shape[1])]
-    return np.asarray(np.unwrap(np.concatenate([start[None], path]), axis=0)[1:])

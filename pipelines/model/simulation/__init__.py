@@ -18,11 +18,11 @@ from pipelines.model.simulation.accuracy import Step, choose_step
 from pipelines.model.simulation.experiment import Experiment
 from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.plant import Plant
-from pipelines.model.simulation.replicas import Noise, Simulated, run, run_together, torque_noise
+from pipelines.model.simulation.replicas import Noise, Simulated, run, run_together
 from pipelines.model.simulation.windows import Windows, simulate_windows
 
 __all__ = ["Experiment", "Noise", "Plant", "Simulated", "Step", "Windows", "choose_step", "choose_steps", "run",
-           "runs_alone", "simulate", "simulate_together", "simulate_windows", "torque_noise"]
+           "runs_alone", "simulate", "simulate_together", "simulate_windows"]
 
 
 def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None, seeds: Iterable[int] = (0,), p: Array | None = None,

@@ -22,11 +22,6 @@ class ManyCurves:
     heights: Array  # [N m] (sigmoids, joints); joints with fewer sigmoids have zeros
     sharpnesses: Array  # [s/rad] (sigmoids, joints)
 
-    @property
-    def slope(self) -> Array:
-        """Steepest slope of each joint's curve, at most [N m s/rad] (joints,): of every term, at rest."""
-        return np.asarray(np.abs(self.viscous) + np.abs(self.heights * self.sharpnesses).sum(axis=0))
-
     def prepared(self, replicas: int) -> PreparedCurves:
         return PreparedCurves(self, replicas)
 

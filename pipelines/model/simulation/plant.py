@@ -18,6 +18,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Hooks, OwnLoad, OwnMemory, PlainDrive
+from pipelines.model.effects.fast import own_load, own_memory, speed_curve
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 from pipelines.model.rigid.rrr import RRR
@@ -55,7 +56,7 @@ class Plant:
         curves, hooks, records, added = [], [], [], np.zeros((arm.n_joints, arm.n_joints))
         laws = [(law, True) for law in arm.friction]
         for acting, friction in (*laws, *((effect, False) for effect in arm.effects)):
-            curve = acting.effect.speed_curve(acting.values)
+            curve = speed_curve(acting.effect, acting.values)
             if curve is not None and acting.effect.joint is not None:
                 curves.append((acting.effect.joint - 1, curve))
                 continue
@@ -65,7 +66,7 @@ class Plant:
             records += [own.record] if own.record else []
             if any((own.load, own.actuator, own.sensor, own.settled, own.states)):
                 values = {name: float(value) for name, value in acting.values.items()}  # which are written as numbers of Python
-                load = None if own.actuator or own.states else acting.effect.own_load(values)
+                load = None if own.actuator or own.states else own_load(acting.effect, values)
                 alone = None if load is None or acting.effect.joint is None else (acting.effect.joint - 1, load)
                 hooks.append(replace(own, alone=alone, remembering=_remembering(acting, own)))
         parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
@@ -131,7 +132,7 @@ def _remembering(acting: Acting, own: Hooks) -> tuple[int, OwnMemory] | None:
     """What `acting` remembers in plain numbers, if its hooks are a load and the rate of one state."""
     if own.states != 1 or any((own.actuator, own.sensor, own.settled, own.start, own.update)) or acting.effect.joint is None:
         return None
-    memory = acting.effect.own_memory(acting.values)
+    memory = own_memory(acting.effect, acting.values)
     return None if memory is None else (acting.effect.joint - 1, memory)
 
 

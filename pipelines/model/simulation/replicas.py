@@ -24,7 +24,7 @@ from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.one_rrr import OneRRR
 from pipelines.model.simulation.plant import MovingPlant, Plant
 
-__all__ = ["Noise", "Simulated", "run", "run_together", "torque_noise"]
+__all__ = ["Noise", "Simulated", "run", "run_together"]
 
 Integrator = RungeKutta | OneRRR | OneHooked
 
@@ -179,15 +179,6 @@ def _integrator(moving: MovingPlant, sample_time: float, steps: int, exact: bool
 
 def _seen(moving: MovingPlant, q: Array, states: Array) -> Array:
     return moving.measured(q, states) if moving.plant.hooks else q
-
-
-def torque_noise(noise: Noise, seeds: Iterable[int], samples: int) -> Array:
-    """(replicas, samples, joints) [N m] what the drives give beside their commands, in the replicas of these seeds."""
-    every, n = tuple(seeds), len(noise.torque)
-    pieces = _pieces(noise, every, samples)
-    if pieces is None:
-        return np.zeros((len(every), samples, n))
-    return np.ascontiguousarray(np.moveaxis(np.concatenate([piece[:, :n] for piece in pieces]), 2, 0))
 
 
 def _draws(noise: Noise, seeds: tuple[int, ...], samples: int) -> Iterator[tuple[Array | float, Array | float]]:

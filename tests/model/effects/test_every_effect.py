@@ -15,6 +15,7 @@ from pipelines.errors import UsageError
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects, effect_names, find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.fast import own_columns
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 
@@ -71,7 +72,7 @@ def without_amplitude(effect: Effect, values: dict[str, float]) -> dict[str, flo
 
 def test_every_file_is_an_effect() -> None:
     """One file, one effect, of the same name; nothing is registered by hand."""
-    files = {path.stem for path in FOLDER.glob("*.py")} - {"__init__", "base", "placed", "terms"}
+    files = {path.stem for path in FOLDER.glob("*.py")} - {"__init__", "base", "fast", "placed", "terms"}
     assert set(effect_names()) == files
     assert [kind.name for kind in all_effects()] == sorted(files)
     assert {"coulomb", "viscous", "three_sigmoid"} <= files
@@ -188,14 +189,14 @@ def test_a_simulation_counts_time_from_the_start_of_the_log_as_well(cause: str, 
     np.testing.assert_allclose(hooks.load(part, states), expected, rtol=1e-6, atol=1e-6 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("kind", [kind for kind in all_effects() if kind.from_motion], ids=lambda kind: kind.name)
+@pytest.mark.parametrize("kind", [one for one in all_effects() if getattr(one, "from_motion", False)], ids=lambda kind: kind.name)
 def test_columns_from_the_motion_alone(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """They are those of any arm, act on their own joint only, and come out the same for many shapes at once."""
     other = Arm("another", arm.body, tuple(replace(p, value=1.7 * p.value + 0.1) for p in arm.base))
     shapes = list(placed(kind).shapes(motion, arm))
     apart = np.array([shape.columns(motion, other) for shape in shapes])
     assert not np.delete(apart, 1, axis=2).any()
-    together = shapes[0].own_columns(shapes, motion, arm)
+    together = own_columns(shapes, motion, arm)
     np.testing.assert_allclose(together.transpose(0, 2, 1), apart[:, :, 1], rtol=1e-9, atol=1e-9 * np.abs(apart).max())
 
 

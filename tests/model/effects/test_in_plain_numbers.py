@@ -8,6 +8,7 @@ import pytest
 from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, Formula
+from pipelines.model.effects.fast import Fast, own_load, own_memory
 from pipelines.model.effects.terms import WRITTEN, summed
 from pipelines.model.rigid.body import Motion
 from tests.model.effects.test_every_effect import arm, drawn, every_effect, motion, placed
@@ -19,7 +20,7 @@ __all__ = ["arm", "motion"]
 def test_a_load_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """Where it follows from angle and speed of its own joint alone, it is the same as the torque by arrays."""
     values = drawn(placed(kind), 7)
-    load = placed(kind).own_load(values)
+    load = own_load(placed(kind), values)
     if load is None:
         return
     some = slice(0, None, 50)
@@ -33,7 +34,7 @@ def test_a_load_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) -
 def test_a_memory_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """Where its load remembers one number alone, that moves, and loads, as by arrays."""
     values = drawn(placed(kind), 8)
-    memory, hooks = placed(kind).own_memory(values), placed(kind).simulate(arm, values)
+    memory, hooks = own_memory(placed(kind), values), placed(kind).simulate(arm, values)
     if memory is None:
         return
     assert hooks.states == 1
@@ -78,7 +79,7 @@ def test_torques_of_a_moment_mixed(kind: type[Effect], arm: Arm, motion: Motion)
 @every_effect
 def test_what_is_written_out_is_what_is_called(kind: type[Effect]) -> None:
     """With any sign of its numbers, and within a product."""
-    load = placed(kind).own_load(drawn(placed(kind), 11))
+    load = own_load(placed(kind), drawn(placed(kind), 11))
     if not isinstance(load, Formula):
         return
     for angle, speed in ((0.3, -0.7), (-1.1, 0.02), (2.0, 0.0)):
@@ -90,8 +91,9 @@ def test_some_effects_have_them(arm: Arm) -> None:
     hooks = {kind.name: placed(kind).simulate(arm, drawn(placed(kind), 9)) for kind in all_effects()}
     assert {name for name, one in hooks.items() if one.drive} == {
         name for name, one in hooks.items() if one.actuator and not one.states} != set()
-    assert any(kind.own_memory is not Effect.own_memory for kind in all_effects())
-    assert any(kind.own_load is not Effect.own_load for kind in all_effects())
+    fast = [kind for kind in all_effects() if issubclass(kind, Fast)]
+    assert any(kind.own_memory is not Fast.own_memory for kind in fast)
+    assert any(kind.own_load is not Fast.own_load for kind in fast)
     assert any(kind.mixing is not Effect.mixing for kind in all_effects())
 
 

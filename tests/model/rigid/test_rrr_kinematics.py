@@ -13,7 +13,6 @@ from pipelines.model.rigid.rrr_kinematics import (
     BRANCHES,
     Geometry,
     Reach,
-    continuous_branch,
     inverse,
     rrr_geometry,
     tip,
@@ -99,26 +98,6 @@ def test_just_outside_is_rounding_and_farther_is_not(geometry: Geometry) -> None
 def test_every_status_has_words() -> None:
     """No status without a sentence."""
     assert all(status.words for status in Reach)
-
-
-@pytest.mark.parametrize("branch", range(4))
-def test_a_path_is_followed_without_jumps(geometry: Geometry, branch: int) -> None:
-    """A tip going round the first axis three times: one branch throughout, and the first joint turns on."""
-    turn = np.linspace(0, 6 * np.pi, 5001)
-    x = np.stack([0.5 * np.cos(turn), 0.5 * np.sin(turn), 0.6 + 0.1 * np.sin(3 * turn)], axis=-1)
-    answer = inverse(geometry, x)
-    q = continuous_branch(answer.q, answer.q[branch, 0] + 2 * np.pi)
-    assert np.abs(np.diff(q, axis=0)).max() < 0.05
-    assert np.abs(tip(geometry, q) - x).max() <= 1e-12
-    assert q[-1, 0] - q[0, 0] == pytest.approx(6 * np.pi)
-    assert np.abs(q[0] - answer.q[branch, 0] - 2 * np.pi).max() < 1e-9
-
-
-def test_a_path_through_unreachable_points_is_refused(geometry: Geometry) -> None:
-    """No branch leads through the cylinder about the first axis."""
-    x = np.stack([np.linspace(-0.5, 0.5, 11), np.zeros(11), np.full(11, 0.6)], axis=-1)
-    with pytest.raises(ValueError, match="unreachable"):
-        continuous_branch(inverse(geometry, x).q, np.zeros(3))
 
 
 def angle(q: Array) -> Array:

@@ -1,7 +1,6 @@
 """The logs of a diagnosis, and what is made of them before anything is suspected.
 
     prepared = prepare(logs, settings, arm)
-    prepared = narrowed(prepared, 20.0, speeds)  the same through a lower low-pass, without slow samples
     prepared.data, prepared.judge, prepared.columns
 """
 
@@ -36,9 +35,8 @@ from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.motion import Reconstruction
 
-__all__ = ["GAP_HZ", "Logs", "Prepared", "narrowed", "prepare"]
+__all__ = ["Logs", "Prepared", "prepare"]
 
-GAP_HZ = 10.0  # below it a gap's torque is that of the gap; above, that of the tooth on which the link rings
 Joints = npt.NDArray[np.bool_]
 
 _HELD = 0.02  # of its largest speed in all logs, below which a joint is held throughout a log
@@ -79,7 +77,6 @@ class Prepared:
     recipe: Recipe
     motions: Motions  # of the logs that are fitted
     judging: Motions
-    referring: Motions
     data: Data
     judge: Data | None  # None: blocks of the fitted ones judge
     reference: Data | None
@@ -112,16 +109,6 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     return prepared
 
 
-def narrowed(prepared: Prepared, cutoff_hz: float, min_speed: Sequence[float]) -> Prepared:
-    """The same logs through a low-pass at `cutoff_hz` at most, without samples of a joint slower than its `min_speed` [rad/s]."""
-    recipe = prepared.recipe
-    lower = cutoff_hz if recipe.cutoff_hz is None else min(cutoff_hz, recipe.cutoff_hz)
-    speeds = tuple(np.maximum(np.broadcast_to(np.array(recipe.min_speed), len(min_speed)), min_speed).tolist())
-    laid = _laid(prepared.logs, prepared.columns, replace(recipe, cutoff_hz=lower, min_speed=speeds), prepared.motions,
-                 prepared.judging, prepared.referring)
-    return replace(laid, fewer=prepared.fewer)
-
-
 def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging: Motions, referring: Motions) -> Prepared:
     fastest = [np.abs(found.motion.dq[found.good.kept]).max(axis=0, initial=0.0) for _, found in (*fitted, *judging, *referring)]
     held = list(np.array(fastest) < _HELD * np.max(fastest, axis=0))
@@ -139,7 +126,7 @@ def _laid(logs: Logs, columns: Columns, recipe: Recipe, fitted: Motions, judging
         for (log, found), one in zip(part, laid.logs if laid else (), strict=True):
             if not one.y.size:
                 raise none_left(log, found, few=True)
-    return Prepared(logs, columns, recipe, fitted, judging, referring, data, judge, reference)
+    return Prepared(logs, columns, recipe, fitted, judging, data, judge, reference)
 
 
 def _without_rests(parts: Sequence[Motions], columns: Columns, recipe: Recipe, held: Sequence[Joints], at_rest: Sequence[Joints],

@@ -22,6 +22,7 @@ from pipelines.model.diagnosis.fitted.nominal import Fit, effect_rows, law_rows,
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.mixed import mixable, mixed
 from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.fast import from_motion
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 
@@ -88,11 +89,6 @@ class Exact:
     def without(self, place: int) -> Exact:
         return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
 
-    def beside(self, nominal: Exact) -> Exact:
-        """Its effects beside another nominal model."""
-        own = tuple(_following(one, nominal.columns.laws) for one in self.effects)
-        return replace(nominal, effects=own, standing=self.standing)
-
     @cached_property
     def nominal(self) -> Arm:
         """One and the same for models that differ in their effects: what it has worked out serves all of them."""
@@ -143,7 +139,7 @@ class Exact:
     @property
     def core(self) -> int:
         """How many of the effects the torque has to be worked out with as a whole: all up to the last that does not just add."""
-        if any(one.effect.last or one.effect.in_drive or one.effect.misread for one in self.effects):
+        if any(one.effect.acts_on != "load" for one in self.effects):
             return len(self.effects)
         return max((k + 1 for k, one in enumerate(self.effects) if not one.effect.adds), default=0)
 
@@ -182,7 +178,7 @@ class Exact:
         return np.asarray(rows - sum(stands))
 
     def _nominal_rows(self, data: Data) -> Array:
-        if not all(law.from_motion for law in self.columns.laws):
+        if not all(from_motion(law) for law in self.columns.laws):
             return data.lay(self.nominal.torque)
         kept = len(self.columns.kept)
         torque, first = self.beta[:kept] @ rigid_rows(data, self.columns), kept

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 
-__all__ = ["covariance", "deviations", "left_out", "solved", "superfluous"]
+__all__ = ["covariance", "left_out", "solved", "superfluous"]
 
 _LAGS = 20  # rows next to each other that share the noise of the low-pass
 _ROUNDING = 1e-11  # of the largest eigenvalue
@@ -69,11 +69,6 @@ def covariance(table: Array, residual: Array) -> Array:
     sums = upto[:, _LAGS + 1:] - upto[:, :-_LAGS - 1]
     meat = sums @ sums.T / (_LAGS + 1)
     return np.asarray(bread @ meat @ bread / size / size[:, None])
-
-
-def deviations(table: Array, residual: Array) -> Array:
-    """Standard deviations (k,) of the coefficients of `table` (k, rows), weighted: those of `covariance`."""
-    return np.asarray(np.sqrt(np.maximum(np.diag(covariance(table, residual)), 0.0)))
 
 
 def left_out(table: Array, residual: Array, blocks: npt.NDArray[np.intp]) -> Array:

@@ -19,11 +19,12 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.effects.base import ArmModel, Effect, Quantity
+from pipelines.model.effects.fast import from_motion, several_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
 
-__all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_shapes", "law_slopes", "nominal_arm", "orthonormal",
-           "polish", "rigid_rows", "rows_of", "several_rows"]
+__all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_slopes", "nominal_arm", "rigid_rows", "rows_of",
+           "several_rows"]
 
 _RANK = 1e-12  # of the largest: smaller eigenvalues of the Gram matrix of unit columns are rounding
 _ROUNDS = 6  # of weights
@@ -40,12 +41,6 @@ class Fit:
     y: Array  # (rows,) torque
     weight: Array  # (joints,) [1/(N m)]
     beta: Array  # (k,)
-    torque: Array | None = None  # (rows,) [N m] of the model, where `y` is only what it leaves
-
-    @property
-    def modelled(self) -> Array:
-        """(rows,) [N m] torque of the fitted model."""
-        return self.y - self.left if self.torque is None else self.torque
 
     @cached_property
     def weights(self) -> Array:
@@ -55,7 +50,7 @@ class Fit:
     @cached_property
     def basis(self) -> Array:
         """(rank, rows) orthonormal rows that span the weighted columns."""
-        return orthonormal(self.table * self.weights)
+        return _orthonormal(self.table * self.weights)
 
     @cached_property
     def residual(self) -> Array:
@@ -79,7 +74,7 @@ class Fit:
         return np.asarray(weighted - (weighted @ self.basis.T) @ self.basis)
 
 
-def orthonormal(table: Array) -> Array:
+def _orthonormal(table: Array) -> Array:
     """(rank, n) orthonormal rows that span those of `table` (k, n): by the Gram matrix, twice."""
     norm = np.linalg.norm(table, axis=1)
     basis: Array = table[norm > 0.0] / norm[norm > 0.0, None]
@@ -92,9 +87,9 @@ def orthonormal(table: Array) -> Array:
     return np.asarray(basis)
 
 
-def fit_columns(data: Data, table: Array, y: Array | None = None, weight: Array | None = None) -> Fit:
-    """Least squares with joints weighted by their own residual, found in turns; or with the weights given."""
-    target = data.y if y is None else y
+def fit_columns(data: Data, table: Array) -> Fit:
+    """Least squares with joints weighted by their own residual, found in turns."""
+    target = data.y
     scale = np.linalg.norm(table, axis=1)
     scale = np.where(scale > 0.0, scale, 1.0)
     unit = table / scale[:, None]
@@ -102,9 +97,9 @@ def fit_columns(data: Data, table: Array, y: Array | None = None, weight: Array 
     moments = [unit[:, data.joint == j] @ target[data.joint == j] for j in range(data.n_joints)]
     powers = np.array([np.sum(target[data.joint == j] ** 2) for j in range(data.n_joints)])
     counts = np.maximum(np.bincount(data.joint[data.counts], minlength=data.n_joints), 1)
-    w = np.ones(data.n_joints) if weight is None else weight
+    w = np.ones(data.n_joints)
     beta = _solved(grams, moments, w)
-    for _ in range(_ROUNDS if weight is None else 0):
+    for _ in range(_ROUNDS):
         rss = np.array([p - 2.0 * beta @ m + beta @ g @ beta for p, m, g in zip(powers, moments, grams, strict=True)])
         sigma = np.sqrt(np.maximum(rss, 1e-12 * powers) / counts)
         before, w = w, 1.0 / np.maximum(sigma, 1e-12 * (sigma.max() or 1.0))
@@ -142,16 +137,16 @@ def law_rows(data: Data, law: Effect, columns: Columns) -> Array:
 
 def effect_rows(data: Data, effect: Effect, arm: ArmModel) -> Array:
     """(k, rows) columns of an effect in one shape."""
-    if effect.from_motion:
+    if from_motion(effect):
         return data.lay_kept(effect, lambda motion: effect.columns(motion, arm))
     return data.lay(lambda motion: effect.columns(motion, arm))
 
 
 def several_rows(data: Data, shapes: Sequence[Effect], arm: ArmModel) -> list[Array]:
     """The same of several shapes of an effect, each (k, rows)."""
-    if not shapes or shapes[0].from_motion:
+    if not shapes or from_motion(shapes[0]):
         return [effect_rows(data, shape, arm) for shape in shapes]
-    laid = data.lay(lambda motion: np.concatenate(shapes[0].several(shapes, motion, arm), axis=2))
+    laid = data.lay(lambda motion: np.concatenate(several_columns(shapes, motion, arm), axis=2))
     return np.split(laid, len(shapes))
 
 
@@ -170,16 +165,16 @@ def fit_nominal(data: Data, columns: Columns) -> tuple[Columns, Fit]:
             rest = np.concatenate([rigid, *(t for k, t in enumerate(tables) if k != place)])
             laws[place], tables[place] = _best_of_grid(data, law, columns, replace(fit, table=rest))
     fit = fit_columns(data, np.concatenate([rigid, *tables]))
-    return polish(data, replace(columns, laws=tuple(laws)), rigid, fit)
+    return _polished(data, replace(columns, laws=tuple(laws)), rigid, fit)
 
 
-def polish(data: Data, columns: Columns, rigid: Array, fit: Fit) -> tuple[Columns, Fit]:
+def _polished(data: Data, columns: Columns, rigid: Array, fit: Fit) -> tuple[Columns, Fit]:
     """Gauss-Newton over the shapes of the laws, Golub & Pereyra 2003: each step solves for shapes and amplitudes together."""
     for _ in range(_STEPS):
         slopes, names = law_slopes(data, columns, fit.beta)
         tables = [law_rows(data, law, columns) for law in columns.laws]
         base = np.concatenate([rigid, *tables])
-        fit = fit_columns(data, np.concatenate([base, *slopes]), fit.y) if slopes else fit_columns(data, base, fit.y)
+        fit = fit_columns(data, np.concatenate([base, *slopes]))
         shift = np.clip(fit.beta[len(base):], -0.3, 0.3)
         if not len(shift) or np.abs(shift).max() < _FINE:
             break
@@ -202,8 +197,8 @@ def _moved(law: Effect, name: str, factor: float) -> Effect:
 
 
 def law_slopes(data: Data, columns: Columns, all_beta: Array) -> tuple[list[Array], list[tuple[int, str]]]:
-    """(1, rows) of each shape: the slope of the torque by its logarithm; and which shapes they are, as `law_shapes` has them."""
-    slopes, shapes = [], law_shapes(columns, all_beta)
+    """(1, rows) of each shape: the slope of the torque by its logarithm; and which shapes they are."""
+    slopes, shapes = [], _shapes_of(columns, all_beta)
     for place, name in shapes:
         law, beta = columns.laws[place], _of_laws(columns, all_beta)[place]
         up, down = (law_rows(data, _moved(law, name, factor), columns) for factor in (1.0 + _STEP, 1.0 - _STEP))
@@ -211,7 +206,7 @@ def law_slopes(data: Data, columns: Columns, all_beta: Array) -> tuple[list[Arra
     return slopes, shapes
 
 
-def law_shapes(columns: Columns, all_beta: Array) -> list[tuple[int, str]]:
+def _shapes_of(columns: Columns, all_beta: Array) -> list[tuple[int, str]]:
     """Places of the laws and names of their free shapes: of a law that takes no torque none, for it has no shape."""
     return [(place, quantity.name) for place, beta in enumerate(_of_laws(columns, all_beta)) if beta.any()
             for quantity in _free(columns.laws[place])]
@@ -236,7 +231,7 @@ def _best_of_grid(data: Data, law: Effect, columns: Columns, rest: Fit) -> tuple
     return max(laid, key=lambda one: gain(one[1]))
 
 
-def nominal_arm(columns: Columns, beta: Array, name: str = "nominal") -> Arm:
+def nominal_arm(columns: Columns, beta: Array) -> Arm:
     """The arm that the fit describes; `beta` of rigid columns and laws, what follows is of no concern here."""
     place = {i: k for k, i in enumerate(columns.kept)}
     base = tuple(Parameter(p.name, float(beta[place[i]]) if i in place else 0.0, None, p.unit,
@@ -250,4 +245,4 @@ def nominal_arm(columns: Columns, beta: Array, name: str = "nominal") -> Arm:
         acting = Acting.of(law, law.values(beta[first:first + count]), revolute=law.joint is None or turning[law.joint - 1])
         first += count
         (friction if law.friction else effects).append(acting)
-    return Arm(name, columns.body, base, tuple(friction), tuple(effects))
+    return Arm("nominal", columns.body, base, tuple(friction), tuple(effects))

@@ -1,63 +1,29 @@
-"""What the record makes of torque: as it comes out of an effect that all torque of its joint passes through.
+"""Pass torque through what changes its record, a low-pass say.
 
-    recorded(arm, table, motion)                  columns over a motion, by everything in `arm` that changes the record
-    recorded_of(changing(arm, joint), x, motion)  the same of torque of one joint
-    passed_rows(data, effect, amplitude, x)       rows, which are far apart: enough to see what is worth an exact fit
+    recorded(arm, table, motion)
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from pipelines.log.experiment import Array
-from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.effects.base import Effect
+from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["changing", "passed_rows", "recorded", "recorded_of"]
+__all__ = ["recorded"]
 
 
-def changing(arm: Arm, joint: int) -> tuple[Acting, ...]:
-    """What in `arm` all recorded torque of `joint`, from 1, passes through, in that order."""
-    return tuple(acting for acting in arm.effects if acting.effect.passing and (acting.effect.joint or 1) == joint)
-
-
-def recorded_of(through: Sequence[Acting], x: Array, motion: Motion) -> Array:
-    """Torque (…, samples) of one joint as it comes out of what it passes `through`.
+def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
+    """Return torque (samples, joints), or columns (samples, joints, k), as `arm` records them.
 
     Where the log tells the torque at its start, that is no column's: each begins with nothing.
     """
     start = None if motion.logged is None else 0.0
-    for acting in through:
-        amplitude = float(acting.effect.amplitudes(acting.values)[0])
-        x = acting.effect.passed(amplitude, x, motion.t, start, motion.since)
-    return x
-
-
-def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
-    """Torque (samples, joints) or columns (samples, joints, k) as they come out of all in `arm` that changes the record."""
-    for joint in range(1, arm.n_joints + 1):
-        through = changing(arm, joint)
-        if through:
-            own, table = np.ascontiguousarray(table[:, joint - 1].T), table.copy()
-            table[:, joint - 1] = recorded_of(through, own, motion).T
+    for acting in arm.effects:
+        if acting.effect.acts_on != "record":
+            continue
+        joint, amplitude = (acting.effect.joint or 1) - 1, float(acting.effect.amplitudes(acting.values)[0])
+        own, table = np.ascontiguousarray(table[:, joint].T), table.copy()
+        table[:, joint] = acting.effect.passed(amplitude, own, motion.t, start, motion.since).T
     return table
-
-
-def passed_rows(data: Data, effect: Effect, amplitude: float, x: Array, whole: bool = False, own: bool = False) -> Array:
-    """(…, rows) with the rows of the effect's joint as they come out of it; `whole` torque begins where the log does.
-
-    Args:
-        own: `x` has the rows of that joint alone.
-    """
-    out, first, joint = x.copy(), 0, (effect.joint or 1) - 1
-    for one in data.logs:
-        before, count = (0, 1) if own else (joint, one.n_joints)
-        here = slice(first + before * one.rows, first + (before + 1) * one.rows)
-        start = None if one.motion.logged is None else float(one.y[joint, 0]) if whole else 0.0
-        out[..., here] = effect.passed(amplitude, x[..., here], one.t, start)
-        first += count * one.rows
-    return out

@@ -1,7 +1,7 @@
 """Fit an exact model: every number at once.
 
     done = refine(model, data, weight)                    Gauss-Newton over everything
-    done.residual, done.fit.basis                         what is left, and what the model can imitate
+    done.residual                                         what is left
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.fitted.dissipation import dissipating, driving
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.linear import covariance, left_out, solved, superfluous
-from pipelines.model.diagnosis.fitted.nominal import Fit, rigid_rows
+from pipelines.model.diagnosis.fitted.nominal import rigid_rows
 from pipelines.model.diagnosis.fitted.slopes import Which, slopes_of
 from pipelines.model.diagnosis.rows.data import Data
 
@@ -50,11 +50,6 @@ class Refined:
     def residual(self) -> Array:
         """(rows,) weighted."""
         return np.asarray(self.left * self.weights)
-
-    @cached_property
-    def fit(self) -> Fit:
-        """As a linear fit around the solution: what is orthogonal to it, the model cannot imitate by moving a little."""
-        return Fit(self.data, self.slopes, self.left, self.weight, np.zeros(len(self.slopes)), self.data.y - self.left)
 
     @cached_property
     def rss(self) -> float:
@@ -100,15 +95,14 @@ class Refined:
         return whole
 
 
-def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS, target: Array | None = None) -> Refined:
+def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS) -> Refined:
     """Gauss-Newton with halved steps until the squared weighted residual no longer falls."""
     with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
-        return _refined(model, data, weight, steps, data.y if target is None else target)
+        return _refined(model, data, weight, steps)
 
 
-def _refined(model: Exact, data: Data, weight: Array, steps: int, y: Array) -> Refined:
-    weights = weight[data.joint]
-
+def _refined(model: Exact, data: Data, weight: Array, steps: int) -> Refined:
+    y, weights = data.y, weight[data.joint]
     rigid = rigid_rows(data, model.columns)
     model = replace(model, beta=dissipating(model.beta, model.columns.laws))
     laid = model.laid(data)

@@ -33,14 +33,14 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
     Args:
         laid: as `model.laid(data)` makes it, where it is known.
     """
-    if any(one.effect.passing for one in model.effects):
+    if any(one.effect.acts_on == "record" for one in model.effects):
         return _slopes_through(model, data)
     laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
     bent, which = law_slopes(data, model.columns, model.beta)
     names = [(0, place, name) for place, name in which]
     more, core = list(bent), model.core
     here = model.core_torque(data, core) if core else np.zeros(0)
-    whole = any(one.effect.misread or one.effect.in_drive for one in model.effects)
+    whole = any(one.effect.acts_on in ("encoder", "drive") for one in model.effects)
     if whole:  # friction is felt where the joint truly is, and comes late
         more = [_of_law(model, data, here, one) for one in names]
     columns = model.laid(data) if laid is None else laid
@@ -95,7 +95,7 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
             if one.log in (None, log) else np.zeros_like(motion.q))
 
     here = model.torque(data)
-    as_read = not any(one.effect.misread or one.effect.in_drive for one in model.effects)
+    as_read = not any(one.effect.acts_on in ("encoder", "drive") for one in model.effects)
     names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
     more = [_of_law(model, data, here, one) for one in names]
     for place, one in enumerate(model.effects):

@@ -2,7 +2,6 @@
 
     told = compliance(logs.frf, arm)
     told.named             causes that the responses name, with their numbers
-    told.rigid             whether they show a rigid arm: what gives way then does so at reversals only, and is a gap
     untold(told)           causes that they leave open, with the reason
     gaps_untold(told)      causes that only responses without a spring let be named
 """
@@ -22,7 +21,7 @@ from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
 from pipelines.model.frf.modes import relative_acceleration
 
-__all__ = ["Compared", "Compliance", "compared", "compliance", "gaps_untold", "untold"]
+__all__ = ["Compliance", "compliance", "gaps_untold", "new_causes", "untold"]
 
 _MOVED = 3.0  # standard deviations, by which a base's frequency or a joint's stiffness is another one
 _SAME = 0.03  # of it, within which two sessions show the same one: temperature, and how the arm stood
@@ -35,24 +34,14 @@ class Compliance:
     """What the responses say."""
 
     named: tuple[Acting, ...]
-    rigid: bool
     open: str  # what they leave open, in words; empty where they do not
     seen: tuple[frf.Seen, ...] = field(default=(), repr=False)
     seen_at: Mapping[str, tuple[int, ...]] = field(default_factory=dict)  # place of a cause -> joints that show it
-    priors: Mapping[str, frf.Gaussian] = field(default_factory=dict, repr=False)  # place of a cause -> its numbers and covariance
 
     def answers(self, acting: Acting) -> tuple[Answer, ...]:
         """The responses that name a cause: of its joint, of the first one that shows it where it is the base."""
         joint = min(self.seen_at.get(acting.place, (0,)))
         return tuple(_answer(one) for one in self.seen if one.measured.joint == joint)
-
-
-@dataclass(frozen=True)
-class Compared:
-    """What responses name now, beside what those of the reference logs named."""
-
-    new: tuple[Acting, ...]  # or moved
-    standing: tuple[Acting, ...]
 
 
 def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance | None:
@@ -62,22 +51,20 @@ def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] =
     try:
         found = frf.frf_findings(logs, arm)
     except InputRejected as refused:
-        return Compliance((), False, f"the frequency responses are of no use: {refused.message}")
+        return Compliance((), f"the frequency responses are of no use: {refused.message}")
     giving = [one for one in found.classification
               if one.cause is not None and find_effect(one.cause).evidence == "frequency responses"]
     wanted = [one for one in giving if one.cause not in without]
     named = tuple(_acting(one, arm) for one in wanted)
     left = "; ".join(one.evidence for one in found.undecided)
     shown = {acting.place: one.seen_at for acting, one in zip(named, wanted, strict=True)}
-    known = {acting.place: one.numbers for acting, one in zip(named, wanted, strict=True) if one.numbers is not None}
-    return Compliance(named, not giving and not found.undecided, left, found.seen, shown, known)
+    return Compliance(named, left, found.seen, shown)
 
 
-def compared(now: Compliance, before: Compliance) -> Compared:
-    """Which of the causes named now are news: those that the reference does not name, or not with this frequency or stiffness."""
+def new_causes(now: Compliance, before: Compliance) -> tuple[Acting, ...]:
+    """Return the causes that the reference does not name, or not with this frequency or stiffness."""
     there = {one.place: one for one in before.named}
-    new = tuple(one for one in now.named if one.place not in there or _moved(one, there[one.place]))
-    return Compared(new, tuple(one for one in now.named if one not in new))
+    return tuple(one for one in now.named if one.place not in there or _moved(one, there[one.place]))
 
 
 def _moved(now: Acting, before: Acting) -> bool:

@@ -8,12 +8,12 @@ opposite signs that are whatever noise makes of them, or each stands for a piece
 then nobody finds. So of a law and its plainer forms that is taken whose terms are told apart, with the fewest of them that is not
 clearly worse on blocks of time that it was not fitted to. Logs that judge the model have no say in it: they would judge what they
 have chosen. What was recorded when all was in order decides alone, as far as it drives a joint: a fault blurs the terms, or is
-taken for one more of them. So do stored thresholds, which are right for the laws alone that they were found by.
+taken for one more of them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
@@ -27,7 +27,6 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
 from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.diagnosis.screened.candidates import place_of
 from pipelines.model.diagnosis.worth.gains import torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import cross_validated
 from pipelines.model.effects import find_effect
@@ -45,15 +44,13 @@ _MUCH = 0.85  # of the same; at 21 joints with one sigmoid, of two that were tol
 _ONE = 0.5  # of the half of a 95 % interval: a standard error
 _LONG, _FAST = 0.25, 0.5  # times the equations and the speed of a joint in later logs, with which those before judge its friction
 _AS_LITTLE = "fewer terms leave as little of what was held out"
-_STORED = "the stored thresholds are those of fewer"
 
 
-def with_terms_told_apart(prepared: Prepared, blocks: int, stored: Collection[str] = ()) -> Prepared:
+def with_terms_told_apart(prepared: Prepared, blocks: int) -> Prepared:
     """The same rows, for laws in the shape that they were fitted in, each with no more terms than these logs tell apart.
 
     Args:
         blocks: of time, held out in turn.
-        stored: the laws of stored thresholds, as `place_of` names them: each law has the terms that it has there, if any.
     """
     given = prepared.columns
     if not any(law.plainer for law in given.laws):
@@ -67,12 +64,10 @@ def with_terms_told_apart(prepared: Prepared, blocks: int, stored: Collection[st
             laws.append(law)
             continue
         rungs = before if _judges(before.data, now.data, _row(law)) else now
-        known = _as_stored(law, given.laws, stored)
-        rung = rungs.chosen(law) if known is None else known
+        rung = rungs.chosen(law)
         laws += rungs.laws_for(law, rung)
         if rung:
-            why = rungs.why(law, rung) if known is None else _STORED
-            fewer.append(FewerTerms(law.joint, law.name, law.plainer[rung - 1], why))
+            fewer.append(FewerTerms(law.joint, law.name, law.plainer[rung - 1], rungs.why(law, rung)))
     return replace(prepared, columns=replace(given, laws=tuple(laws)), fewer=tuple(fewer))
 
 
@@ -86,12 +81,6 @@ def _driven(data: Data, row: int) -> tuple[int, float]:
     """How many equations of a joint count, and its root mean square speed in them [rad/s]."""
     speed = np.concatenate([one.at_rows(one.motion.dq[:, row])[one.weighed[row]] for one in data.logs])
     return len(speed), float(np.sqrt(np.mean(np.square(speed)))) if len(speed) else 0.0
-
-
-def _as_stored(law: Effect, laws: Sequence[Effect], stored: Collection[str]) -> int | None:
-    """The rung of `law` that is among the `stored` laws; None where none is."""
-    rungs = range(len(law.plainer) + 1 if stored else 0)
-    return next((rung for rung in rungs if all(place_of(one.name, one.joint) in stored for one in _on(law, rung, laws))), None)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,16 +18,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.signal.neighbours import nearest_pairs
 
 __all__ = ["Repeated"]
 
 _NEAR = 0.1  # of the standard deviation of each coordinate: rows of one state
 _APART = 1.0  # [s] in a log, at least: after less, what wanders is still where it was
-_NEIGHBOURS = 32  # numerics: that are looked at; slow motion has many next to it in time
+_OTHER_LOG = 1e9  # numerics: [s] between the clocks of two logs
 _FEWEST = 100  # numerics: pairs of a joint; fewer say little
 
 
@@ -42,24 +42,11 @@ class Repeated:
     @classmethod
     def of(cls, data: Data) -> Repeated:
         """Return the pairs, nearest first."""
-        logs = [(one.at_rows(one.motion.q), one.at_rows(one.motion.dq), one.at_rows(one.motion.ddq))
+        logs = [np.hstack([one.at_rows(x) for x in (one.motion.q, one.motion.dq, one.motion.ddq)])
                 for one in data.logs]
-        state = np.vstack([np.hstack(own) for own in logs])
-        log = np.repeat(np.arange(len(data.logs)), [one.rows for one in data.logs])
-        time = np.concatenate([one.t for one in data.logs]) + 1e9 * log  # other logs are far away
-        scaled = state / np.maximum(state.std(axis=0), 1e-300)
-        distance, other = cKDTree(scaled).query(scaled, min(_NEIGHBOURS, len(scaled)), p=np.inf,
-                                                distance_upper_bound=_NEAR)
-        here, place = np.nonzero(np.isfinite(distance))
-        there = other[here, place]
-        apart = np.abs(time[here] - time[there]) >= _APART
-        here, there = here[apart], there[apart]
-        free, chosen = np.ones(len(scaled), dtype=bool), []
-        for k in np.argsort(distance[np.isfinite(distance)][apart], kind="stable"):
-            if free[here[k]] and free[there[k]]:
-                free[[here[k], there[k]]] = False
-                chosen.append(k)
-        return cls(data, here[chosen], there[chosen])
+        log = np.repeat(np.arange(len(logs)), [len(own) for own in logs])
+        time = np.concatenate([one.t for one in data.logs]) + _OTHER_LOG * log
+        return cls(data, *nearest_pairs(np.vstack(logs), time, _NEAR, _APART))
 
     @property
     def count(self) -> Array:

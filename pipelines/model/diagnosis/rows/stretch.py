@@ -28,7 +28,6 @@ _END = 1.0  # periods of the cut-off left out at either end of a stretch
 class Run:
     """A stretch without a gap: what is done to a signal of it, in the frequency domain."""
 
-    part: slice  # of the log's kept samples
     held: bool  # the torque is a held command: columns are averaged as it is
     response: Array  # (bins,) low-pass, at the frequencies of the padded stretch, as far as the thinned rows go
     average: Array  # (bins,) of the average over two samples of a smooth signal
@@ -76,7 +75,7 @@ def run_of(equations: LogEquations, part: slice, skip: int = 1) -> Run:
     turn = 2.0 * np.pi * bins / size
     response = np.ones(len(bins)) if cutoff is None else passed_both_ways(bins * rate / size, cutoff, rate)
     average = (114.0 + 68.0 * np.cos(turn) - 2.0 * np.cos(2.0 * turn)) / 180.0
-    return Run(part, held, response, average, size // skip, pad // skip, every // skip, chosen)
+    return Run(held, response, average, size // skip, pad // skip, every // skip, chosen)
 
 
 def quick_size(n: int) -> int:

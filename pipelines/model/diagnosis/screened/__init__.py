@@ -2,5 +2,4 @@
 
 candidates    each effect at every joint, in every shape
 wanted        causes that a user names, and why a model cannot take one up
-arms_alike    arms for which columns are known already, as they are nearly the same
 """

@@ -11,25 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
-from pipelines.model.arm import Acting, Arm
-from pipelines.model.diagnosis.fitted.record import changing, recorded, recorded_of
+from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.rows.data import Data, LogData
-from pipelines.model.diagnosis.screened.arms_alike import Asked
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.fast import from_motion, own_columns, several_columns
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Arms", "Family", "Laid", "families", "lay_family", "place_of", "runs_away", "whole_motion"]
+__all__ = ["Family", "Laid", "families", "lay_family", "place_of", "whole_motion"]
 
 Indices = npt.NDArray[np.intp]
-Mask = npt.NDArray[np.bool_]
 
 _AT_ONCE = 48  # columns
 _AWAY = 1e50  # beyond any unit: what is larger runs away, and its square, weighted and summed, is no number any more
@@ -45,39 +42,9 @@ class Family:
 
     @property
     def event(self) -> bool:
-        """Return whether it happens once, in one log: its non-linear numbers belong to that."""
+        """Whether it happens once, in one log: its non-linear numbers belong to that."""
         one = self.shapes[0]
         return any(q.shape and q.name in one.per_log for q in one.parameters)
-
-
-@dataclass(frozen=True, eq=False)
-class Arms:
-    """By whose columns causes are screened."""
-
-    now: Arm  # with all that was found
-    start: Arm  # for what just adds its torque, whatever else acts
-    rigid: tuple[Asked, ...] = ()  # at each joint: for what just adds what follows from the rigid body alone
-    body: Asked | None = None  # for what follows from that and does more
-    moving: tuple[Asked, ...] = ()  # at each joint: for what follows from that and from what acts at the joint
-
-    @property
-    def asked(self) -> tuple[Asked, ...]:
-        """Those that stand for others that are nearly the same."""
-        return (*self.rigid, *self.moving, *(() if self.body is None else (self.body,)))
-
-    @property
-    def every(self) -> tuple[Arm, ...]:
-        return (self.now, self.start, *(one.arm for one in self.asked))
-
-    def of(self, family: Family) -> Arm:
-        effect = family.shapes[0]
-        if self.rigid and effect.from_body and effect.adds and family.joint:
-            return self.rigid[family.joint - 1].arm
-        if self.body is not None and effect.from_body:
-            return self.body.arm
-        if self.moving and effect.from_own_joint and family.joint:
-            return self.moving[family.joint - 1].arm
-        return self.start if effect.adds else self.now
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,72 +99,39 @@ def whole_motion(data: Data) -> Motion:
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     """The columns of every shape, a few shapes at a time."""
-    size = _at_once(data, family, arm.unrecorded)
-    for first in range(0, len(family.shapes), size):
-        yield _lay_some(data, family, first, size, arm)
-
-
-def _lay_some(data: Data, family: Family, first: int, size: int, whole: Arm) -> Laid:
-    some, arm = family.shapes[first:first + size], whole.unrecorded
     with np.errstate(all="ignore"):
-        own = some[0].from_motion and family.joint
-        acting, parts = _own(data, some, arm, whole) if own else _anywhere(data, some, arm, whole, not family.event)
+        width = int(family.shapes[0].columns(_first_samples(data), arm).shape[2])
+    size = max(1, _AT_ONCE // max(width, 1))
+    for first in range(0, len(family.shapes), size):
+        yield _lay_some(data, family.shapes[first:first + size], first, arm)
+
+
+def _lay_some(data: Data, some: Sequence[Effect], first: int, arm: Arm) -> Laid:
+    joint = some[0].joint if from_motion(some[0]) else None
+    with np.errstate(all="ignore"):
+        if joint is not None:
+            acting = np.arange(data.n_joints) == joint - 1
+            parts = [_laid_own(one, some, joint, arm) for one in data.logs]
+        else:
+            laid = [_laid_anywhere(one, some, arm) for one in data.logs]
+            acting = np.array([any(x[:, :, j].any() for x in laid) for j in range(data.n_joints)])
+            parts = [x[:, :, acting].reshape(*x.shape[:2], -1) for x in laid]
     rows = np.flatnonzero(acting[data.joint])
     return Laid(first, data.clear(np.concatenate(parts, axis=2), rows), rows)
 
 
-def _at_once(data: Data, family: Family, arm: Arm) -> int:
-    """Shapes that are laid together."""
-    first = family.shapes[0]
-
-    def width() -> Array:
-        with np.errstate(all="ignore"):
-            return np.array(first.columns(_first_samples(data), arm).shape[2])
-
-    columns = width() if family.event else data.logs[0].keep(("columns", first), width)
-    return max(1, _AT_ONCE // max(int(columns), 1))
-
-
-def _own(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm) -> tuple[Mask, list[Array]]:
-    """The joint that they act on, and of each log (shapes, k, rows of that joint): kept, for they follow from the motion alone,
-    and from what the record of that joint passes through, where there is such a thing."""
-    joint = some[0].joint or 1
-    through = changing(whole, joint)
-    passed = tuple((acting.place, tuple(acting.values.items())) for acting in through)
-    laid = [one.keep((tuple(some), passed) if through else tuple(some), partial(_laid_own, one, some, arm, through))
-            for one in data.logs]
-    return np.arange(data.n_joints) == joint - 1, [x.reshape(len(some), -1, x.shape[-1]) for x in laid]
-
-
-def _laid_own(one: LogData, some: Sequence[Effect], arm: Arm, through: Sequence[Acting]) -> Array:
-    table = some[0].own_columns(some, one.motion, arm)
+def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Array:
+    """(shapes, k, rows of the joint) of effects that act on it alone."""
+    table = own_columns(some, one.motion, arm)
     for shape in table:
         shape[...] = _finite(shape)
-    flat = recorded_of(through, table.reshape(-1, table.shape[2]), one.motion)
-    return one.lay_signals(flat, np.full(len(flat), (some[0].joint or 1) - 1))
+    rows = one.lay_signals(table.reshape(-1, table.shape[2]), np.full(len(some) * table.shape[1], joint - 1))
+    return rows.reshape(len(some), table.shape[1], -1)
 
 
-def _anywhere(data: Data, some: Sequence[Effect], arm: Arm, whole: Arm, keep: bool) -> tuple[Mask, list[Array]]:
-    """Joints that they act on, and of each log (shapes, k, rows of those joints); kept for the next time the same arm is asked."""
-    laid, acts = [], np.zeros(data.n_joints, dtype=bool)
-    for one in data.logs:
-        lay, key = partial(_laid_anywhere, one, some, arm, whole), (tuple(some), one.kept.number(whole)) if keep else None
-        laid.append(lay() if key is None else one.keep(key, lay))
-        there = partial(_acting, laid[-1])
-        acts |= there() if key is None else one.keep((*key, "acting"), there)
-    joints = slice(None) if acts.all() else np.flatnonzero(acts)
-    return acts, [x[:, :, joints].reshape(*x.shape[:2], -1) for x in laid]
-
-
-def _acting(laid: Array) -> Mask:
-    """(joints,) of (shapes, k, joints, rows): which have something."""
-    return np.array([laid[:, :, joint].any() for joint in range(laid.shape[2])])
-
-
-def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -> Array:
+def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
     """(shapes, k, joints, rows)"""
-    tables = [recorded(whole, _finite(table), one.motion).transpose(2, 1, 0)
-              for table in some[0].several(some, one.motion, arm)]
+    tables = [_finite(table).transpose(2, 1, 0) for table in several_columns(some, one.motion, arm)]
     k, joints, samples = tables[0].shape
     acting = np.flatnonzero([any(table[:, j].any() for table in tables) for j in range(joints)])
     flat = np.empty((len(some), k, len(acting), samples))
@@ -211,16 +145,9 @@ def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm, whole: Arm) -
 
 def _finite(table: Array) -> Array:
     """Columns that run away, of an arm that is badly known, are none."""
-    return np.zeros_like(table) if runs_away(table) else table
-
-
-def runs_away(table: Array) -> bool:
-    """Return whether some of it is no number, or larger than any torque."""
-    return not bool((np.abs(table) < _AWAY).all())
+    return table if bool((np.abs(table) < _AWAY).all()) else np.zeros_like(table)
 
 
 def _first_samples(data: Data) -> Motion:
     motion = data.logs[0].motion
     return Motion(motion.t[:8], motion.q[:8], motion.dq[:8], motion.ddq[:8], None if motion.tau is None else motion.tau[:8])
-
-

@@ -1,15 +1,12 @@
 """What a finding is worth on what was held out: torque residual, simulated position, tip.
 
-    torque_gain(before, after, case)        with its bootstrap interval
-    surely_less(before, after, own, ...)    of all joints together
+    torque_gain_of(data, before, after)     with its bootstrap interval
     simulation_errors(arms, logs)           position error of each arm, in closed loop or over short windows
-    farther(before, after)                  whether the second is worse than chance does
-    no_nearer(before, after)                whether it is no better
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal
@@ -22,20 +19,16 @@ from pipelines.fit.bootstrap import apart
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.shared_work import shared_out
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.result import BeforeAfter, Gain, SimulatedSpan, TipError, TorqueGain
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.worth.closed_loop import Positions, in_loop, in_loops
-from pipelines.model.diagnosis.worth.held_out import held_out_left
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, Windows, simulate_windows
 
-__all__ = ["Simulation", "Strayed", "farther", "gain_of", "nearer", "no_nearer", "simulation_errors", "surely_less", "torque_gain",
-           "torque_gain_of", "worse_log"]
+__all__ = ["Simulation", "Strayed", "gain_of", "nearer", "simulation_errors", "torque_gain_of", "worse_log"]
 
-Mask = npt.NDArray[np.bool_]
 
 _BLOCKS = 20  # of the held-out time
 _SEED = 20040509
@@ -48,7 +41,6 @@ _FINE = 1e-3  # [s] between torques that drive a window: a faster log's are aver
 _EXACT = 1e-3  # of the position error, to which it is worked out
 _ROUGH = 1e-2  # the same, where something moves beside the joints: a hundredth is far less than what chance does to the error
 _LOGS = 2  # that are simulated
-_THERE = 0.5  # of the share that all joints together fall by, by which those have to where a cause acts or is seen
 _WORSE = 1.1  # times the error of a held-out log, that an extension must not exceed
 
 
@@ -68,15 +60,13 @@ class Simulation:
     how: Literal["closed-loop", "windowed", "none"]
     position_rms: Array  # [rad] (joints,)
     tip_rms: float  # [m]
-    power: Array  # (blocks,) squared error summed over the joints, in units of each, and the samples of each block of time
-    samples: Array  # (blocks,)
+    power: Array  # (blocks,) of time: squared error summed over the joints, in units of each
     first: Strayed | None = None  # in the first of the logs; None where no controller is known
     span: tuple[SimulatedSpan, ...] = ()  # of each log that was simulated
-    longest: float = np.nan  # [s] of a log, at most
 
     @classmethod
     def none(cls, joints: int) -> Simulation:
-        return cls("none", np.full(joints, np.nan), np.nan, np.zeros(0), np.zeros(0))
+        return cls("none", np.full(joints, np.nan), np.nan, np.zeros(0))
 
 
 def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
@@ -86,15 +76,8 @@ def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
                 TipError(before.tip_rms, after.tip_rms) if known else None, after.span if known else ())
 
 
-def torque_gain(before: Refined, after: Refined, judge: Data | None, blocks: int) -> TorqueGain:
-    """Root mean square of the held-out torque residual, joint by joint, and how sure its change is."""
-    data = after.data if judge is None else judge
-    one, other = (held_out_left(x, judge, blocks) for x in (before, after))
-    return torque_gain_of(data, one, other)
-
-
 def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
-    """The same of residuals (rows,) [N m] of held-out rows."""
+    """Root mean square of held-out residuals (rows,) [N m], joint by joint, and how sure its change is."""
     place = data.blocks(_BLOCKS)
     count = int(place.max()) + 1
     ci = []
@@ -104,21 +87,6 @@ def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
                 for values in (before[own] ** 2, after[own] ** 2, np.ones(int(own.sum())))]
         ci.append(apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED)))
     return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
-
-
-def surely_less(before: Refined, after: Refined, own: Mask, judge: Data | None, blocks: int) -> bool:
-    """Whether the held-out torque error of all joints together falls beyond chance, each in units of what `before` leaves of it,
-    and at the joints `own` (joints,) together by half of that share at least."""
-    data = after.data if judge is None else judge
-    left = [held_out_left(x, judge, blocks) for x in (before, after)]
-    scale = np.maximum(data.rms(left[0]), 1e-12)[data.joint]
-    place = data.blocks(_BLOCKS)
-    ours, theirs, rows = (np.asarray(np.bincount(place, np.where(data.counts, x, 0.0), minlength=int(place.max()) + 1), dtype=float)
-                          for x in (np.square(left[0] / scale), np.square(left[1] / scale), np.ones(len(scale))))
-    _, high = apart(ours, theirs, rows, np.random.default_rng(_SEED))
-    here = data.counts & own[data.joint]
-    there = float(np.sum(np.square(left[1] / scale)[here]) / max(np.sum(np.square(left[0] / scale)[here]), 1e-300))
-    return high < 0.0 and 1.0 - there >= _THERE * (1.0 - float(theirs.sum() / max(ours.sum(), 1e-300)))
 
 
 def worse_log(data: Data, before: Array, after: Array) -> str:
@@ -134,45 +102,16 @@ def worse_log(data: Data, before: Array, after: Array) -> str:
     return ""
 
 
-def farther(before: Simulation, after: Simulation, *, late: bool = False) -> str:
-    """Why the second simulated arm is farther from the measured one than chance explains; empty where it is not.
-
-    Args:
-        late: the log's torque is not what the arm felt: windows, which it drives, tell nothing then.
-    """
-    if before.how == "none" or (late and before.how == "windowed"):
-        return ""
-    if after.how == "none":
-        return "the simulated arm runs away with it"
-    low, _ = apart(before.power, after.power, before.samples, np.random.default_rng(_SEED))
-    return "the simulated arm with it is farther from the measured one" if low > 0.0 else ""
-
-
-def no_nearer(before: Simulation, after: Simulation, *, late: bool = False) -> str:
-    """Why an extension by what the second arm has more is not accepted: the simulated one has to come nearer, chance or not; empty
-    where it does, and where nothing can be simulated. `late` as in `farther`."""
-    if why := farther(before, after, late=late):
-        return why
-    if before.how == "none" or (late and before.how == "windowed") or nearer(before, after, late=late):
-        return ""
-    return "the simulated arm with it comes no nearer to the measured one"
-
-
-def nearer(before: Simulation, after: Simulation, *, late: bool = False) -> bool:
-    """Whether the second simulated arm is nearer to the measured one than the first, chance or not; `late` as in `farther`."""
-    if late and before.how == "windowed":
-        return False
+def nearer(before: Simulation, after: Simulation) -> bool:
+    """Whether the second simulated arm is nearer to the measured one than the first, chance or not."""
     return "none" not in (before.how, after.how) and float(after.power.sum()) < float(before.power.sum())
 
 
-def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int, Simulation] | None = None) -> list[Simulation]:
+def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
     """Position error of each arm over the same stretches of logs: closed loop where the first allows it, short windows else.
 
     Without logs nothing is simulated. In a loop the stretches are short, and longer ones where they leave it open whether the last
     arm comes nearer than the first: what the amplifiers' noise moves, no simulated arm follows.
-
-    Args:
-        known: of arms, by their places, that were simulated already beside others with the same effects as these.
     """
     none = [Simulation.none(arm.n_joints) for arm in arms]
     if not motions:
@@ -181,13 +120,6 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions, known: Mapping[int,
     hooks = [hook for arm in arms for hook in Plant.of(arm).hooks]
     soft = any(hook.rate for hook in hooks)
     slow = soft or any(hook.actuator and hook.states for hook in hooks)
-    if known:
-        one, left = next(iter(known.values())), [k for k in range(len(arms)) if k not in known]
-        if one.how == "none":
-            return none
-        found = _each([arms[k] for k in left], logs, soft, one.longest, closed=one.how == "closed-loop")
-        every = {**known, **dict(zip(left, found, strict=True))}
-        return [every[k] for k in range(len(arms))]
     if all(in_loop(arms[0], log) for log, _ in logs):
         longest = _SOFT if slow else _LONGEST
         found = _each(arms, logs, soft, longest)
@@ -209,11 +141,11 @@ def _each(arms: Sequence[Arm], motions: Motions, soft: bool, longest: float, *, 
     """`soft`: something moves beside the joints of one of them; `longest` [s] of a log in a loop."""
     every = (in_loops(arms, motions, longest) if closed else
              shared_out(partial(_in_windows, motions=motions, exact=_ROUGH if soft else _EXACT), arms))
-    return [Simulation.none(arm.n_joints) if pairs is None else _all(arm, motions, pairs, closed, longest)
+    return [Simulation.none(arm.n_joints) if pairs is None else _all(arm, motions, pairs, closed)
             for arm, pairs in zip(arms, every, strict=True)]
 
 
-def _all(arm: Arm, motions: Motions, pairs: Sequence[Positions], closed: bool, longest: float) -> Simulation:
+def _all(arm: Arm, motions: Motions, pairs: Sequence[Positions], closed: bool) -> Simulation:
     square, away, span = [], [], []
     for (q, seen, between), (log, _) in zip(pairs, motions, strict=True):
         known = np.isfinite(q + seen).all(axis=1)
@@ -224,12 +156,10 @@ def _all(arm: Arm, motions: Motions, pairs: Sequence[Positions], closed: bool, l
     block = np.arange(len(each)) * _BLOCKS // max(len(each), 1)
     units = _units(arm, np.concatenate([seen[np.isfinite(seen).all(axis=1)] for _, seen, _ in pairs]))
     power = np.asarray(np.bincount(block, each @ units**-2, minlength=_BLOCKS), dtype=np.float64)
-    samples = np.asarray(np.bincount(block, minlength=_BLOCKS), dtype=np.float64)
     (log, _), (q, seen, _) = motions[0], pairs[0]
     first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen) if closed else None
     return Simulation("closed-loop" if closed else "windowed", np.sqrt(each.mean(axis=0)),
-                      float(np.sqrt(np.mean(np.concatenate(away)))), power, samples, first, tuple(span),
-                      longest)
+                      float(np.sqrt(np.mean(np.concatenate(away)))), power, first, tuple(span))
 
 
 def _units(arm: Arm, q: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What a model leaves of rows that it was not fitted to: of the judging logs, or block by block of the fitted ones."""
+"""What a model leaves of rows that it was not fitted to: block by block of the fitted ones."""
 
 from __future__ import annotations
 
@@ -6,14 +6,8 @@ import numpy as np
 
 from pipelines.log.experiment import Array
 from pipelines.model.diagnosis.fitted.refit import Refined
-from pipelines.model.diagnosis.rows.data import Data
 
-__all__ = ["cross_validated", "held_out_left"]
-
-
-def held_out_left(done: Refined, judge: Data | None, blocks: int) -> Array:
-    """(rows,) [N m] of the judging logs; of the fitted ones, block by block, where there are none."""
-    return cross_validated(done, blocks) if judge is None else judge.y - done.model.torque(judge)
+__all__ = ["cross_validated"]
 
 
 def cross_validated(done: Refined, blocks: int) -> Array:

@@ -2,7 +2,6 @@
 
     told(acting)                    {"order": Value(18.0, 0.01, "1/rev"), …} of an effect whose numbers are known
     parameters(done, place)         the same of effect number `place` of a fitted model
-    of_amplitudes(effect, a, C)     an effect whose amplitudes alone were fitted, with the deviations of its numbers
 
 Covariance is that of all numbers of the model together, by the sandwich of `Refined.covariance`; what is reported follows from
 them to first order (the delta method): √(s C sᵀ), s the slopes. What follows mostly from a number that these logs do not tell from
@@ -24,16 +23,11 @@ from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.result import Value
 from pipelines.model.effects.base import Effect, Values
 
-__all__ = ["acting", "of_amplitudes", "parameters", "standard_deviations", "told"]
+__all__ = ["acting", "parameters", "standard_deviations", "told"]
 
 Mask = npt.NDArray[np.bool_]
 
 _STEP = 1e-4  # of an amplitude or of its deviation, whichever is larger: an angle between two small ones turns fast
-# Deviations from zero: of 410 named causes of the test bench the least true one of one number was 6.9, a false gain 4.9; delays of
-# two arms in order 2.3 and 3.5.
-_STDS = 5.0
-_ONE_SIDED = 4.87  # what a normal number exceeds as seldom as its size exceeds `_STDS`
-_SURE = 2.0  # deviations by which it is less
 
 
 def told(acting: Acting) -> dict[str, Value]:
@@ -49,50 +43,9 @@ def told(acting: Acting) -> dict[str, Value]:
     return found
 
 
-def parameters(done: Refined, place: int, covariance: Array | None = None) -> dict[str, Value]:
+def parameters(done: Refined, place: int) -> dict[str, Value]:
     """What is reported of effect number `place`."""
-    return told(_with(done, place, _of_effect(done, place, done.covariance() if covariance is None else covariance)))
-
-
-def of_amplitudes(effect: Effect, amplitudes: Array, covariance: Array, revolute: Sequence[bool]) -> Acting:
-    """`effect`, on an arm of such joints, by amplitudes and their covariance; the shape was not fitted with them.
-
-    Amplitudes of no variance were not seen.
-    """
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    steps = [_step(*each) for each in zip(amplitudes.tolist(), std.tolist(), strict=True)]
-    moved = [effect.values(amplitudes + step * one) for step, one in zip(steps, np.eye(len(steps)), strict=True)]
-    values = effect.values(amplitudes)
-    known = _finite(_deviations(effect, values, moved, steps, covariance, std == 0.0))
-    return Acting.of(effect, values, known, revolute=_turning(effect, revolute))
-
-
-def _limit(count: int) -> float:
-    """Deviations from none of so many numbers together that chance gives as seldom as `_STDS` of one: of χ², whose third root is
-    nearly normal (Wilson & Hilferty 1931)."""
-    part = 2.0 / (9.0 * count)
-    return _STDS if count == 1 else float(np.sqrt(count * (1.0 - part + _ONE_SIDED * np.sqrt(part)) ** 3))
-
-
-def _from_none(done: Refined, place: int) -> float:
-    """Deviations between the amplitudes a of an effect and none, whatever its other numbers are: √(aᵀ C⁻¹ a) (Wald 1943)."""
-    index = [k for k in done.of_effect(place) if done.names[k - len(done.model.beta)][2].isdigit()]
-    own = done.covariance()[np.ix_(index, index)]
-    if len(index) != len(done.model.effects[place].amplitudes) or set(index) & set(done.unseen) or not np.isfinite(own).all():
-        return np.inf  # who does not know them does not know that they are none
-    a = np.array(done.model.effects[place].amplitudes)
-    size = np.maximum(np.sqrt(np.maximum(np.diag(own), 0.0)), 1e-300)
-    return float(np.sqrt(max(float(a / size @ np.linalg.pinv(own / size[:, None] / size, hermitian=True) @ (a / size)), 0.0)))
-
-
-def _sizes(done: Refined) -> list[tuple[int, float, float]]:
-    """Place, amplitude and its standard deviation of the effects of one number alone."""
-    whole, found = done.covariance(), []
-    for place, one in enumerate(done.model.effects):
-        index = done.of_effect(place)
-        if len(index) == 1 and one.free_amplitudes and len(one.amplitudes) == 1:
-            found.append((place, abs(float(one.amplitudes[0])), float(np.sqrt(max(whole[index[0], index[0]], 0.0)))))
-    return found
+    return told(_with(done, place, _of_effect(done, place, done.covariance())))
 
 
 def standard_deviations(done: Refined, place: int, covariance: Array) -> dict[str, float]:

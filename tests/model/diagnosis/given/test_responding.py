@@ -14,7 +14,7 @@ from pipelines.diagnosis import engine, extension
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.given.compliance import Compliance, compared
+from pipelines.model.diagnosis.given.compliance import Compliance, new_causes
 from pipelines.model.diagnosis.screened.wanted import Wanted
 from pipelines.model.effects.base_resonance import BaseResonance
 from pipelines.report.diagnosis_finding import finding_section
@@ -35,7 +35,7 @@ def base(frequency: float | None = None, std: float = 0.02) -> Acting:
 @pytest.fixture
 def told(monkeypatch: pytest.MonkeyPatch) -> None:
     def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance | None:
-        return Compliance((base(),), False, "") if logs else None
+        return Compliance((base(),), "") if logs else None
 
     for module in (engine, extension):
         monkeypatch.setattr(module, "compliance", compliance)
@@ -89,6 +89,6 @@ def test_the_extension_takes_the_responses_numbers() -> None:
 def test_a_base_that_was_always_soft_is_no_news_by_its_responses() -> None:
     """28 Hz again, by a hair; 28 and now 25 Hz; firm and now soft."""
     now, again, other = base(28.0, 1e-3), base(28.01, 1e-3), base(25.0, 1e-3)
-    assert compared(Compliance((now,), False, ""), Compliance((again,), False, "")).standing == (now,)
-    assert compared(Compliance((other,), False, ""), Compliance((again,), False, "")).new == (other,)
-    assert compared(Compliance((now,), False, ""), Compliance((), True, "")).new == (now,)
+    assert new_causes(Compliance((now,), ""), Compliance((again,), "")) == ()
+    assert new_causes(Compliance((other,), ""), Compliance((again,), "")) == (other,)
+    assert new_causes(Compliance((now,), ""), Compliance((), "")) == (now,)

@@ -14,7 +14,7 @@ import pytest
 
 from pipelines.log.experiment import Array
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, narrowed, prepare
+from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import BLOCKS, DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
@@ -227,12 +227,6 @@ def test_a_part_that_stands_beside_a_law_is_not_laid_twice() -> None:
     laws = (*prepared.columns.laws, Viscous(2))
     told = with_terms_told_apart(replace(prepared, columns=replace(prepared.columns, laws=laws)), BLOCKS)
     assert kinds(told, 2) == [Coulomb, Viscous]
-
-
-@pytest.mark.slow
-def test_a_narrower_look_still_says_so() -> None:
-    told = with_terms_told_apart(prepare(simple(), SETTINGS, synthetic_arm()), BLOCKS)
-    assert narrowed(told, 10.0, [0.0] * 3).fewer == told.fewer != ()
 
 
 @pytest.mark.slow

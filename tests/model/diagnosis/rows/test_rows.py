@@ -8,7 +8,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.fitted.nominal import fit_nominal, orthonormal, rows_of
+from pipelines.model.diagnosis.fitted.nominal import _orthonormal, fit_nominal, rows_of
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.stretch import quick_size
 from pipelines.model.rigid.body import Motion
@@ -111,7 +111,7 @@ def test_what_the_model_can_imitate_is_projected_away(prepared: Prepared) -> Non
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     own = rows_of(prepared.data, columns)
     assert np.abs(fit.project(own)).max() < 1e-6 * np.abs(own * fit.weights).max()
-    basis = orthonormal(own * fit.weights)
+    basis = _orthonormal(own * fit.weights)
     np.testing.assert_allclose(basis @ basis.T, np.eye(len(basis)), atol=1e-9)
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.diagnosis.fitted.refit import Refined, refine
-from pipelines.model.diagnosis.worth.numbers import of_amplitudes, parameters, standard_deviations, told
+from pipelines.model.diagnosis.worth import numbers
+from pipelines.model.diagnosis.worth.numbers import parameters, standard_deviations, told
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.gravity_tilt import GravityTilt
@@ -51,6 +55,16 @@ def test_an_inertia_that_is_a_part_of_the_links_is_not_known(joint: int, told: b
     for name, true in (("viscous", VISCOUS), ("coulomb", COULOMB), *((("inertia", INERTIA),) if told else ())):
         assert found[name].value == pytest.approx(true, abs=max(4.0 * found[name].std, 0.02 * true))
         assert 0.0 < found[name].std < 0.2 * true
+
+
+def of_amplitudes(effect: Effect, amplitudes: Array, covariance: Array, revolute: Sequence[bool]) -> Acting:
+    """`effect` by amplitudes and their covariance, on an arm of such joints; amplitudes of no variance were not seen."""
+    std = np.sqrt(np.diag(covariance))
+    steps = [numbers._step(*each) for each in zip(amplitudes.tolist(), std.tolist(), strict=True)]
+    moved = [effect.values(amplitudes + step * one) for step, one in zip(steps, np.eye(len(steps)), strict=True)]
+    values = effect.values(amplitudes)
+    known = numbers._finite(numbers._deviations(effect, values, moved, steps, covariance, std == 0.0))
+    return Acting.of(effect, values, known, revolute=effect.joint is None or revolute[effect.joint - 1])
 
 
 def spread(effect: Effect, amplitudes: Array, covariance: Array, name: str) -> float:
