@@ -1,6 +1,6 @@
 """Pairs of instants at which a system is in the same state.
 
-    first, second = nearest_pairs(state, time, near=0.1, apart=1.0)
+first, second = nearest_pairs(state, time, near=0.1, apart=1.0)
 """
 
 from __future__ import annotations
@@ -16,9 +16,7 @@ Indices = npt.NDArray[np.intp]
 _NEIGHBOURS = 32  # numerics: that are looked at; slow motion has many next to it in time
 
 
-def nearest_pairs(
-    state: Array, time: Array, near: float, apart: float
-) -> tuple[Indices, Indices]:
+def nearest_pairs(state: Array, time: Array, near: float, apart: float) -> tuple[Indices, Indices]:
     """Return pairs of rows of one state, the nearest first; no row is in two of them.
 
     Args:
