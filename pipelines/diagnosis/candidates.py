@@ -207,14 +207,14 @@ def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
         return lambda motion: np.asarray(np.tanh(motion.dq[:, j, None] / widths))
 
     clocks = [one.motion.t for one in dataset.later.data.logs]
-    start, span = dataset.session_start, max(float(np.ptp(np.concatenate(clocks))), 1e-9)
-    if start is None:
-        span = max(float(np.ptp(t)) for t in clocks)
+    start = dataset.session_start if dataset.reference is None else None  # two days have no clock
+    session = [np.concatenate(clocks)] if start is not None else clocks
+    span = max(1e-9, *(float(np.ptp(t)) for t in session))
 
     def drift(j: int) -> Make:
         def make(motion: Motion) -> Array:
             since = (motion.t - (motion.t[0] if start is None else start)) / span
-            course = legvander(2.0 * since - 1.0, config.drift_order)[:, 1:]
+            course = legvander(np.clip(2.0 * since - 1.0, -1.0, 1.0), config.drift_order)[:, 1:]
             dq = motion.dq[:, j]
             sharp = widths_of(j)[0]
             return np.concatenate([course * np.tanh(dq / sharp)[:, None], course * dq[:, None]], 1)

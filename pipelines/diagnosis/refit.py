@@ -28,7 +28,7 @@ __all__ = ["Later", "State"]
 
 _RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
-_DAMPING = (_RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
+_DAMPING = (_RIDGE, 1e-2, 0.3, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = 81  # numerics: amplitudes that may be possible
 _HALF = 0.5  # numerics: of the time
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
@@ -146,6 +146,8 @@ class Later:
             before = now
             for damping in _DAMPING if names else _DAMPING[:1]:
                 step = self._factor(info, unit, base, gram, damping).solve(gradient)
+                if k and damping == _RIDGE and gradient @ step < 2.0 + _SETTLED * now:
+                    break  # what the step would save if all were linear
                 way, more = step[: len(theta)], step[len(theta) :] / size
                 own = way[: self.prior.n_nominal] / self.prior.scale
                 tried = model.moved(np.r_[own, more], names)

@@ -20,14 +20,16 @@ def nearest_pairs(state: Array, time: Array, near: float, apart: float) -> tuple
     """Return pairs of rows of one state, the nearest first; no row is in two of them.
 
     Args:
-        state: (rows, coordinates)
+        state: (rows, coordinates), each in units of what is no motion of it.
         time: (rows,) [s]
-        near: of the standard deviation of each coordinate, by which two rows of a pair may differ.
+        near: of the standard deviation of each coordinate, by which two rows may differ, or by a unit.
         apart: [s] between them, at least.
     """
     from scipy.spatial import cKDTree
 
-    scaled = state / np.maximum(state.std(axis=0), 1e-300)
+    if len(state) < 2:
+        return np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp)
+    scaled = state / np.maximum(state.std(axis=0), 1.0 / near)
     distance, other = cKDTree(scaled).query(
         scaled, min(_NEIGHBOURS, len(scaled)), p=np.inf, distance_upper_bound=near
     )

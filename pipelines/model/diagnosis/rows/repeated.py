@@ -25,6 +25,7 @@ from pipelines.signal.neighbours import nearest_pairs
 
 __all__ = ["Repeated"]
 
+_STILL = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²; m, m/s, m/s²] a joint that moves less is held, and that is noise
 _NEAR = 0.1  # of the standard deviation of each coordinate: rows of one state
 _APART = 1.0  # [s] in a log, at least: after less, what wanders is still where it was
 _OTHER_LOG = 1e9  # numerics: [s] between the clocks of two logs
@@ -42,8 +43,8 @@ class Repeated:
     @classmethod
     def of(cls, data: Data) -> Repeated:
         """Return the pairs, nearest first."""
-        logs = [np.hstack([one.at_rows(x) for x in (one.motion.q, one.motion.dq, one.motion.ddq)])
-                for one in data.logs]
+        logs = [np.hstack([one.at_rows(x) / least for x, least in zip(
+            (one.motion.q, one.motion.dq, one.motion.ddq), _STILL, strict=True)]) for one in data.logs]
         log = np.repeat(np.arange(len(logs)), [len(own) for own in logs])
         time = np.concatenate([one.t for one in data.logs]) + _OTHER_LOG * log
         return cls(data, *nearest_pairs(np.vstack(logs), time, _NEAR, _APART))
