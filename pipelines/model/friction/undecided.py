@@ -1,6 +1,6 @@
 """Laws that the chosen one is not told from, why it was chosen all the same, and what the choice changes.
 
-What is chosen is the simplest law that is not measurably worse than the best on rows that were held out (ladder.py). A alternative
+What is chosen is the simplest law that is not measurably worse than the best on rows that were held out (ladder.py). An alternative
 explains the rows that were fitted as well. It may have been as good on those held out, or measurably worse: then these speak
 for the chosen law, but they are the same few rows, and another day may fall out otherwise.
 """
