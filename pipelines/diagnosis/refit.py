@@ -28,8 +28,8 @@ __all__ = ["Later", "State"]
 
 _RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
-_DAMPING = (_RIDGE, 1e-2, 0.3, 10.0)  # numerics: of unit columns, that is tried in turn
-_TRIED = 81  # numerics: amplitudes that may be possible
+_DAMPING = (_RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
+_TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
 _HALF = 0.5  # numerics: of the time
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
 _FREE = 1e-6  # numerics: of the information along a direction that is freed, or not held
@@ -146,8 +146,7 @@ class Later:
             before = now
             for damping in _DAMPING if names else _DAMPING[:1]:
                 step = self._factor(info, unit, base, gram, damping).solve(gradient)
-                if k and damping == _RIDGE and gradient @ step < 2.0 + _SETTLED * now:
-                    break  # what the step would save if all were linear
+                settled = damping == _RIDGE and gradient @ step < 2.0 + _SETTLED * now  # if linear
                 way, more = step[: len(theta)], step[len(theta) :] / size
                 own = way[: self.prior.n_nominal] / self.prior.scale
                 tried = model.moved(np.r_[own, more], names)
@@ -156,6 +155,8 @@ class Later:
                     cost = self._cost(left, theta + way, info, moment) + self._read_off(tried)
                 if np.isfinite(cost) and cost <= now:
                     model, theta, residual, now = tried, theta + way, left, cost
+                    break
+                if settled:
                     break
             gained = before - now
             if k and gained < 2.0 + _SETTLED * now:
@@ -237,7 +238,7 @@ class Later:
                 continue
             if abs(last.amplitudes[int(name)]) + reach < last.effect.slight:
                 return False
-            for way in np.linspace(-reach, reach, _TRIED):
+            for way in np.outer((-reach, reach), _TRIED).ravel():
                 amplitudes = np.array(last.amplitudes)
                 amplitudes[int(name)] += way
                 within |= last.effect.possible(last.effect.values(amplitudes))
