@@ -23,13 +23,15 @@ class Decision:
     verdict: str  # "cause" | "no-fault-found" | "unknown"
     reason: str
     causes: tuple[Cause, ...]
-    explained: float  # share of the excess over the baseline
 
 
 def decide(
     later: Later, selection: Selection, baseline: Baseline, config: DiagnosisConfig
 ) -> Decision:
-    """Return the verdict by significance and goodness of fit."""
+    """Return the verdict by significance and goodness of fit.
+
+    Causes lose their names where they explain less than half of what is more than noise.
+    """
     rows, causes = later.rows.count, selection.causes
     first, last = selection.start.cost / rows, selection.end.cost / rows
     gained = max(selection.explained / rows, 1e-12)
@@ -47,30 +49,29 @@ def decide(
             "unknown",
             f"{causes[0].key[0]} explains {explained:.0%} of the excess residual",
             (),
-            explained,
         )
     if causes and causes[0].alternatives:
-        return Decision("unknown", "several causes explain it", causes, explained)
+        return Decision("unknown", "several causes explain it", causes)
     if causes:
-        return Decision("cause", "", causes, explained)
+        return Decision("cause", "", causes)
     if selection.stopped and (missing.any() or followed or not fits):
-        return Decision("unknown", selection.stopped, (), explained)
+        return Decision("unknown", selection.stopped, ())
     more = f"; it follows {selection.follows}" if selection.follows else ""
     if missing.any():
         reason = (
             f"{missing.max():.1%} of the torque of joint {int(missing.argmax()) + 1} comes again "
             f"with the motion, and no cause explains it{more}"
         )
-        return Decision("unknown", reason, (), explained)
+        return Decision("unknown", reason, ())
     if followed:
-        return Decision("unknown", followed, (), explained)
+        return Decision("unknown", followed, ())
     if not fits:
         reason = (
             f"the mean square residual is {left.max():.2f} of the noise at joint "
             f"{int(left.argmax()) + 1}, where {bound:.2f} is usual at most{more}"
         )
-        return Decision("unknown", reason, (), explained)
-    return Decision("no-fault-found", "", (), explained)
+        return Decision("unknown", reason, ())
+    return Decision("no-fault-found", "", ())
 
 
 def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
