@@ -80,6 +80,23 @@ class Arrow:
             corner = corner - across[-1].T @ across[-1]
         return cls(structure, tuple(blocks), tuple(across), _root(corner))
 
+    def widened(self, across: Array, own: Array) -> Arrow:
+        """Return the factor of [A, across; acrossᵀ, own]: of m further numbers, which are shared.
+
+        Args:
+            across: (k, m).
+            own: (m, m).
+        """
+        half, shared = self.half(across), self.structure.shared
+        wider = tuple(
+            np.concatenate([w, half[at]], axis=1)
+            for w, at in zip(self.across, self.structure.own, strict=True)
+        )
+        upper = np.zeros((len(shared), len(own)))
+        last = _root(own - half.T @ half)
+        corner = np.block([[self.corner, upper], [half[shared].T, last]])
+        return Arrow(self.structure.wider(len(own)), self.blocks, wider, corner)
+
     def half(self, b: Array) -> Array:
         """Return L⁻¹ b, in the order of `b` (k,) or (k, m): |L⁻¹ b|² is bᵀ A⁻¹ b."""
         out, shared = np.empty(b.shape), self.structure.shared

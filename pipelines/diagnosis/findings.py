@@ -180,7 +180,7 @@ def _visibility(later: Later, end: State, place: int) -> float:
     own = [a - b for a, b in zip(rows.torque(model), without, strict=True)]
     moments = later.base.moments(own)
     power = sum(float(x @ x) for x in own)
-    imitated = float(moments @ np.linalg.solve(end.info + later.gram, moments))
+    imitated = float(moments @ end.belief.after.solve(moments))
     return float(np.sqrt(np.clip(1.0 - imitated / max(power, 1e-300), 0.0, 1.0)))
 
 

@@ -72,7 +72,7 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
     shapes: dict[Key, list[_Shape]] = {}
     both = Table.stacked([later.base, state.effects])
     cross = np.concatenate([later.cross, state.effects.gram(later.candidates)])
-    solved = np.linalg.solve(later.information(state), cross)
+    solved = state.factor.solve(cross)
     for group, square in zip(later.dictionary.groups, later.squares, strict=True):
         at, family = group.columns, later.dictionary.families.get(group.key)
         if group.kind != "named" or family is None:

@@ -13,12 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.diagnosis.arrow import Arrow, Structure
+from pipelines.diagnosis.arrow import Arrow
+from pipelines.diagnosis.belief import RIDGE, Belief
 from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import Prior
-from pipelines.diagnosis.score import block_losses
 from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.model.diagnosis.fitted.exact import Exact
@@ -26,13 +26,11 @@ from pipelines.model.effects.base import Effect
 
 __all__ = ["Later", "State"]
 
-_RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
-_DAMPING = (_RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
+_DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
 _HALF = 0.5  # numerics: of the time
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
-_FREE = 1e-6  # numerics: of the information along a direction that is freed, or not held
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,15 +39,13 @@ class State:
 
     model: Exact
     theta: Array  # nominal and standing numbers, scaled
-    info: Array  # prior information A
-    moment: Array  # A m
+    belief: Belief  # before the rows
     residual: tuple[Array, ...]  # of each joint, in units of the noise
     effects: Table  # slopes by the numbers of the effects, of unit length
     lasting: (
         Indices  # of these, numbers that hold for all time; those of an event hold for its moment
     )
     losses: Array  # (blocks,) squared error of each block, predicted from all others
-    structure: Structure
     read_off: float = 0.0  # price of rows that effects take from the log itself
 
     @property
@@ -59,10 +55,18 @@ class State:
     @cached_property
     def cost(self) -> float:
         """‖r‖² + (θ - m)ᵀ A (θ - m), and the price of rows that are read off."""
-        theta, moment = self.theta, self.moment
-        away = theta @ self.info @ theta - 2.0 * moment @ theta
-        known = Arrow.of(self.info, self.structure).half(moment)
-        return self.rss + float(away + known @ known) + self.read_off
+        return self.belief.cost(self.theta, self.residual) + self.read_off
+
+    @property
+    def slope(self) -> Array:
+        """(k,) of -cost / 2 by all numbers."""
+        own = self.belief.slope(self.theta, self.residual)
+        return np.r_[own, self.effects.moments(self.residual)]
+
+    @cached_property
+    def factor(self) -> Arrow:
+        """The factor of the information P of all numbers, with the rows."""
+        return self.belief.beside(self.effects)
 
     @property
     def mean_squares(self) -> Array:
@@ -121,38 +125,40 @@ class Later:
     def y(self) -> tuple[Array, ...]:
         return self.rows.y
 
+    @cached_property
+    def belief(self) -> Belief:
+        """What is known before the rows."""
+        return Belief(*self.prior.start, self.base, self.gram, self.prior.structure, self.block)
+
     def start(self, found: Exact | None = None) -> State:
         """Return the nominal model, or one with causes found before, fitted under the prior."""
-        model = found or self.dataset.model
-        info, moment = self.prior.start
+        model, belief = found or self.dataset.model, self.belief
         for one in model.effects:
-            info, moment = self.freed(info, moment, one.effect)
+            belief = self.freed(belief, one.effect)
         theta = np.zeros(self.base.width)
         theta[: len(model.beta)] = model.beta * self.prior.scale
-        return self.fit(model, theta, info, moment)
+        return self.fit(model, theta, belief)
 
-    def fit(
-        self, model: Exact, theta: Array, info: Array, moment: Array, steps: int = _STEPS
-    ) -> State:
+    def fit(self, model: Exact, theta: Array, belief: Belief, steps: int = _STEPS) -> State:
         """Return the model with all its numbers fitted; those of effects have no prior."""
         residual = self._residual(model, theta)
-        now = self._cost(residual, theta, info, moment) + self._read_off(model)
+        now = belief.cost(theta, residual) + self._read_off(model)
         for k in range(1 + steps):
             slopes, names = self._slopes(model) if k else self._none  # linear numbers first
             size = _unit(slopes.norms)
             unit = slopes.scaled(1.0 / size)
-            base, gram = self._exact(model)
-            gradient = np.r_[moment - info @ theta + base.moments(residual), unit.moments(residual)]
+            known = self._exact(belief, model)
+            gradient = np.r_[known.slope(theta, residual), unit.moments(residual)]
             before = now
             for damping in _DAMPING if names else _DAMPING[:1]:
-                step = self._factor(info, unit, base, gram, damping).solve(gradient)
-                settled = damping == _RIDGE and gradient @ step < 2.0 + _SETTLED * now  # if linear
+                step = known.beside(unit, damping).solve(gradient)
+                settled = damping == RIDGE and gradient @ step < 2.0 + _SETTLED * now  # if linear
                 way, more = step[: len(theta)], step[len(theta) :] / size
                 own = way[: self.prior.n_nominal] / self.prior.scale
                 tried = model.moved(np.r_[own, more], names)
                 with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
                     left = self._residual(tried, theta + way)
-                    cost = self._cost(left, theta + way, info, moment) + self._read_off(tried)
+                    cost = belief.cost(theta + way, left) + self._read_off(tried)
                 if np.isfinite(cost) and cost <= now:
                     model, theta, residual, now = tried, theta + way, left, cost
                     break
@@ -166,29 +172,16 @@ class Later:
         lasting = np.flatnonzero(
             [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
         )
-        state = State(
-            model,
-            theta,
-            info,
-            moment,
-            residual,
-            effects,
-            lasting,
-            np.zeros(0),
-            self.prior.structure,
-            self._read_off(model),
-        )
+        price = self._read_off(model)
+        state = State(model, theta, belief, residual, effects, lasting, np.zeros(0), price)
         return replace(state, losses=self.losses(state))
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
-        both = Table.stacked([self.base, state.effects])
         cross = np.concatenate([self.cross, state.effects.gram(self.candidates)])
-        info = self._factor(state.info, state.effects)
-        slope = np.r_[state.moment - state.info @ state.theta, np.zeros(state.effects.width)]
-        slope += both.moments(state.residual)  # zero where the fit has settled
-        moments = self.candidates.moments(state.residual) - cross.T @ info.solve(slope)
-        found = screen(self.dictionary.groups, info, cross, self.squares, moments)
+        left = state.factor.solve(state.slope)  # zero where the fit has settled
+        moments = self.candidates.moments(state.residual) - cross.T @ left
+        found = screen(self.dictionary.groups, state.factor, cross, self.squares, moments)
         return [self._charged(one) if one.group.reads_torque else one for one in found]
 
     def _charged(self, one: Screened) -> Screened:
@@ -220,10 +213,9 @@ class Later:
             explained: cost that the effect saves.
         """
         slopes, names = self._slopes(state.model)
-        factor, first = self._factor(state.info, state.effects), self.base.width
+        factor, first = state.factor, self.base.width
         std = np.sqrt(factor.inverse_diagonal[first:]) / _unit(slopes.norms)
-        gradient = np.r_[self._slope(state), state.effects.moments(state.residual)]
-        step = factor.solve(gradient)[first:] / _unit(slopes.norms)
+        step = factor.solve(state.slope)[first:] / _unit(slopes.norms)
         deviations = np.sqrt(max(config.deviations**2, config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within = last.possible
@@ -250,10 +242,6 @@ class Later:
         acting = [effect.columns(one.motion, arm).any(axis=(1, 2)) for one in logs]
         return float(np.concatenate(acting).mean()) > _HALF
 
-    def _slope(self, state: State) -> Array:
-        """Return the slope (k,) of -cost / 2 by nominal and standing numbers."""
-        return state.moment - state.info @ state.theta + self.base.moments(state.residual)
-
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.
 
@@ -279,8 +267,7 @@ class Later:
         Of each joint, what nominal numbers and shapes without a name cannot imitate of its causes:
         m_cᵀ ((P⁻¹)_cc)⁻¹ m_c, P the information of the later rows.
         """
-        info, moment = self.prior.start
-        mean = Arrow.of(info, self.prior.structure).solve(moment)
+        mean = self.belief.mean
         rows = Arrow.of(self.gram + self.prior.precision, self.prior.structure)
         first, out = self.prior.n_nominal, np.zeros(self.rows.n_joints)
         for j in range(len(out)):
@@ -296,7 +283,7 @@ class Later:
 
         Of each s ((P⁻¹)_ss)⁻¹ s, by which the cost would rise without them.
         """
-        factor, first, out = self._factor(state.info, state.effects), self.prior.n_nominal, []
+        factor, first, out = state.factor, self.prior.n_nominal, []
         for group in groups:
             shapes = {g.shape for g in self.prior.groups if g.key == group.key}
             shape = group.shape if group.shape in shapes else 0
@@ -326,12 +313,8 @@ class Later:
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""
         more = Table.stacked([state.effects, columns.scaled(1.0 / _unit(columns.norms))])
-        info = self._factor(state.info, more)
-        gradient = np.r_[
-            state.moment - state.info @ state.theta + self.base.moments(state.residual),
-            more.moments(state.residual),
-        ]
-        step = info.solve(gradient)
+        slope = state.belief.slope(state.theta, state.residual)
+        step = state.belief.beside(more).solve(np.r_[slope, more.moments(state.residual)])
         torque = Table.stacked([self.base, more]).times(step)
         residual = tuple(r - t for r, t in zip(state.residual, torque, strict=True))
         lasting = np.append(state.lasting, np.arange(state.effects.width, more.width))
@@ -350,9 +333,7 @@ class Later:
         The numbers of an event cannot be predicted from other times: they are taken as known, and
         the selection charges them.
         """
-        lasting = state.effects.take(state.lasting)
-        columns = Table.stacked([self.base, lasting])
-        return block_losses(columns, self._factor(state.info, lasting), state.residual, self.block)
+        return state.belief.losses(state.effects.take(state.lasting), state.residual)
 
     def unchanged(self, state: State, key: Key) -> State:
         """Return the state refitted with the standing numbers of a cause held at their prior mean."""
@@ -360,73 +341,29 @@ class Later:
         at = self.prior.n_nominal + np.flatnonzero(own)
         if not len(at):
             return state
-        mean = Arrow.of(state.info, self.prior.structure).solve(state.moment)
-        info, moment = state.info.copy(), state.moment.copy()
-        tight = np.diag(self.gram)[at] / _FREE
-        info[at, at] += tight
-        moment[at] += tight * mean[at]
-        return self.fit(state.model, state.theta, info, moment)
+        return self.fit(state.model, state.theta, state.belief.held(at))
 
-    def freed(self, info: Array, moment: Array, effect: Effect) -> tuple[Array, Array]:
-        """Return the prior free along base parameters that the effect moves by unknown numbers."""
+    def freed(self, belief: Belief, effect: Effect) -> Belief:
+        """Return the belief free along base parameters that the effect moves by unknown numbers."""
         directions = effect.moving(self.dataset.arm)
         if directions is None or not directions.shape[1]:
-            return info, moment
+            return belief
         kept = list(self.dataset.model.columns.kept)
-        along = np.zeros((len(info), directions.shape[1]))
+        along = np.zeros((self.base.width, directions.shape[1]))
         along[: len(kept)] = directions[kept] * self.prior.scale[: len(kept), None]
         along = along[:, np.linalg.norm(along, axis=0) > 0.0]
-        along = along / np.linalg.norm(along, axis=0)
-        side = info @ along
-        inner = along.T @ side
-        inner = inner + _FREE * np.trace(inner) * np.eye(len(inner))
-        free = info - side @ np.linalg.solve(inner, side.T)
-        free = 0.5 * (free + free.T)
-        return free, free @ Arrow.of(info, self.prior.structure).solve(moment)
-
-    def information(self, state: State) -> Array:
-        """Return P (k, k) of nominal and standing numbers and those of the effects, of unit columns."""
-        return self._information(state.info, state.effects)
+        return belief.freed(along / np.linalg.norm(along, axis=0))
 
     def slopes(self, state: State) -> tuple[Table, list[tuple[int, int, str]]]:
         """Return the slopes by the numbers of the effects in their own units, and their names."""
         return self._slopes(state.model)
 
-    def _exact(self, model: Exact) -> tuple[Table, Array]:
-        """Return B and B Bᵀ where a drive passes on more, or less, than the torque of its joint."""
+    def _exact(self, belief: Belief, model: Exact) -> Belief:
+        """Return the belief where a drive passes on more, or less, than the torque of its joint."""
         nominal = self.rows.mixed(model)
         if nominal is None:
-            return self.base, self.gram
-        first = self.prior.n_nominal
-        standing = self.base.take(np.arange(first, self.base.width))
-        base = Table.stacked([nominal.scaled(1.0 / self.prior.scale), standing])
-        gram = self.gram.copy()
-        gram[:first] = base.take(np.arange(first)).gram(base)
-        gram[:, :first] = gram[:first].T
-        return base, gram
-
-    def _information(
-        self,
-        info: Array,
-        effects: Table,
-        base: Table | None = None,
-        gram: Array | None = None,
-        damping: float = _RIDGE,
-    ) -> Array:
-        across = (self.base if base is None else base).gram(effects)
-        own = effects.gram(effects) + damping * np.eye(effects.width)
-        return np.block([[info + (self.gram if gram is None else gram), across], [across.T, own]])
-
-    def _factor(
-        self,
-        info: Array,
-        effects: Table,
-        base: Table | None = None,
-        gram: Array | None = None,
-        damping: float = _RIDGE,
-    ) -> Arrow:
-        wider = self.prior.structure.wider(effects.width)
-        return Arrow.of(self._information(info, effects, base, gram, damping), wider)
+            return belief
+        return belief.exactly(nominal.scaled(1.0 / self.prior.scale))
 
     @property
     def _none(self) -> tuple[Table, list[tuple[int, int, str]]]:
@@ -444,9 +381,6 @@ class Later:
         return tuple(
             y - t - s for y, t, s in zip(self.y, torque, self.base.times(standing), strict=True)
         )
-
-    def _cost(self, residual: tuple[Array, ...], theta: Array, info: Array, moment: Array) -> float:
-        return float(sum(r @ r for r in residual) + theta @ info @ theta - 2.0 * moment @ theta)
 
 
 def _unit(lengths: Array) -> Array:

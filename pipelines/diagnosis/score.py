@@ -1,6 +1,6 @@
 """Compare models by how they predict blocks of time: the model confidence set.
 
-    block_losses(columns, info, residual, block)   of each block, predicted from all others
+    Blocks.of(columns, info, block).losses(residual)   of each block, predicted from all others
     log_scores(losses, rows)            of each block, its noise level unknown
     confidence_set({key: scores})       the models that the data do not tell from the best
     probabilities({key: scores})        how probable each is
@@ -15,6 +15,8 @@ Hansen, Lunde & Nason 2011, statistic T_max, with a moving-block bootstrap (Kün
 from __future__ import annotations
 
 from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -24,7 +26,7 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.table import Array, Indices, Table
 
 __all__ = [
-    "block_losses",
+    "Blocks",
     "chi2_bound",
     "confidence_set",
     "log_scores",
@@ -37,35 +39,59 @@ K = TypeVar("K", bound=Hashable)
 _SEED = 1
 
 
-def block_losses(
-    columns: Table, info: Arrow, residual: Sequence[Array], block: Sequence[Indices]
-) -> Array:
-    """Return the squared error (blocks,) of each block of rows, predicted from all other blocks.
+@dataclass(frozen=True, eq=False)
+class Blocks:
+    """What predicts each block of rows from all others, by the numbers of some columns.
 
-    Args:
-        columns: J, slopes by the k numbers.
-        info: factor of P (k, k), of all rows and the prior.
-        residual: of each joint's rows.
-        block: number of the block, of each joint's rows.
+    I - J_bᵀ P⁻¹ J_b = D - Uᵀ U: D of each joint and its own numbers, U (s, rows) of the shared ones;
+    its inverse is D⁻¹ + D⁻¹Uᵀ (I - U D⁻¹Uᵀ)⁻¹ U D⁻¹ (Woodbury).
     """
-    whole = [info.whitened(columns, j) for j in range(len(residual))]
-    count = 1 + max(int(b.max()) for b in block if len(b))
-    order = [np.argsort(b, kind="stable") for b in block]
-    edges = [np.searchsorted(b[o], np.arange(count + 1)) for b, o in zip(block, order, strict=True)]
-    out = np.zeros(count)
-    for b in range(count):
-        rows = [o[e[b] : e[b + 1]] for o, e in zip(order, edges, strict=True)]
-        r = np.concatenate([v[own] for v, own in zip(residual, rows, strict=True)])
-        shared = np.concatenate(
-            [w[:, own] for (_, w), own in zip(whole, rows, strict=True)], axis=1
-        )
-        inner, first = np.eye(len(r)) - shared.T @ shared, 0
-        for (w, _), own in zip(whole, rows, strict=True):
-            at = slice(first, first := first + len(own))
-            inner[at, at] -= w[:, own].T @ w[:, own]
-        error = np.linalg.solve(inner, r)
-        out[b] = float(error @ error)
-    return out
+
+    rows: tuple[tuple[Indices, ...], ...]  # of each block, of each joint
+    own: tuple[tuple[Array, ...], ...]  # D⁻¹
+    shared: tuple[Array, ...]  # U, of each joint
+
+    @classmethod
+    def of(cls, columns: Table, info: Arrow, block: Sequence[Indices]) -> Blocks:
+        """Return the blocks of rows.
+
+        Args:
+            columns: J, slopes by the k numbers.
+            info: factor of P (k, k), of all rows and the prior.
+            block: number of the block, of each joint's rows.
+        """
+        count = 1 + max(int(b.max()) for b in block if len(b))
+        rows, inverse, shared = [], [], []
+        for j, b in enumerate(block):
+            order = np.argsort(b, kind="stable")
+            edges = np.searchsorted(b[order], np.arange(count + 1))
+            rows.append(tuple(order[slice(*e)] for e in pairwise(edges)))
+            own, among = info.whitened(columns, j)
+            parts = (own[:, at] for at in rows[-1])
+            inverse.append(tuple(np.linalg.inv(np.eye(w.shape[1]) - w.T @ w) for w in parts))
+            shared.append(among)
+        return cls(tuple(zip(*rows, strict=True)), tuple(zip(*inverse, strict=True)), tuple(shared))
+
+    def losses(self, residual: Sequence[Array], more: Sequence[Array] | None = None) -> Array:
+        """Return the squared error (blocks,) of each block, predicted from all other blocks.
+
+        Args:
+            residual: of each joint's rows.
+            more: (m, rows of each joint) further rows of U.
+        """
+        both = self.shared
+        if more is not None:
+            both = tuple(np.concatenate(one) for one in zip(both, more, strict=True))
+        out = np.zeros(len(self.rows))
+        for b, (rows, inverse) in enumerate(zip(self.rows, self.own, strict=True)):
+            u = [w[:, at] for w, at in zip(both, rows, strict=True)]
+            plain = [d @ r[at] for d, r, at in zip(inverse, residual, rows, strict=True)]
+            through = [w @ d for w, d in zip(u, inverse, strict=True)]
+            inner = np.eye(len(u[0])) - sum(t @ w.T for t, w in zip(through, u, strict=True))
+            c = np.linalg.solve(inner, sum(w @ p for w, p in zip(u, plain, strict=True)))
+            error = [p + c @ t for p, t in zip(plain, through, strict=True)]
+            out[b] = sum(float(e @ e) for e in error)
+        return out
 
 
 def log_scores(losses: Array, rows: Array) -> Array:

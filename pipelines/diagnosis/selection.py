@@ -300,10 +300,10 @@ def _candidate(
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
     start = np.zeros(max(len(amplitudes), _width(later, effect)))
     start[: len(amplitudes)] = amplitudes
-    info, moment = later.freed(state.info, state.moment, effect)
+    belief = later.freed(state.belief, effect)
     model = state.model.with_effect(effect, start, log=log)
     try:
-        fits = [later.fit(one, state.theta, info, moment) for one in (model, *_plainer(model))]
+        fits = [later.fit(one, state.theta, belief) for one in (model, *_plainer(model))]
     except np.linalg.LinAlgError:
         return None
     fitted = min(fits, key=lambda one: one.cost)
@@ -394,7 +394,7 @@ def _backward(
             place += 1
             continue
         model = end.model.without(place)
-        without = later.fit(model, end.theta, end.info, end.moment)
+        without = later.fit(model, end.theta, end.belief)
         scores = {"with": _scores(later, end), "without": _scores(later, without)}
         if "without" in confidence_set(scores, config):
             causes, end, place = [c for k, c in enumerate(causes) if k != place], without, 0

@@ -102,5 +102,5 @@ class Table:
         return out
 
     def times(self, coefficients: Array) -> tuple[Array, ...]:
-        """Return Aᵀ c, one array of rows for each joint."""
-        return tuple(coefficients[i] @ v for i, v in zip(self.index, self.values, strict=True))
+        """Return cᵀ A of coefficients (k,) or (k, m), an array (…, rows) for each joint."""
+        return tuple(coefficients[i].T @ v for i, v in zip(self.index, self.values, strict=True))

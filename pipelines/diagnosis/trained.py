@@ -107,7 +107,7 @@ class Trained:
         columns = Table.stacked([self.later.base, state.effects]).take(lasting)
         own = _fitted(self.later, state, done.names)
         slopes = (done.slopes[own] / size[:, None])[lasting]
-        info = self.later.information(state)[np.ix_(lasting, lasting)]
+        info = state.belief.information(state.effects)[np.ix_(lasting, lasting)]
         block, left = done.data.blocks(self.blocks), done.left.copy()
         parts = [block[done.data.joint == j] for j in range(done.data.n_joints)]
         for b in range(int(block.max()) + 1):
@@ -158,9 +158,9 @@ def _chain(own: Later, causes: Sequence[Named]) -> list[State]:
     states = [own.start()]
     for one in causes:
         before = states[-1]
-        info, moment = own.freed(before.info, before.moment, one.effect)
+        belief = own.freed(before.belief, one.effect)
         model = replace(before.model, effects=(*before.model.effects, one))
-        states.append(own.fit(model, before.theta, info, moment))
+        states.append(own.fit(model, before.theta, belief))
     return states
 
 
@@ -208,7 +208,7 @@ def covariance(later: Later, state: State) -> Array:
     slopes, _ = later.slopes(state)
     size = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
     columns = Table.stacked([later.base, state.effects])
-    white = np.linalg.inv(later.information(state))
+    white = state.factor.solve(np.eye(columns.width))
     count = len(later.block_rows)
     scores = np.zeros((columns.width, count))
     for j, (index, values) in enumerate(zip(columns.index, columns.values, strict=True)):

@@ -8,7 +8,7 @@ import pytest
 from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.score import block_losses, confidence_set
+from pipelines.diagnosis.score import Blocks, confidence_set
 from pipelines.diagnosis.screening import screen
 from pipelines.diagnosis.table import Array, Table, by_joint
 
@@ -66,12 +66,9 @@ def test_a_block_is_predicted_as_by_a_fit_without_it(rng: np.random.Generator) -
     block = np.tile(np.repeat(np.arange(4), _ROWS // _JOINTS // 4), _JOINTS)
     _, theta = _least_cost(base, y, info)
     table = Table.of(base, joint, _JOINTS)
-    losses = block_losses(
-        table,
-        Arrow.of(info + table.gram(table), Structure.of(table)),
-        by_joint(y - base.T @ theta, joint, _JOINTS),
-        [block[joint == j] for j in range(_JOINTS)],
-    )
+    factor = Arrow.of(info + table.gram(table), Structure.of(table))
+    blocks = Blocks.of(table, factor, [block[joint == j] for j in range(_JOINTS)])
+    losses = blocks.losses(by_joint(y - base.T @ theta, joint, _JOINTS))
     for b in range(4):
         _, without = _least_cost(base[:, block != b], y[block != b], info)
         left = y[block == b] - base[:, block == b].T @ without
