@@ -24,10 +24,9 @@ from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import (
     fit_columns,
     fit_nominal,
-    rigid_rows,
     rows_of,
 )
-from pipelines.model.diagnosis.fitted.slopes import slopes_of
+from pipelines.model.diagnosis.fitted.slopes import further_slopes
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.kept import Kept
 from pipelines.model.diagnosis.rows.whitening import Whitening
@@ -138,14 +137,9 @@ class Rows:
         At the joint of an effect the shape of the friction law is one of them: fitted without the
         effect, it has taken some of it.
         """
-        every, names = slopes_of(model, self.data, rigid_rows(self.data, model.columns))
-        first, joints = len(model.beta), {one.effect.joint for one in model.effects}
-        places = [
-            k
-            for k, (of_effect, place, _) in enumerate(names)
-            if of_effect or model.columns.laws[place].joint in joints
-        ]
-        return self.table(every[[first + k for k in places]]), [names[k] for k in places]
+        joints = {one.effect.joint for one in model.effects}
+        every, names = further_slopes(model, self.data, joints)
+        return self.table(every), names
 
     def blocks(self, length: float) -> tuple[Indices, ...]:
         """Return the block of `length` [s] that each row belongs to, of each joint."""

@@ -61,7 +61,7 @@ class State:
     def slope(self) -> Array:
         """(k,) of -cost / 2 by all numbers."""
         own = self.belief.slope(self.theta, self.residual)
-        return np.r_[own, self.effects.moments(self.residual)]
+        return np.asarray(np.r_[own, self.effects.moments(self.residual)])
 
     @cached_property
     def factor(self) -> Arrow:

@@ -8,7 +8,7 @@ effect are differences of the torque.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from pipelines.model.diagnosis.fitted.record import recorded
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.rigid.body import Motion
 
-__all__ = ["Which", "slopes_of"]
+__all__ = ["Which", "further_slopes", "slopes_of"]
 
 Which = tuple[int, int, str]  # 0 a law, 1 an effect; its place; the number of an amplitude, or the name of a shape
 
@@ -33,11 +33,44 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
     Args:
         laid: as `model.laid(data)` makes it, where it is known.
     """
-    if any(one.effect.acts_on == "record" for one in model.effects):
-        return _slopes_through(model, data)
-    laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
+    further, names = further_slopes(model, data, range(1, data.n_joints + 1), laid)
+    if not _through(model):
+        laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
+        return np.concatenate([rigid, *laws, further]), names
+    columns, arm, kept = model.columns, model.arm, list(model.columns.kept)
+
+    def linear(motion: Motion) -> Array:
+        own = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
+        return recorded(arm, np.concatenate([own, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion)
+
+    return np.concatenate([data.lay(linear), further]), names
+
+
+def further_slopes(
+    model: Exact, data: Data, joints: Container[int | None], laid: Sequence[Array] | None = None
+) -> tuple[Array, list[Which]]:
+    """Return the slopes (numbers, rows) by all that is not a base parameter, and which they are.
+
+    Args:
+        joints: of whose friction laws the shapes are among them.
+    """
+    laws = model.columns.laws
     bent, which = law_slopes(data, model.columns, model.beta)
-    names = [(0, place, name) for place, name in which]
+    own = [k for k, (place, _) in enumerate(which) if laws[place].joint in joints]
+    bent, names = [bent[k] for k in own], [(0, *which[k]) for k in own]
+    make = _slopes_through if _through(model) else _slopes_beside
+    more = make(model, data, bent, names, laid)
+    return np.concatenate([np.zeros((0, data.rows)), *more]), names
+
+
+def _through(model: Exact) -> bool:
+    """Return whether all torque passes through an effect, a lag of the record."""
+    return any(one.effect.acts_on == "record" for one in model.effects)
+
+
+def _slopes_beside(
+    model: Exact, data: Data, bent: list[Array], names: list[Which], laid: Sequence[Array] | None
+) -> list[Array]:
     more, core = list(bent), model.core
     here = model.core_torque(data, core) if core else np.zeros(0)
     whole = any(one.effect.acts_on in ("encoder", "drive") for one in model.effects)
@@ -65,7 +98,7 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
             if law in names:
                 torque = _with(model, data, place, core, [number_moved(one, name, _DIFFERENCE)])[0]
                 more[names.index(law)] = more[names.index(law)] + (torque - alone)[None] / _DIFFERENCE
-    return np.concatenate([rigid, *laws, *more]), names
+    return more
 
 
 def _with(model: Exact, data: Data, place: int, core: int, moved: Sequence[Named]) -> list[Array]:
@@ -81,13 +114,10 @@ def _is_nothing(one: Named, name: str) -> bool:
     return name.isdigit() and one.amplitudes[int(name)] == 0.0
 
 
-def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
-    """The same where all torque passes through an effect, a lag of the record: what is linear passes as well."""
-    columns, arm, kept = model.columns, model.arm, list(model.columns.kept)
-
-    def linear(motion: Motion) -> Array:
-        rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
-        return recorded(arm, np.concatenate([rigid, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion)
+def _slopes_through(
+    model: Exact, data: Data, bent: list[Array], names: list[Which], laid: Sequence[Array] | None
+) -> list[Array]:
+    arm = model.arm
 
     def alone(one: Named) -> Array:
         return data.lay_each(lambda log, motion: recorded(
@@ -96,7 +126,6 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
 
     here = model.torque(data)
     as_read = not any(one.effect.acts_on in ("encoder", "drive") for one in model.effects)
-    names = [(0, place, name) for place, name in law_slopes(data, columns, model.beta)[1]]
     more = [_of_law(model, data, here, one) for one in names]
     for place, one in enumerate(model.effects):
         for name, size in _steps(one):
@@ -107,7 +136,7 @@ def _slopes_through(model: Exact, data: Data) -> tuple[Array, list[Which]]:
             else:
                 effects = (*model.effects[:place], there, *model.effects[place + 1:])
                 more.append((replace(model, effects=effects).torque(data) - here)[None] / size)
-    return np.concatenate([data.lay(linear), *more]), names
+    return more
 
 
 def _of_law(model: Exact, data: Data, here: Array, law: Which) -> Array:
