@@ -10,12 +10,12 @@ import numpy as np
 from pipelines.diagnosis.baseline import Baseline, baseline
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.dataset import Dataset, load
+from pipelines.diagnosis.dataset import Dataset, Rows, load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.prior import prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.selection import Selection, select
-from pipelines.diagnosis.table import Array
+from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
@@ -47,14 +47,21 @@ class Look:
         """Return the causes in rows that no noise is known of, beside those found before."""
         found = None if before is None else before.selection
         cause = None if found is None else _torque(rough, found.end.model)
-        dataset, dictionary = settle(rough, every, config, cause)
-        if before is not None and dataset.reference is not None:  # it is what it was
+        same = None if before is None else before.reference
+        dataset, dictionary = settle(rough, every, config, cause, same)
+        if before is not None and same is not None:  # the reference is what it was
             prior, known = before.later.prior, before.baseline
         else:
             prior = prior_of(dataset, dictionary, config)
             known = baseline(dataset, dictionary, prior, config)
         later = Later.of(dataset, dictionary, prior, config)
         return cls(later, known, select(later, known, responses, config, found))
+
+    @property
+    def reference(self) -> tuple[Rows, Table] | None:
+        """The rows and columns of the reference."""
+        rows, columns = self.later.dataset.reference, self.later.dictionary.reference
+        return None if rows is None or columns is None else (rows, columns)
 
 
 def _torque(rough: Dataset, model: Exact) -> Array:

@@ -102,7 +102,11 @@ def _family(group: Group) -> tuple[str, int | None]:
 
 
 def settle(
-    dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig, cause: Array | None = None
+    dataset: Dataset,
+    dictionary: Dictionary,
+    config: DiagnosisConfig,
+    cause: Array | None = None,
+    reference: tuple[Rows, Table] | None = None,
 ) -> tuple[Dataset, Dictionary]:
     """Return the rows of each session whitened, in units of its own noise, and their columns.
 
@@ -112,6 +116,7 @@ def settle(
 
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
+        reference: rows and columns of the reference that were settled before.
     """
 
     alone = dataset.reference is None
@@ -133,7 +138,7 @@ def settle(
     dataset = replace(dataset, later=cleared.less(None), cleared=cleared)
     if dataset.reference is None or dictionary.reference is None:
         return dataset, replace(dictionary, later=table)
-    before, known = settled(dataset.reference, dictionary.reference)
+    before, known = reference or settled(dataset.reference, dictionary.reference)
     return (
         replace(dataset, reference=before),
         replace(dictionary, later=table, reference=known),
