@@ -137,7 +137,7 @@ class Arrow:
         structure, block, w = self.structure, self.blocks[joint], self.across[joint]
         place = np.full(table.width, -1, dtype=np.intp)
         place[table.index[joint]] = np.arange(len(table.index[joint]))
-        values = table.values[joint]
+        values = np.asarray(table.values[joint], dtype=np.float64)
         own = _forward(block, values[place[structure.own[joint]]])
         there = place[structure.shared] >= 0
         shared = np.zeros((len(structure.shared), values.shape[1]))

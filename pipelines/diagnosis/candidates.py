@@ -136,7 +136,7 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
         shapes, width, _ = laid.table.shape
         columns = np.zeros((shapes * width, rows.count))
         columns[:, laid.rows] = laid.table.reshape(shapes * width, -1)
-        parts.append(rows.table(columns))
+        parts.append(rows.table(columns).compact())
         for k in range(shapes):
             number = laid.first + k
             groups.append(
@@ -240,7 +240,7 @@ def _lay_unnamed(rows: Rows, key: Key, make: Make, groups: list[Group], parts: l
         out[:, j] = own
         return out
 
-    part = rows.table(rows.data.lay(on_joint))
+    part = rows.table(rows.data.lay(on_joint)).compact()
     first = sum(one.width for one in parts)
     standing = key[0].split()[0] in ("ripple", "friction")
     groups.append(Group(key, 0, first, part.width, standing, "unnamed"))

@@ -28,6 +28,7 @@ from pipelines.model.effects import find_effect
 __all__ = ["Prior", "prior_of"]
 
 _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot be seen in 1e5 rows
+_PARTS = 8  # numerics: of the known logs at most, of which splits are made
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
     scale = np.where(rows.nominal.norms > 0.0, rows.nominal.norms, 1.0)
     columns, first = dictionary.standing(), len(scale)
     table = Table.stacked([rows.nominal.scaled(1.0 / scale), dictionary.known.take(columns)])
-    parts = _halves(dataset)
+    parts = _parts(dataset)
     grams = np.array([table.gram(table, part) for part in parts])
     moments = np.array([table.moments(rows.y, part) for part in parts])
     structure = Structure.of(table)
@@ -158,15 +159,18 @@ def _rubs(group: Group) -> bool:
     return effect.friction or "sharpness" in effect.shared
 
 
-def _halves(dataset: Dataset) -> tuple[tuple[np.ndarray, ...], ...]:
-    """Return the first and the second half of each known log, as masks of each joint's rows."""
+def _parts(dataset: Dataset) -> tuple[tuple[np.ndarray, ...], ...]:
+    """Return masks of each joint's rows, of parts of the known logs.
+
+    The first and the second half of each log, dealt to as many parts as are compared at most.
+    """
     data = dataset.known.data
-    out = []
+    half = np.zeros(data.rows, dtype=np.intp)
     for k in range(len(data.logs)):
         own = data.log_of == k
-        late = data.t > np.median(data.t[own])
-        out += [
-            tuple((own & (late == half))[data.joint == j] for j in range(data.n_joints))
-            for half in (False, True)
-        ]
-    return tuple(out)
+        half[own] = 2 * k + (data.t[own] > np.median(data.t[own]))
+    count = min(2 * len(data.logs), _PARTS)
+    return tuple(
+        tuple((half % count == part)[data.joint == j] for j in range(data.n_joints))
+        for part in range(count)
+    )

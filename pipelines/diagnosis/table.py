@@ -30,7 +30,7 @@ class Table:
 
     width: int  # number of columns
     index: tuple[Indices, ...]  # of each joint, which columns act on it
-    values: tuple[Array, ...]  # of each joint (columns there, rows there)
+    values: tuple[npt.NDArray[np.floating], ...]  # of each joint (columns there, rows there)
 
     @classmethod
     def of(cls, columns: Array, joint: Indices, n_joints: int) -> Table:
@@ -76,12 +76,16 @@ class Table:
             tuple(v * scale[i, None] for v, i in zip(self.values, self.index, strict=True)),
         )
 
+    def compact(self) -> Table:
+        """Return the columns in single precision: of candidates there are many."""
+        return Table(self.width, self.index, tuple(v.astype(np.float32) for v in self.values))
+
     @property
     def norms(self) -> Array:
         """(k,) Euclidean length of each column."""
         total = np.zeros(self.width)
         for index, values in zip(self.index, self.values, strict=True):
-            total[index] += np.einsum("ij,ij->i", values, values)
+            total[index] += np.einsum("ij,ij->i", values, values, dtype=np.float64)
         return np.asarray(np.sqrt(total))
 
     def gram(self, other: Table, part: Parts | None = None) -> Array:
@@ -90,6 +94,7 @@ class Table:
         for j, (a, b) in enumerate(zip(self.values, other.values, strict=True)):
             if len(self.index[j]) and len(other.index[j]):
                 mine, theirs = (a, b) if part is None else (a[:, part[j]], b[:, part[j]])
+                mine = mine.astype(np.float64, copy=False)
                 out[np.ix_(self.index[j], other.index[j])] += mine @ theirs.T
         return out
 

@@ -131,7 +131,7 @@ def settle(
             left = [y - t for y, t in zip(rows.y, both.times(numbers), strict=True)]
             left = _less_events(rows, dictionary, dataset.arm, left) if alone else left
             white, through = rows.whitened(left, config.noise_bins)
-            columns = through(table)
+            columns = through(table).compact()
         return white, columns
 
     cleared, table = settled(dataset.later.less(cause), dictionary.later)

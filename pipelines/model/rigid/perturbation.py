@@ -21,6 +21,7 @@ Torque = Callable[[Motion], Array]
 
 _STEP = 1e-6  # [rad], [rad/s] and, thousandfold, [rad/s^2]: far below what friction's sharpness resolves, far above rounding
 _ROUNDS = 3  # each leaves what is of higher order in the deflection
+_SETTLED = 1e-6  # of the deflection: less is no correction
 _LEAST = 0.1  # of the inertia that a joint feels: what stays beyond its spring at least
 
 
@@ -87,6 +88,8 @@ def deflection(torque: Torque, motion: Motion, index: int, stiffness: float, dam
         left = stiffness * x + damping * rate + tau + inertia * (second if base else own + second)
         more = oscillation(motion.t, mass, drag, spring, -left)
         x, rate, second = (a + b for a, b in zip((x, rate, second), more, strict=True))
+        if np.abs(more[0]).max(initial=0.0) < _SETTLED * np.abs(x).max(initial=0.0):
+            break
     return x, rate, second
 
 
