@@ -88,8 +88,12 @@ def answer(
     trained = train(prepared, found.look.later, named_effects, blocks, standing)
     worth = weigh(prepared, trained, standing.floor, whole)
     last, floor = len(causes), worth.floor
-    rounds = {one.cause.key: one for one in found.look.selection.rounds if one.cause is not None}
-    named_causes = [(one.probability[one.key], alternatives_of(rounds[one.key])) for one in causes]
+    rounds = found.look.selection.rounds
+    own = [next(one for one in rounds if one.cause is cause) for cause in causes]
+    named_causes = [
+        (cause.probability[cause.key], alternatives_of(one))
+        for cause, one in zip(causes, own, strict=True)
+    ]
     findings = findings_of(worth, found.look.later, end, named_causes, found.responses)
     limits = limits_of(found.look.later, end, found.look.baseline) if whole else Limits((), ())
     open_to = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))

@@ -30,48 +30,82 @@ def decide(
 ) -> Decision:
     """Return the verdict by significance and goodness of fit.
 
-    Causes lose their names where they explain less than half of what is more than noise.
+    Causes lose their names where they explain less than half of what is more than noise at the
+    joints on which they act. What is left at others is told beside them.
     """
-    rows, causes = later.rows.count, selection.causes
-    first, last = selection.start.cost / rows, selection.end.cost / rows
-    gained = max(selection.explained / rows, 1e-12)
-    left = selection.end.mean_squares * later.dataset.noise_ratio
+    causes, end = selection.causes, selection.end
+    left = end.mean_squares * later.dataset.noise_ratio
     bound = max(config.excess * max(1.0, baseline.usual_fit), baseline.worst_fit)
-    missing, followed = _missing(later, selection.end, config), _followed(later, selection, config)
-    fits = bool(max(float(left.max()), last) < bound)
-    power = np.array([float(y @ y) for y in later.rows.y])
-    excess = max(
-        0.0 if fits else first - baseline.usual_fit, gained + float(missing**2 @ power) / rows
-    )
-    explained = gained / excess if causes else 0.0
-    if causes and explained < config.share:
-        return Decision(
-            "unknown",
-            f"{causes[0].key[0]} explains {explained:.0%} of the excess residual",
-            (),
-        )
-    if causes and causes[0].alternatives:
-        return Decision("unknown", "several causes explain it", causes)
+    missing = _missing(later, end, config)
+    rest = _rest(later, selection, missing, left, bound, config)
     if causes:
-        return Decision("cause", "", causes)
-    if selection.stopped and (missing.any() or followed or not fits):
-        return Decision("unknown", selection.stopped, ())
+        power = np.array([float(y @ y) for y in later.rows.y])
+        too_much = np.where(left < bound, 0.0, left - baseline.usual_fit) * _counts(end)
+        beyond = np.maximum(missing**2 * power, too_much)
+        strained = end.cost / later.rows.count >= bound
+        explained = _explained(later, selection, beyond, strained)
+        if explained < config.share:
+            reason = f"{causes[0].key[0]} explains {explained:.0%} of the excess residual"
+            return Decision("unknown", reason, ())
+        if causes[0].alternatives:
+            return Decision("unknown", "several causes explain it", causes)
+        return Decision("cause", f"beside it, {rest}" if rest else "", causes)
+    fits = max(float(left.max()), end.cost / later.rows.count) < bound
+    if not rest and fits:
+        return Decision("no-fault-found", "", ())
+    return Decision("unknown", selection.stopped or rest or _too_large(left, bound), ())
+
+
+def _counts(state: State) -> Array:
+    """(joints,) rows of each."""
+    return np.array([len(r) for r in state.residual], dtype=np.float64)
+
+
+def _explained(later: Later, selection: Selection, beyond: Array, strained: bool) -> float:
+    """Return the share that causes explain of what is more than noise where they act.
+
+    Args:
+        beyond: (joints,) squared residual that is more than noise, and left.
+        strained: what the prior says against the numbers is more than usual.
+    """
+    start, end = selection.start, selection.end
+    acting = later.acting(end)
+    weight = acting / max(float(acting.max()), 1e-12) if acting.any() else np.ones(len(acting))
+    gained = np.maximum((start.mean_squares - end.mean_squares) * _counts(end), 0.0)
+    before, after = (one.cost - one.rss for one in (start, end))
+    taken = float(weight @ gained) + max(before - after, 0.0)
+    rest = float(weight @ beyond) + (after if strained else 0.0)
+    return taken / max(taken + rest, 1e-12)
+
+
+def _rest(
+    later: Later,
+    selection: Selection,
+    missing: Array,
+    left: Array,
+    bound: float,
+    config: DiagnosisConfig,
+) -> str:
+    """Return what the model leaves that is more than noise; "" where it is none."""
     more = f"; it follows {selection.follows}" if selection.follows else ""
     if missing.any():
-        reason = (
+        return (
             f"{missing.max():.1%} of the torque of joint {int(missing.argmax()) + 1} comes again "
             f"with the motion, and no cause explains it{more}"
         )
-        return Decision("unknown", reason, ())
-    if followed:
-        return Decision("unknown", followed, ())
-    if not fits:
-        reason = (
-            f"the mean square residual is {left.max():.2f} of the noise at joint "
-            f"{int(left.argmax()) + 1}, where {bound:.2f} is usual at most{more}"
-        )
-        return Decision("unknown", reason, ())
-    return Decision("no-fault-found", "", ())
+    followed = _followed(later, selection, config)
+    if followed or left.max() < bound:
+        return followed
+    return _too_large(left, bound) + more
+
+
+def _too_large(left: Array, bound: float) -> str:
+    if left.max() < bound:
+        return "the numbers of the model are further from the reference than is usual"
+    return (
+        f"the mean square residual is {left.max():.2f} of the noise at joint "
+        f"{int(left.argmax()) + 1}, where {bound:.2f} is usual at most"
+    )
 
 
 def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
