@@ -221,8 +221,14 @@ class Dataset:
         if level is None:
             return np.ones(later.n_joints)
         usual = level.at(later.speed, later.joint)
-        power = np.bincount(later.joint, later.weight**-2)
-        return np.asarray(power / np.bincount(later.joint, usual**2))
+        power = np.bincount(later.joint, usual**2) / np.bincount(later.joint)
+        return np.asarray(self.noise_power / power)
+
+    @property
+    def noise_power(self) -> Array:
+        """(joints,) [(N m)²] variance of the later rows' noise."""
+        later = self.later
+        return np.asarray(np.bincount(later.joint, later.weight**-2) / np.bincount(later.joint))
 
 
 def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:

@@ -26,6 +26,9 @@ from pipelines.model.diagnosis.given.compliance import Compliance, compliance, n
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
+_LOOKS = 4  # numerics: after the first, at most
+_SETTLED = 0.1  # numerics: ln of the power of a joint's noise, by which a further look changes nothing
+
 
 @dataclass(frozen=True, eq=False)
 class Look:
@@ -38,18 +41,15 @@ class Look:
     @classmethod
     def of(
         cls,
-        rough: Dataset,
-        every: Dictionary,
+        dataset: Dataset,
+        dictionary: Dictionary,
         responses: Sequence[Acting],
         config: DiagnosisConfig,
         before: Look | None = None,
     ) -> Look:
-        """Return the causes in rows that no noise is known of, beside those found before."""
+        """Return the causes in rows whose noise is known, beside those found before."""
         found = None if before is None else before.selection
-        cause = None if found is None else _torque(rough, found.end.model)
-        same = None if before is None else before.reference
-        dataset, dictionary = settle(rough, every, config, cause, same)
-        if before is not None and same is not None:  # the reference is what it was
+        if before is not None and dataset.reference is not None:  # it is what it was
             prior, known = before.later.prior, before.baseline
         else:
             prior = prior_of(dataset, dictionary, config)
@@ -113,12 +113,17 @@ def diagnose_prepared(
     every = Dictionary.of(rough, config, exclude)
     responses = compliance(rough.frf, rough.model.nominal, exclude)
     named = _new(responses, rough, prepared, exclude)
-    last = found = Look.of(rough, every, named, config)
-    while last.selection.causes:  # what these leave tells the noise, and what is typical
-        last = Look.of(rough, every, named, config, found)
-        if len(last.selection.causes) <= len(found.selection.causes):
+    last, known = Look.of(*settle(rough, every, config), named, config), 0
+    for _ in range(_LOOKS):  # what the causes leave tells the noise, and what is typical
+        found, causes = last.later.dataset, len(last.selection.causes)
+        if not causes:
             break
-        found = last
+        torque = _torque(rough, last.selection.end.model)
+        dataset, dictionary = settle(rough, every, config, torque, last.reference)
+        change = np.abs(np.log(dataset.noise_power / found.noise_power)).max()
+        if change < _SETTLED and (found.reference is not None or causes == known):
+            break
+        last, known = Look.of(dataset, dictionary, named, config, last), causes
     decision = decide(last.later, last.selection, last.baseline, config)
     return Diagnosis(decision, last, responses, config)
 
