@@ -29,7 +29,7 @@ __all__ = ["Family", "Laid", "families", "lay_family", "place_of", "whole_motion
 Indices = npt.NDArray[np.intp]
 
 _AT_ONCE = 48  # columns
-_AWAY = 1e50  # beyond any unit: what is larger runs away, and its square, weighted and summed, is no number any more
+_AWAY = 1e12  # [N m]: what is larger runs away, and is no torque any more
 
 
 @dataclass(frozen=True)
