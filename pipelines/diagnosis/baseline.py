@@ -52,27 +52,20 @@ def baseline(
     excess: dict[str, list[float]] = {}
     largest: dict[str, Screened] = {}
     fits: list[float] = []
-    most: list[float] = []
     for before, after in _splits(len(prior.parts)):
         found, fit, rows = parts.compared(before, list(after))
         fits.append(fit)
-        most.append(-np.inf)
         for one in best_of(found).values():
             family = one.group.family
             if family not in largest or one.gain > largest[family].gain:
                 largest[family] = one
             bound = chi2_bound(config.alpha / families, one.freedom)
             excess.setdefault(family, []).append((one.gain - bound) / rows)
-            if one.group.kind != "compliance" and not one.group.reads_torque:
-                most[-1] = max(most[-1], excess[family][-1])
     bias = {
         family: max(0.0, upper_point(values, config.alpha)) for family, values in excess.items()
     }
     if dataset.reference is None:
         bias = _unlike(bias, largest, parts, dictionary.known)
-    else:  # other motion may show another family what this one has shown (Westfall & Young 1993)
-        any_family = upper_point(most, config.alpha)
-        bias = {family: max(value, any_family) for family, value in bias.items()}
     return Baseline(
         config.alpha, families, bias, upper_point(fits, config.alpha), float(np.median(fits))
     )

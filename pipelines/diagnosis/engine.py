@@ -27,7 +27,9 @@ from pipelines.model.diagnosis.given.compliance import Compliance, compliance, n
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
 _LOOKS = 4  # numerics: after the first, at most
-_SETTLED = 0.1  # numerics: ln of the power of a joint's noise, by which a further look changes nothing
+_SETTLED = (
+    0.1  # numerics: ln of the power of a joint's noise, by which a further look changes nothing
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -198,12 +198,12 @@ def _contest(
     better = {k: v for k, v in (scores | free).items() if v.sum() < without.sum()}
     if not any(one.key in better for one in tried):
         return None, None, fails
-    kept = confidence_set(better, config)
-    named = [one for one in tried if one.key in kept] or _nearly(
-        later, state, tried, others, config
-    )
+    kept, first = confidence_set(better, config), min(better, key=lambda key: better[key].sum())
+    named = [one for one in tried if one.key in kept]
+    if first in free or not named:
+        named = _nearly(later, state, tried, others, config)
     if not named:
-        return None, None, f"{_place(kept[0])} predicts better than {best}"
+        return None, None, f"{_place(first)} predicts better than {best}"
     pick = min(named, key=lambda one: scores[one.key].sum())
     unchanged = _scores(later, later.unchanged(state, pick.key))
     pays = confidence_set({"with": scores[pick.key], "without": unchanged}, config)
