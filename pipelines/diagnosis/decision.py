@@ -94,9 +94,15 @@ def _rest(
             f"with the motion, and no cause explains it{more}"
         )
     followed = _followed(later, selection, config)
-    if followed or left.max() < bound:
+    if followed:
         return followed
-    return _too_large(left, bound) + more
+    if left.max() >= bound:
+        return _too_large(left, bound) + more
+    slow = _wandering(later)
+    if slow.max() > config.misfit:
+        joint = int(slow.argmax()) + 1
+        return f"{slow.max():.1%} of the torque of joint {joint} wanders, whatever the motion is"
+    return ""
 
 
 def _too_large(left: Array, bound: float) -> str:
@@ -129,6 +135,22 @@ def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
     torque = np.array([float(np.mean(y**2)) for y in rows.y])
     share = np.sqrt(np.maximum(common - differing, 0.0) / torque)
     return np.where((common > bound * differing) & (share > config.misfit), share, 0.0)
+
+
+def _wandering(later: Later) -> Array:
+    """Return the share of each joint's torque (joints,) that its noise has for a whole block of time.
+
+    Noise of level σ whitened by A has the density σ² / A(1)² at the lowest frequencies: its means over
+    n rows have the variance σ² / (n A(1)²). With reference logs their noise is what is usual.
+    """
+    rows = later.rows
+    whitening = rows.data.logs[0].whitening
+    if later.dataset.reference is not None or whitening is None:
+        return np.zeros(rows.n_joints)
+    each = float(later.block_rows.mean()) / rows.n_joints
+    measured = np.concatenate([one.unwhitened for one in rows.data.logs], axis=1)
+    lasting = later.dataset.noise_power / (each * whitening.weights[:, -1].sum(axis=1) ** 2)
+    return np.asarray(np.sqrt(lasting / np.maximum(np.mean(measured**2, axis=1), 1e-300)))
 
 
 def _followed(later: Later, selection: Selection, config: DiagnosisConfig) -> str:
