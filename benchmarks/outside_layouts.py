@@ -171,7 +171,12 @@ def from_point_to_point(
 
 
 def simulate(
-    arm: Arm, seed: int, rate: float = 200.0, seconds: float = 12.0, how: str = "series"
+    arm: Arm,
+    seed: int,
+    rate: float = 200.0,
+    seconds: float = 12.0,
+    how: str = "series",
+    size: float = 1.0,
 ) -> Run:
     """Move the arm along a Fourier series, from point to point ("points") or joint by joint
     ("turns"); Pinocchio's inverse dynamics and friction make its torque."""
@@ -192,8 +197,9 @@ def simulate(
         c, s = np.cos(np.outer(at, w)), np.sin(np.outer(at, w))
         return c @ a + s @ b, (c * w) @ b - (s * w) @ a, -(c * w**2) @ a - (s * w**2) @ b
 
-    scale = reach / abs(series(t)[0]).max(axis=0)
+    scale = size * reach / abs(series(t)[0]).max(axis=0)
     q, dq, ddq = (x * scale for x in series(t))
+    centre = size * centre
     q, ahead, dq_ahead = (
         q + centre,
         series(t + 0.02)[0] * scale + centre,

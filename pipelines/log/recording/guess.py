@@ -13,6 +13,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -24,11 +25,8 @@ from pipelines.log.recording.clock_guess import SECONDS, unit_of_clock
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
-    LinkFit,
     Slope,
-    fit_of_links,
     held,
-    motion_of,
     position_unit,
     quarter_turns,
     sign_of,
@@ -36,6 +34,7 @@ from pipelines.log.recording.evidence import (
     torque_unit,
     velocity_unit,
 )
+from pipelines.log.recording.link_evidence import LinkFit, fits_by_unit
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.reading import (
     BY_FILE,
@@ -58,6 +57,8 @@ _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _USABLE = 0.8  # of the cells of a column that is looked at
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
+_ANGLES = ("rad", "deg", "rev")  # that positions without a unit may be in
+_NAMED = "as named"
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
@@ -171,6 +172,8 @@ class _Drafting:
                 self.t = reading.clock.values * factor
                 self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
         self.current = tau is not None and tau.quantity == "current"
+        self.fits: dict[str, LinkFit] = {}  # by the unit of the positions
+        self.fits = self._fits()
         self.links = self._links()
         self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
 
@@ -304,7 +307,8 @@ class _Drafting:
         if turning:
             slope = self.slope if self.t is not None else None  # decides the unit of angle once that of time is known
             joints = [self.joints[j] for j in turning] if self.joints else ()
-            guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints, group.side)
+            guess, further = position_unit(self.q[:, turning], slope, named[turning[0]], joints, group.side,
+                                           self.fits, self.reading.in_si)
             for j in turning:
                 said = named[j] or ""
                 units[j] = said if guess.value and (said in UNITS or said == "counts") else guess.value
@@ -344,8 +348,9 @@ class _Drafting:
         group, slope = self.reading.dq.group, self.slope
         if group is None or slope is None or self.t is None or self.q is None or not self.reading.q.group:
             return []
+        position = self.reading.q.group
         if any(joint.type != "revolute" for joint in self.joints) or self._out_of_order(group) or (
-                self.reading.q.group.order != group.order):
+                position.order != group.order or self._doubt("q", position, self.reading.tau.group) is not None):
             return []
         named = unit_of_group(group.columns, self.reading.table)[0]
         unit = velocity_unit(slope, self._position_units(self.reading.q.group)[0][0])
@@ -366,9 +371,13 @@ class _Drafting:
             return ""
         confirmed = links is not None and links.followed and not links.alone
         words = group.unknown - (other.unknown if other else frozenset())
-        if words and not confirmed and (signal == "tau" or self.slope is None):
+        if words and not (signal == "tau" and confirmed):
             return f"what does '{clean(min(words), 40)}' say of it?"
         named = any(unit_of_group(group.columns, self.reading.torque_table))
+        best = min(self.fits.values(), key=lambda fit: fit.left, default=None)
+        if best is not None and best.exchanged is not None:
+            first, second = (joint + 1 for joint in best.exchanged)
+            return f"the robot's own links agree far better with joints {first} and {second} exchanged: in which order are they?"
         if links is not None and not links.followed and (signal == "q" or not named):
             return ("torque and motion do not agree by the robot's own links: "
                     "other torques, or the order, unit or zero of the joints?")
@@ -408,21 +417,29 @@ class _Drafting:
             return Guess("", "unsure", f"{peak}, of a file named '{file}': a torque in N m, or a current in A?")
         return guess
 
-    def _links(self) -> LinkFit | None:
-        """Return how the torque follows from the motion by the robot's links; None where links or motion are unknown."""
+    def _fits(self) -> dict[str, LinkFit]:
+        """Return how the torque follows from the motion by the robot's links, for each unit the positions may be in."""
         q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
         if self.model is None or robot is None or group is None or q is None or self.tau is None or self.t is None:
-            return None
-        units = self._position_units(group)[0]
+            return {}
         turning = all(joint.revolute for joint in robot.joints)
-        if not turning or not set(units) <= UNITS.keys() or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
+        if not turning or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
+            return {}
+        named = self._position_units(group)[0]
+        said = any(unit_of_group(group.columns, self.reading.table))
+        units = {_NAMED: named} if said else {unit: [unit] * self.n for unit in _ANGLES}
+        if said and not set(named) <= UNITS.keys():
+            return {}
+        factors = {key: np.array([UNITS[unit].factor for unit in each]) for key, each in units.items()}
+        return fits_by_unit(partial(self.model, robot), q, self.tau, self.t, factors)
+
+    def _links(self) -> LinkFit | None:
+        """Return the fit by links in the unit of the positions; None where links, motion or unit are unknown."""
+        if not self.fits or self.reading.q.group is None:
             return None
-        tau = motion_of(self.tau, self.t)[0]
-        motion = motion_of(np.unwrap(q * [UNITS[unit].factor for unit in units], axis=0), self.t)
-        if len(tau) < FEWEST:
-            return None  # the steps of time are too uneven
-        model = self.model(robot, *motion)
-        return None if model is None or not np.isfinite(model).all() else fit_of_links(tau, model, motion[1])
+        unit = self._position_units(self.reading.q.group)[0][0]
+        fit = self.fits.get(_NAMED) or self.fits.get(unit)
+        return fit if fit is not None and fit.varies else None
 
     def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
         """Return a blank line with the candidates, and why none of them was taken."""

@@ -90,6 +90,13 @@ class Reading:
             self.arm.robot.n_joints if self.arm.robot else len(groups[0].columns) if groups else 1
         )
 
+    @property
+    def in_si(self) -> bool:
+        """Tell whether the positions have the symbol of mechanics, or stand beside efforts as in ROS, whose units are SI."""
+        q, tau = self.q.group, self.tau.group
+        ros = tau is not None and bool({"effort", "efforts"} & set(tau.words.split()))
+        return q is not None and (ros or q.in_si)
+
 
 def arm_beside(folder: Path, named: str | None = None) -> Arm:
     """Return the robot in the folder: its only URDF, or the only TOML file that describes one."""
