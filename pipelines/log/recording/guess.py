@@ -434,12 +434,13 @@ class _Drafting:
         return fits_by_unit(partial(self.model, robot), q, self.tau, self.t, factors)
 
     def _links(self) -> LinkFit | None:
-        """Return the fit by links in the unit of the positions; None where links, motion or unit are unknown."""
+        """Return the fit by links in the unit of the positions, the best one where it is open; None where links say nothing."""
         if not self.fits or self.reading.q.group is None:
             return None
         unit = self._position_units(self.reading.q.group)[0][0]
-        fit = self.fits.get(_NAMED) or self.fits.get(unit)
-        return fit if fit is not None and fit.varies else None
+        best = min(self.fits.values(), key=lambda fit: fit.left)
+        fit = self.fits.get(_NAMED) or self.fits.get(unit, best)
+        return fit if fit.varies else None
 
     def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
         """Return a blank line with the candidates, and why none of them was taken."""

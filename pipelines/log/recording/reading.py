@@ -94,7 +94,7 @@ class Reading:
     def in_si(self) -> bool:
         """Tell whether the positions have the symbol of mechanics, or stand beside efforts as in ROS, whose units are SI."""
         q, tau = self.q.group, self.tau.group
-        ros = tau is not None and bool({"effort", "efforts"} & set(tau.words.split()))
+        ros = tau is not None and bool({"effort", "efforts", "eff"} & set(tau.words.split()))
         return q is not None and (ros or q.in_si)
 
 

@@ -7,6 +7,7 @@ header decides against it.
 
 from __future__ import annotations
 
+import re
 import unicodedata
 from collections.abc import Mapping
 
@@ -14,19 +15,19 @@ __all__ = ["QUANTITIES", "WORDS", "plain_letters"]
 
 # Words of no language: symbols, abbreviations and the words of programs. English among them.
 _ENGLISH = {
-    "position": "q qpos pos position positions posn angle angles theta enc encoder jpos qs joint_angle ang",
-    "velocity": "dq qd qdot dqdt qvel vel vels velo velocity velocities speed speeds omega dtheta jvel spd",
-    "acceleration": "ddq qdd qddot acc accel acceleration accelerations ddtheta qacc jacc",
-    "torque": "tau torque torques trq tq moment moments effort efforts eff mom qfrc jtau tauj jtrq",
+    "position": "q qpos pos position positions posn angle angles theta enc encoder jpos qs joint_angle ang phi φ θ ϕ",
+    "velocity": "dq qd qdot dqdt qvel vel vels velo velocity velocities speed speeds omega dtheta jvel spd ω dφ dθ dϕ",
+    "acceleration": "ddq qdd qddot acc accel acceleration accelerations ddtheta qacc jacc ddφ ddθ",
+    "torque": "tau torque torques trq tq moment moments effort efforts eff mom qfrc jtau tauj jtrq τ",
     "current": "i iq isq curr current currents cur amp amps ampere",
     "time": "t time times timestamp timestamps stamp clock sec secs second seconds nsec nsecs nanosec nanosecs "
     "nanosecond nanoseconds usec usecs microsec microseconds msec millisec milliseconds millis micros nanos elapsed "
     "ts uptime datetime date",
     "index": "idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id cycle",
-    "temperature": "temp temperature temperatures tmp",
+    "temperature": "temp temperature temperatures tmp ϑ",
     "other": "pose ee eef eff_pose tcp tool flange cart cartesian force forces wrench ft voltage voltages volt volts "
     "gripper finger fingers status mode error errors err deviation lag limit limits flag digital analog io quat "
-    "quaternion orientation rpy euler translation rotation dtau dtauj jacobian power energy pwm duty safety imu gyro "
+    "quaternion orientation rpy euler translation rotation dtau dtauj dτ jacobian power energy pwm duty safety imu gyro "
     "camera reward done success rate bus supply battery rel relative delta temp_core protective payload mass "
     "elbow_config distance",
     "commanded": "cmd command commanded commands des desired ref reference references target targets tgt set setpoint "
@@ -269,9 +270,10 @@ _LANGUAGES = (_ENGLISH, _GERMAN, _FRENCH, _SPANISH, _ITALIAN, _PORTUGUESE, _DUTC
 
 
 def plain_letters(text: str) -> str:
-    """Return a text without accents, its wide Latin letters and signs (Ａ, （, １) as narrow ones."""
+    """Return a text without accents, wide Latin letters and signs (Ａ, （, １) as narrow ones; a dotted φ is dφ."""
     narrow = "".join(unicodedata.normalize("NFKC", c) if "\uff01" <= c <= "\uff5e" else c for c in text)
     apart = unicodedata.normalize("NFD", narrow)
+    apart = re.sub("([α-ω])\u0307", r"d\1", re.sub("([α-ω])\u0308", r"dd\1", apart))
     bare = "".join(c for c in apart if not "\u0300" <= c <= "\u036f")
     return unicodedata.normalize("NFC", bare).replace("ß", "ss").replace("ł", "l").replace("Ł", "L").replace("ı", "i")
 

@@ -9,9 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.import_layouts import motion, urdf
-from benchmarks.outside_formats import THREE
-from benchmarks.outside_layouts import Arm, Run, simulate
+from benchmarks.recorded_arm import THREE, Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
 from pipelines.log.files import open_log
@@ -19,6 +17,8 @@ from pipelines.log.recording.evidence import rollover, sign_of
 from pipelines.log.recording.guess import guess_recipe
 from pipelines.log.recording.recipe_reader import parse_recipe
 from tests.log.recording.good import Array, good, run, text, write
+
+ABC = Arm("abc", ("a", "b", "c"), "zyy", (150, 150, 150))
 
 
 def drafted(folder: Path, content: str, name: str = "run.csv") -> str:
@@ -152,7 +152,7 @@ def test_a_handful_of_samples_is_refused(tmp_path: Path) -> None:
 
 def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
     columns = good()
-    odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "tau #1": columns["tau_1"]}
+    odd = {"t": columns["t"], 'pos "1" \\ (rad)': columns["q_1"], "tau #1": columns["tau_1"]}
     draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
     assert parse_recipe(draft.text).signals["q"].column
 
@@ -183,12 +183,12 @@ def test_positions_that_differ_by_a_constant_are_asked_about(tmp_path: Path) -> 
 
 def _table(folder: Path, edit: Callable[[dict[str, Array]], None], header: Mapping[str, str]) -> str:
     """Return the draft for 700 samples at 250 Hz of three joints, edited, with their robot in the folder."""
-    moved = motion(3)
+    moved = simulate(ABC, seed=1, rate=250.0, seconds=2.8)
     columns: dict[str, Array] = {"t": moved.t}
     for name, values in (("q", moved.q), ("dq", moved.dq), ("tau", moved.tau)):
         columns |= {f"{name}{j + 1}": column for j, column in enumerate(values.T)}
     edit(columns)
-    (folder / "arm.urdf").write_bytes(urdf(("a", "b", "c")))
+    (folder / "arm.urdf").write_text(ABC.urdf())
     named = {header.get(name.rstrip("123"), name).replace("#", name[-1]): v for name, v in columns.items()}
     return drafted(folder, text(named))
 
@@ -312,7 +312,7 @@ def test_a_list_of_names_in_one_cell_orders_the_joints(tmp_path: Path) -> None:
     """As a message of ROS holds them, in an order that is not the robot's."""
     rows = text(good()).splitlines()
     content = "\n".join([f"name,{rows[0]}", *(f"\"['c', 'a', 'b']\",{row}" for row in rows[1:])]) + "\n"
-    (tmp_path / "arm.urdf").write_bytes(urdf(("a", "b", "c")))
+    (tmp_path / "arm.urdf").write_text(ABC.urdf())
     assert 'q = { columns = ["q_2", "q_3", "q_1"],' in drafted(tmp_path, content)
 
 
@@ -332,9 +332,11 @@ def test_a_number_that_marks_a_lost_sample_is_proposed(tmp_path: Path) -> None:
 
 def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
     """Four columns whose squares add up to one, called q0 to q3, and the four joints' angles."""
-    half, moved = 0.5 * motion(4).q[:, 0], motion(4)
+    four = Arm("abcd", ("a", "b", "c", "d"), "zyyy", (150,) * 4)
+    moved = simulate(four, seed=1, rate=250.0)
+    half = 0.5 * moved.q[:, 0]
     turned = (np.cos(half), 0.6 * np.sin(half), 0.8 * np.sin(half), 0.0 * half)
     columns = {"t": moved.t} | {f"q{k}": v for k, v in enumerate(turned)}
     columns |= {f"angle{j + 1}": v for j, v in enumerate(moved.q.T)} | {f"tau{j + 1}": v for j, v in enumerate(moved.tau.T)}
-    (tmp_path / "arm.urdf").write_bytes(urdf(("a", "b", "c", "d")))
-    assert 'q = { columns = "angle{j}", unit = "rad" }' in drafted(tmp_path, text(columns))
+    (tmp_path / "arm.urdf").write_text(four.urdf())
+    assert 'q = { columns = "angle{j}", unit = "rad" }' in draft_recipe(write(tmp_path, text(columns))).text
