@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from pipelines.log.recording.vocabulary import QUANTITIES, WORDS, plain_letters
+from pipelines.log.recording.vocabulary import ALL_WORDS, QUANTITIES, WORDS, plain_letters
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["ColumnName", "read_name", "signal_of", "words_of"]
@@ -72,7 +72,6 @@ _UNIT_WORDS = {
 _SUFFIX_UNITS = {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
 
 
-_KNOWN_WORDS = frozenset[str]().union(*WORDS.values())
 _ROLE_WORDS = frozenset[str]().union(*(words for meaning, words in WORDS.items() if meaning not in QUANTITIES), {"d"})
 
 
@@ -128,7 +127,7 @@ def _whole_words(name: str) -> str:
 @lru_cache(maxsize=4096)
 def _parts(word: str) -> tuple[str, ...]:
     """Return the known words that `word` is made of without a rest, else `word` alone."""
-    if len(word) > 40 or word in _KNOWN_WORDS or word in _SUFFIX_UNITS:
+    if len(word) > 40 or word in ALL_WORDS or word in _SUFFIX_UNITS:
         return (word,)
     for first in _COMPOUND:
         if word.startswith(first) and len(word) > len(first):

@@ -8,11 +8,16 @@ from collections import Counter
 from dataclasses import dataclass
 
 from pipelines.errors import Check, InputRejected
+from pipelines.log.recording.column_names import words_of
+from pipelines.log.recording.vocabulary import ALL_WORDS
 
 __all__ = ["MISSING", "Dialect", "TextFormat", "cells_of", "decode", "find_dialect", "is_number", "lines_of"]
 
 MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "-nan", "-NaN", "-"})
 _NUMBER = re.compile(r"[+-]?(\d++\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|Inf|INF|infinity|Infinity)")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d+")  # as spreadsheets show numbers, in quotes
+_ENCODINGS = ("latin-1", "cp932", "gb18030", "cp949", "cp1250", "cp1251")  # without a mark; the first where none fits better
+_HEAD = 8192  # [bytes] in which the names of the columns are
 _COMMENTS = ("#", "%", "//")
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _WORDS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks", "": "one column"}
@@ -90,8 +95,13 @@ def _encoding_of(data: bytes) -> str:
     try:
         data.decode("utf-8")
     except UnicodeDecodeError:
-        return "latin-1"
+        return max(_ENCODINGS, key=lambda encoding: _words_in(data[:_HEAD], encoding))
     return "utf-8"
+
+
+def _words_in(head: bytes, encoding: str) -> int:
+    """Return how many words that name columns the head of a file has in an encoding."""
+    return sum(word in ALL_WORDS for word in words_of(head.decode(encoding, "ignore")))
 
 
 def lines_of(text: str, comment: str | None) -> list[tuple[int, str]]:
@@ -113,7 +123,8 @@ def cells_of(line: str, delimiter: str) -> list[str]:
         import csv
 
         try:
-            return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+            cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+            return [cell.replace(",", "") if _THOUSANDS.fullmatch(cell) else cell for cell in cells]
         except (csv.Error, StopIteration):
             pass
     return [cell.strip().strip("'\"") for cell in line.split(delimiter)]

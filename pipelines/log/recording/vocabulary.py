@@ -11,7 +11,7 @@ import re
 import unicodedata
 from collections.abc import Mapping
 
-__all__ = ["QUANTITIES", "WORDS", "plain_letters"]
+__all__ = ["ALL_WORDS", "QUANTITIES", "WORDS", "plain_letters"]
 
 # Words of no language: symbols, abbreviations and the words of programs. English among them.
 _ENGLISH = {
@@ -290,3 +290,4 @@ def _merged(languages: tuple[Mapping[str, str], ...]) -> dict[str, frozenset[str
 
 WORDS = _merged(_LANGUAGES)
 QUANTITIES = ("position", "velocity", "acceleration", "torque", "current", "time", "index", "temperature", "other")
+ALL_WORDS = frozenset[str]().union(*WORDS.values())
