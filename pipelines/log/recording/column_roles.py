@@ -23,7 +23,7 @@ __all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quanti
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
-
+_SYMBOLS = frozenset({"q", "qpos", "jpos", "tau", "jtau", "tauj", "qfrc"})  # of mechanics, in SI units
 
 Order = Literal["robot", "numbers", "file", "text"]
 
@@ -44,8 +44,8 @@ class Group:
 
     @property
     def in_si(self) -> bool:
-        """Tell whether it has the symbol of mechanics, not a word for degrees, or for a share of a rated torque."""
-        return bool({"tau", "jtau", "tauj", "qfrc", "q", "qpos", "jpos"} & {word.rstrip("0123456789") for word in self.words.split()})
+        """Tell whether it has the symbol of mechanics, not a word for degrees or a share of a rated torque."""
+        return bool(_SYMBOLS & {word.rstrip("0123456789") for word in self.words.split()})
 
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from pipelines.log.units import UNITS
 __all__ = [
     "Guess",
     "Slope",
+    "crossed",
     "held",
     "position_unit",
     "quarter_turns",
@@ -227,10 +229,9 @@ def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
         return Guess(named, "sure", "named so")
     if named is not None:
         return unknown_unit(named)
-    for unit, factor in (("m", 1.0), ("mm", 1e-3)):
-        if all(map(math.isfinite, joint.position)) and _inside(factor * q, joint):
-            return Guess(unit, "likely", f"inside the limits of sliding joint '{joint.name}' in {unit}")
-    return Guess("", "unsure", f"'{joint.name}' slides: m or mm?")
+    if all(map(math.isfinite, joint.position)) and _inside(q, joint):
+        return Guess("m", "likely", f"inside the limits of sliding joint '{joint.name}' in m")
+    return Guess("", "unsure", f"'{joint.name}' slides: m, cm or mm?")
 
 
 def quarter_turns(q: Array) -> dict[int, int]:
@@ -252,8 +253,8 @@ def held(tau: Array, q: Array) -> Guess:
     both = np.diff(tau, axis=0)[moving[:, :tau.shape[1]]] if tau.shape == q.shape else np.diff(tau, axis=0).ravel()
     share = float(np.mean(both == 0)) if both.size else 0.0
     if share > 0.4 and np.unique(tau).size > 50:
-        return Guess("held-command", "likely", f"{100 * share:.0f} % of the steps between samples are zero while the position "
-                     "moves: a command, held over several samples")
+        return Guess("held-command", "unsure", f"{100 * share:.0f} % of the steps between samples are zero while the position "
+                     "moves: a command, held over several samples, or a measurement from a slower bus?")
     return Guess("measured", "unsure", 'nothing in the numbers tells; ask who recorded them: "held-command" where this is what '
                  "the drive was commanded, to be held until the next sample")
 
@@ -267,7 +268,9 @@ def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tup
     if abs(span / near - 1.0) < _ONE_TURN:
         return (Guess("counts", "likely", f"{why}; the range of {span:.5g} is likely one revolution of {near}; "
                       "add wrap where the counter starts again"), f", counts_per_rev = {near}")
-    return (Guess("counts", "likely" if named else "unsure", f"{why}; the counts of a revolution are in the encoder's data sheet"),
+    if named is None:
+        return Guess("", "unsure", f"{why}: counts (then add counts_per_rev), or thousandths of a degree?"), ""
+    return (Guess("counts", "likely", f"{why}; the counts of a revolution are in the encoder's data sheet"),
             f', counts_per_rev = "{BLANK}"')
 
 
@@ -288,6 +291,14 @@ def _by_velocity(slope: Slope) -> Guess | None:
     if not unit:
         return None
     return Guess(unit, "likely", f"its slope is {slope.factor:.4g} times the recorded velocity, as with {unit} and {speed}")
+
+
+def crossed(q: Array, dq: Array, t: Array | None) -> tuple[int, int] | None:
+    """Return two joints (from 0) of which the position of one has the velocity of the other for its slope."""
+    for j, k in itertools.permutations(range(q.shape[1]), 2):
+        if slope_of(q[:, [j]], dq[:, [k]], t) is not None and slope_of(q[:, [j]], dq[:, [j]], t) is None:
+            return j, k
+    return None
 
 
 def velocity_unit(slope: Slope, position: str) -> str:

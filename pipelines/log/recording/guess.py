@@ -258,7 +258,7 @@ class _Drafting:
 
     def _rate(self) -> list[str]:
         """Return [time] without a column: the rate, which a recorded velocity may show."""
-        slope = self.reading.slope
+        slope = self.reading.slope if self._one_unit_of_angle() else None
         rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
         near = _round_below(1.005 * rate) if math.isfinite(rate) else math.nan
         if abs(rate / near - 1.0) < 5e-3:  # recorders are set to round rates
@@ -269,6 +269,14 @@ class _Drafting:
         self.blanks.append("time.rate")
         return ["[time]", f'rate = "{BLANK}"                        # Hz; no column rises steadily, so only you know it',
                 *self._map_hint(), ""]
+
+    def _one_unit_of_angle(self) -> bool:
+        """Tell whether a velocity without a clock is in the positions' unit: both name it, or are in SI units."""
+        q, dq = self.reading.q.group, self.reading.dq.group
+        if q is None or dq is None:
+            return False
+        position, speed = (unit_of_group(group.columns, self.reading.table)[0] for group in (q, dq))
+        return speed == f"{position}/s" if position or speed else self.reading.in_si
 
     def _map_hint(self) -> list[str]:
         """Positions that rise in even steps without a clock are a map rather than a motion."""

@@ -176,7 +176,7 @@ def _columns(name: str, dataset: Any) -> list[tuple[str, npt.NDArray[np.generic]
     return [(name + unit_in(dataset.attrs), values)]
 
 
-def _fields(name: str, records: npt.NDArray[np.generic]) -> list[tuple[str, npt.NDArray[np.generic]]]:
+def _fields(name: str, records: npt.NDArray[Any]) -> list[tuple[str, npt.NDArray[np.generic]]]:
     """Return the fields of numbers of a table of records, those of records within them by their path."""
     if records.dtype.names is None:
         return [(name, records)] if records.dtype.kind in "fiub" else []
