@@ -238,7 +238,7 @@ def expanded(entry: dict[str, object], n: int) -> tuple[str, ...] | None:
 def plain(name: str) -> str:
     """Return a column's name as a draft writes it: without a unit in brackets and without the %
     of a comment."""
-    return re.sub(r"\s*[\[(][^\])0-9]+[\])]$", "", name).lstrip("%")
+    return re.sub(r"\s*[\[(][^\])0-9]+[\])]$|,\s+\S+$", "", name).lstrip("%")
 
 
 def unit_of(entry: dict[str, object]) -> str:

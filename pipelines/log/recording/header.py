@@ -28,6 +28,7 @@ _SEARCHED = 40  # lines above the numbers
 _SAMPLED = 20  # lines of numbers that say which columns are numbers
 _MARKS = "#%/*! "  # what a comment begins with
 _DELIMITERS = (",", ";", "\t", " ", "|")
+_BEHIND_SIGN = re.compile(r"(.*[^\s,/])(?:,| /)\s+(\S(?:.{0,18}\S)?)")  # a unit as quantities and axes are labelled
 _NO_UNIT = frozenset({"", "-", "1", "none", "n/a", "[]"})
 FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
@@ -244,8 +245,10 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return ("q1", "deg") for "q1 [deg]" or "q1 (deg)"; an index in brackets is no unit."""
+    """Return ("q1", "deg") for "q1 [deg]", "q1 (deg)", "q1, deg" or "q1 / deg"; an index in brackets is no unit."""
     text = name.strip()
+    if (behind := _BEHIND_SIGN.fullmatch(text)) and canonical_unit(behind[2]) in UNITS:
+        return behind[1], behind[2]
     stem, bracket, rest = text.rpartition(max("[(", key=text.rfind))
     unit = rest[:-1].strip()
     if not bracket or not stem.strip() or rest[-1:] not in ("]", ")") or not 0 < len(unit) <= 20:
