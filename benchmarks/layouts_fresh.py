@@ -146,7 +146,8 @@ def xarm_studio(folder: Path, run: Run) -> Answer:
 @layout(FOUR, rate=50.0, how="turns")
 def dynamixel_spanish(folder: Path, run: Run) -> Answer:
     """A student's Dynamixel logger: Spanish names with units, currents in mA, UTF-8 with mark."""
-    specs = "Tiempo [ms]=ms; *Posición objetivo {} [°]=q_ref°; *Posición actual {} [°]=q°; *Corriente {} [mA]=mA:current:mA; Temperatura {} [°C]=temp"
+    specs = "Tiempo [ms]=ms; *Posición objetivo {} [°]=q_ref°; *Posición actual {} [°]=q°; "
+    specs += "*Corriente {} [mA]=mA:current:mA; Temperatura {} [°C]=temp"
     more = {"mA": np.round(1000 * current(run))}
     how = {"encoding": "utf-8-sig", "float_format": "%.3f"}
     return recorded(folder, run, "registro.csv", {"Tiempo [ms]": "ms"}, specs, data=more, known=False, **how)
@@ -252,7 +253,8 @@ def aubo_chinese(folder: Path, run: Run) -> Answer:
     """A Chinese controller's log in GBK: 关节1实际角度 in rad, 关节1目标角度, 关节1电流 in mA."""
     more = {"mA": np.round(1000 * current(run), 1)}
     specs = "时间戳(ms)=ms; *关节{}目标角度(弧度)=q_ref; *关节{}实际角度(弧度)=q; *关节{}电流(mA)=mA:current:mA; 关节{}温度(℃)=temp"
-    return recorded(folder, run, "log.csv", {"时间戳(ms)": "ms"}, specs, known=False, data=more, encoding="gbk", float_format="%.6f")
+    how = {"encoding": "gbk", "float_format": "%.6f"}
+    return recorded(folder, run, "log.csv", {"时间戳(ms)": "ms"}, specs, known=False, data=more, **how)
 
 
 @layout(SIX, rate=125.0)

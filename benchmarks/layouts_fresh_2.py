@@ -1,4 +1,4 @@
-"""Write one simulated motion as thirty more recordings, written down after the first fresh ones were judged (see import_layouts)."""
+"""Write one simulated motion as thirty more recordings, written down before any of them ran (see import_layouts)."""
 
 import json
 from pathlib import Path
@@ -226,7 +226,8 @@ def orientation_of_three_numbers(folder: Path, run: Run) -> Answer:
 def setpoint_chinese_alone(folder: Path, run: Run) -> Answer:
     """A Chinese log with the 给定 (set) angle and the 前馈 (feedforward) torque alone."""
     specs = "时间(s)=t; *给定角度{}(度)=q_ref°; 前馈力矩{}(牛米)=model"
-    return recorded(folder, run, "给定.csv", {"时间(s)": "s"}, specs, known=False, data={"model": run.tau_model}, encoding="gb18030")
+    more = {"model": run.tau_model}
+    return recorded(folder, run, "给定.csv", {"时间(s)": "s"}, specs, known=False, data=more, encoding="gb18030")
 
 
 @layout(SIX, rate=125.0)

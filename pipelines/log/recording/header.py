@@ -17,7 +17,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
-from pipelines.log.recording.dialect import MISSING, Dialect, cells_of, is_number
+from pipelines.log.recording.dialect import MISSING, Dialect, cells_of, holds_number, is_number
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["FORMULA", "Header", "find_header", "names_and_units", "split_unit", "without_repeats"]
@@ -101,7 +101,7 @@ def _numeric_columns(rows: Sequence[Sequence[str]], dialect: Dialect) -> list[in
     columns = []
     for j in range(dialect.width):
         filled = [row[j] for row in rows if row[j] not in MISSING]
-        if sum(is_number(cell, dialect.decimal) for cell in filled) > 0.5 * len(filled):
+        if sum(holds_number(cell, dialect.decimal) for cell in filled) > 0.5 * len(filled):
             columns.append(j)
     return columns
 
@@ -111,7 +111,7 @@ def _is_data(row: Sequence[str], numeric: Sequence[int], dialect: Dialect) -> bo
     if len(numeric) > 2 and [row[j] for j in numeric] == [str(k) for k in range(len(numeric))]:
         return False
     filled = [row[j] for j in numeric if row[j] not in MISSING]
-    return bool(filled) and all(is_number(cell, dialect.decimal) for cell in filled)
+    return bool(filled) and all(holds_number(cell, dialect.decimal) for cell in filled)
 
 
 def _raw_lines_above(text: str, number: int, known: set[int]) -> list[tuple[int, str, bool]]:

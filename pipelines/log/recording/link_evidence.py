@@ -38,6 +38,7 @@ class Config:
     gain: float = 3.0  # a payload as heavy as the links, whose masses are roughly known
     unnamed_gain: float = 1.5  # of a torque without a unit: a share of a rated torque may be near it by chance
     better: float = 0.5  # of what one unit or order leaves open is left by another that fits better
+    proof: float = 0.1  # of the torque may be left open by the unit that is proved: gears near 57 make rad look like deg
     samples: int = 4000  # of a recording that are compared: ten seconds of a fast one
     samples_of_orders: int = 600  # of these, for each exchange of two joints
 
@@ -79,7 +80,8 @@ def best_unit(fits: Mapping[str, LinkFit], config: Config = Config()) -> tuple[s
     by_fit = sorted(fits, key=lambda unit: fits[unit].left)
     if not by_fit or (len(by_fit) > 1 and fits[by_fit[0]].left > config.better * fits[by_fit[1]].left):
         return "", False
-    return by_fit[0], fits[by_fit[0]].followed and fits[by_fit[0]].varies
+    best = fits[by_fit[0]]
+    return by_fit[0], best.followed and best.varies and best.left < config.proof
 
 
 def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config()) -> LinkFit:
