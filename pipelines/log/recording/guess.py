@@ -10,9 +10,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -20,8 +19,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
-from pipelines.log.limits import FEWEST
-from pipelines.log.recording.clock_guess import SECONDS, unit_of_clock
+from pipelines.log.recording.clock_guess import SECONDS, round_rate, unit_of_clock
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
@@ -47,6 +45,7 @@ from pipelines.log.recording.reading import (
     with_companion,
 )
 from pipelines.log.recording.recipe_reader import BLANK
+from pipelines.log.recording.sound import lost_numbers, sound_samples
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.log.units import UNITS
@@ -55,11 +54,8 @@ __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
-_USABLE = 0.8  # of the cells of a column that is looked at
-_FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
 _ANGLES = ("rad", "deg", "rev")  # that positions without a unit may be in
 _NAMED = "as named"
-_NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
 gravity = [0.0, 0.0, -9.81]
@@ -103,49 +99,14 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
     if len(table.columns) > _MOST_COLUMNS:
         raise InputRejected("F16", f"{len(table.columns)} columns: too many to guess what each is", where=path,
                             remedy="export the joints' signals alone, or write the recipe")
-    lost = _lost_numbers(table)
-    table = _sound(table, lost)
+    lost = lost_numbers(table)
+    table = sound_samples(table, lost)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
     companion = companion_for(reading)
     if companion is not None:
-        companion = _sound(companion, lost)
+        companion = sound_samples(companion, lost)
         reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
     return _Drafting(reading, lost, model).draft()
-
-
-def _lost_numbers(table: RawTable) -> list[float]:
-    """Return whole numbers that mark a lost sample: in cells of their own, farther off than all others are apart."""
-    found: Counter[float] = Counter()
-    for column in table.columns.values():
-        values = column[np.isfinite(column) & (np.abs(column) < _NO_NUMBER)]
-        for number in (float(values.min()), float(values.max())) if values.size else ():
-            others = values[values != number]
-            rare = others.size > _USABLE * values.size and np.unique(others[:1000]).size >= 50
-            if number == 0.0 or number != round(number) or not rare:
-                continue  # zero is also a joint at rest
-            room = float(np.ptp(others))
-            if min(abs(number - others.min()), abs(number - others.max())) > _FAR_OFF * room > 0.0:
-                found[number] += values.size - others.size
-    return sorted(number for number, cells in found.items() if cells > 1)
-
-
-def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
-    """Leave out what would disturb a guess: rows with a hole, an absurd or a lost number, columns of nothing else."""
-    usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
-              for name, values in table.columns.items()}
-    # A table of several topics leaves the cells of the others empty: the rows in which most columns hold numbers.
-    masks = Counter(known.tobytes() for known in usable.values() if known.any())
-    topic = np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
-    usable = {name: known[topic] for name, known in usable.items()}
-    table = replace(table, columns={name: values[topic] for name, values in table.columns.items()}, rows=table.rows[topic],
-                    lines=None if table.lines is None else table.lines[topic])
-    columns = {name: values for name, values in table.columns.items() if usable[name].mean() > _USABLE}
-    keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
-    if keep.sum() < FEWEST:
-        raise InputRejected("T08", f"{int(keep.sum())} samples without a hole", where=table.source,
-                            remedy="give a recording of a motion")
-    return replace(table, columns={name: values[keep] for name, values in columns.items()}, rows=table.rows[keep],
-                   lines=None if table.lines is None else table.lines[keep])
 
 
 class _Drafting:
@@ -260,7 +221,7 @@ class _Drafting:
         """Return [time] without a column: the rate, which a recorded velocity may show."""
         slope = self.reading.slope if self._one_unit_of_angle() else None
         rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
-        near = _round_below(1.005 * rate) if math.isfinite(rate) else math.nan
+        near = round_rate(1.005 * rate) if math.isfinite(rate) else math.nan
         if abs(rate / near - 1.0) < 5e-3:  # recorders are set to round rates
             guess = Guess(f"{near:g} Hz", "likely", f"the recorded velocity is {rate:.5g} times the step of the position from "
                           "sample to sample, if both are in one unit of angle")
@@ -442,13 +403,14 @@ class _Drafting:
         return fits_by_unit(partial(self.model, robot), q, self.tau, self.t, factors)
 
     def _links(self) -> LinkFit | None:
-        """Return the fit by links in the unit of the positions, the best one where it is open; None where links say nothing."""
+        """Return the fit by links in the unit of the positions, where that is open the best; None where the links say nothing."""
         if not self.fits or self.reading.q.group is None:
             return None
         unit = self._position_units(self.reading.q.group)[0][0]
-        best = min(self.fits.values(), key=lambda fit: fit.left)
-        fit = self.fits.get(_NAMED) or self.fits.get(unit, best)
-        return fit if fit.varies else None
+        fits = [fit for key, fit in self.fits.items() if key in (_NAMED, unit)] or list(self.fits.values())
+        fits = [fit for fit in fits if fit.followed] or [fit for fit in fits if fit.varies]
+        best = min(fits, key=lambda fit: fit.left, default=None)
+        return best if best is not None and best.varies else None
 
     def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
         """Return a blank line with the candidates, and why none of them was taken."""
@@ -511,7 +473,7 @@ class _Drafting:
         if uneven < 0.05:
             self.evidence.append(f"time is even within {100 * uneven:.2g} %")
             return [f"# time is even within {100 * uneven:.2g} %, every {1e3 * median:.6g} ms: nothing to resample"]
-        rate = _round_below(1.0 / median)
+        rate = round_rate(1.0 / median)
         guess = Guess(f"{rate:g} Hz", "likely",
                       f"steps of {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms, median {1e3 * median:.4g} ms: "
                       "the next round rate below, so that no sample is invented")
@@ -522,11 +484,6 @@ def _also(choice: Choice, table: RawTable) -> list[str]:
     """Return comments that name the other columns of that quantity."""
     return [f"    # also there: {group.words} ({group.quantity}, {group.origin}), {_columns(group.columns, table)}"
             for group in choice.others[:6] if not group.partial]
-
-
-def _round_below(rate: float) -> float:
-    decade = 10.0 ** np.floor(np.log10(rate))
-    return float(max(m for m in (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0) if m * decade <= rate * (1 + 1e-9)) * decade)
 
 
 def _columns(names: Sequence[str], table: RawTable) -> str:

@@ -38,7 +38,7 @@ class Config:
     gain: float = 3.0  # a payload as heavy as the links, whose masses are roughly known
     unnamed_gain: float = 1.5  # of a torque without a unit: a share of a rated torque may be near it by chance
     better: float = 0.5  # of what one unit or order leaves open is left by another that fits better
-    proof: float = 0.1  # of the torque may be left open by the unit that is proved: gears near 57 make rad look like deg
+    proof: float = 0.1  # of the torque may be left open by the unit that is proved
     samples: int = 4000  # of a recording that are compared: ten seconds of a fast one
     samples_of_orders: int = 600  # of these, for each exchange of two joints
 
@@ -76,12 +76,16 @@ def fits_by_unit(
 
 
 def best_unit(fits: Mapping[str, LinkFit], config: Config = Config()) -> tuple[str, bool]:
-    """Return the unit that leaves far less of the torque open than any other, "" where none does; and whether it is proved."""
+    """Return the unit that leaves far less of the torque open than any other, "" where none does; and whether it is proved.
+
+    Gears near 57 make radians of a motor look like degrees of a joint: proved is a unit in which torques are N m as well.
+    """
     by_fit = sorted(fits, key=lambda unit: fits[unit].left)
     if not by_fit or (len(by_fit) > 1 and fits[by_fit[0]].left > config.better * fits[by_fit[1]].left):
         return "", False
     best = fits[by_fit[0]]
-    return by_fit[0], best.followed and best.varies and best.left < config.proof
+    nearly_one = np.abs(np.log(np.abs(best.gains[np.isfinite(best.gains)]))) < math.log(config.unnamed_gain)
+    return by_fit[0], best.followed and best.varies and best.left < config.proof and bool(nearly_one.all())
 
 
 def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config()) -> LinkFit:
