@@ -54,8 +54,7 @@ __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
-_ANGLES = ("rad", "deg", "rev")  # that positions without a unit may be in
-_NAMED = "as named"
+_ANGLES, _NAMED = ("rad", "deg", "rev"), "as named"  # what positions may be in where no unit is named; else that
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
 gravity = [0.0, 0.0, -9.81]
@@ -344,8 +343,8 @@ class _Drafting:
             return f"what does '{clean(min(words), 40)}' say of it?"
         named = any(unit_of_group(group.columns, self.reading.torque_table))
         best = min(self.fits.values(), key=lambda fit: fit.left, default=None)
-        if best is not None and best.exchanged is not None:
-            first, second = (joint + 1 for joint in best.exchanged)
+        if exchanged := next((fit.exchanged for fit in (links, best) if fit is not None and fit.exchanged is not None), None):
+            first, second = exchanged[0] + 1, exchanged[1] + 1
             return f"the robot's own links agree far better with joints {first} and {second} exchanged: in which order are they?"
         if links is not None and not links.followed and (signal == "q" or not named):
             return ("torque and motion do not agree by the robot's own links: "
@@ -395,9 +394,9 @@ class _Drafting:
         if not turning or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
             return {}
         named = self._position_units(group)[0]
-        said = any(unit_of_group(group.columns, self.reading.table))
-        units = {_NAMED: named} if said else {unit: [unit] * self.n for unit in _ANGLES}
-        if said and not set(named) <= UNITS.keys():
+        units = {unit: [unit] * self.n for unit in _ANGLES}
+        units = {_NAMED: named} if any(unit_of_group(group.columns, self.reading.table)) else units
+        if not {unit for each in units.values() for unit in each} <= UNITS.keys():
             return {}
         factors = {key: np.array([UNITS[unit].factor for unit in each]) for key, each in units.items()}
         return fits_by_unit(partial(self.model, robot), q, self.tau, self.t, factors)
