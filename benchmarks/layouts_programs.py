@@ -1,4 +1,4 @@
-"""Write one simulated motion as drives, tools and file formats store it (see outside_formats)."""
+"""Write one simulated motion as drives, tools and file formats store it (see import_layouts)."""
 
 import json
 from pathlib import Path
