@@ -1,753 +1,458 @@
-"""Draft a recipe for recordings in the layouts that people have, fill its blanks, and import them.
+"""Judge the drafts of `rrrid import --guess` on recordings in formats that others chose.
 
-    python -m benchmarks.import_layouts [NAME…]
+    python -m benchmarks.import_layouts [NAME ...] [--set robots] [--keep FOLDER]
 
-Each layout is a small recording, written after the documentation of a recorder or a public report,
-with what is true. A draft is "right" where the imported log equals the truth without an answer,
-"asks" where it does so once the blanks are filled as a person would fill them, or where the file
-is refused with a reason; "wrong" where the import succeeds and the log differs: no layout may be wrong.
-"failed" is a draft that no answer makes usable.
+A layout writes one simulated motion as a recorder does, after its documentation or public source
+code, and states the right answer beside it. The draft is "right" where every field that is filled
+in is true and the imported log is the simulated motion, "asks" where a field that it cannot know is
+blank, "refused" with a remedy, or "wrong": a field is filled in that is not true, or the import
+succeeds with other numbers. Blanks are then filled in as a person would who knows the truth: a
+draft that this makes no usable recipe has "failed".
 """
 
-from __future__ import annotations
-
-import io
-import json
+import argparse
+import re
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
+from math import sqrt
 from pathlib import Path
-from typing import Any
 
+import h5py
 import numpy as np
-import numpy.typing as npt
+import pandas as pd
 import tomli_w
 
+from benchmarks.recorded_arm import Arm, Run, simulate
 from pipelines.errors import RrridError
-from pipelines.import_log import STAGE, Settings
-from pipelines.log.files import open_log
-from pipelines.log.recording.guess import guess_recipe
+from pipelines.import_log import STAGE, Settings, draft_recipe
 from pipelines.stage import Request, run_stage
 
-Array = npt.NDArray[Any]
+SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
+ASK = "FILL IN"
+SETS = ("robots", "programs", "stranger", "stranger_2", "fresh", "fresh_2")
 
-SAMPLES = 700
-Columns = dict[str, Any]  # name -> (samples,) or (samples, n) numbers, or texts
-UR = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
-PANDA = tuple(f"panda_joint{j}" for j in range(1, 8))
-BLANK = "FILL IN"
+
+@dataclass(frozen=True)
+class Signal:
+    """What a signal may be made of: columns in the robot's order of joints, and spellings of
+    their unit."""
+
+    columns: tuple[str, ...]
+    units: tuple[str, ...] = ()  # none: no unit can be known, it must be left blank
+    values: np.ndarray | None = None  # SI, where not what the run calls so
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The right answer of one layout. A signal without an entry must not be filled in."""
+
+    file: str
+    time: dict[str, str] = field(default_factory=dict)  # column, or columns joined by +: unit(s)
+    rate: float | None = None  # where there is no column
+    right: dict[str, tuple[Signal, ...]] = field(default_factory=dict)
+    torque: tuple[str, ...] = ("measured", "held-command")
+    texts: bool = True  # columns are compared by name too
+    draftable: bool = True  # False: nothing but blanks or a refusal is right
+    table: bool = True  # False: a refusal with a remedy is all that is right
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Files of one recording, and what is true of them.
-
-    `answers` holds what a person would fill in, by place: "time.rate", "signals.tau.unit", …
-    """
-
-    files: Mapping[str, bytes]
-    t: Array  # (samples,) [s]
-    q: Array  # (samples, joints) [rad] or [m]
-    tau: Array  # (samples, joints) [N m] or [N]
-    answers: Mapping[str, Any] = field(default_factory=dict)
-    recording: str = "run.csv"
+    name: str
+    source: str
+    arm: Arm
+    robot: str | None
+    write: Callable[[Path, Run], Answer]
+    rate: float
+    how: str = "series"  # the motion
+    size: float = 1.0  # of the motion
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """Outcome of one layout: "right", "asks", "wrong" or "failed", and why."""
-
-    outcome: str
-    why: str
+LAYOUTS: list[Layout] = []
 
 
-@dataclass(frozen=True)
-class Motion:
-    """A smooth motion with inertia, gravity and friction: q, dq, tau (samples, joints) in SI."""
+def layout(
+    arm: Arm, robot: str | None = "arm.urdf", rate: float = 200.0, how: str = "series", size: float = 1.0
+) -> Callable[[Callable[[Path, Run], Answer]], Callable[[Path, Run], Answer]]:
+    """Register a function that writes one recording into a folder; its docstring names the source."""
 
-    t: Array
-    q: Array
-    dq: Array
-    tau: Array
+    def register(write: Callable[[Path, Run], Answer]) -> Callable[[Path, Run], Answer]:
+        source = (write.__doc__ or "").splitlines()[0]
+        LAYOUTS.append(Layout(write.__name__, source, arm, robot, write, rate, how, size))
+        return write
 
-
-def motion(
-    n: int, step: float = 0.004, seed: int = 1, samples: int = SAMPLES, slides: Sequence[int] = ()
-) -> Motion:
-    """Return a Fourier motion of `n` joints with torques of a plain arm; joints in `slides` move 0.1 m."""
-    rng = np.random.default_rng(seed)
-    t = np.arange(samples) * step
-    base = 2.0 * np.pi / (samples * step)
-    q, dq, ddq = (np.zeros((samples, n)) for _ in range(3))
-    for k in range(1, 6):
-        a, b = rng.normal(size=(2, n)) / k
-        s, c = np.sin(k * base * t)[:, None], np.cos(k * base * t)[:, None]
-        w = k * base
-        q += a * s + b * c
-        dq += w * (a * c - b * s)
-        ddq -= w * w * (a * s + b * c)
-    size = np.where(np.isin(np.arange(n), slides), 0.1, 1.0) * np.minimum(
-        1.3 / np.abs(q).max(axis=0), 120.0 / np.abs(ddq).max(axis=0)
-    )
-    q, dq, ddq = (x * size for x in (q, dq, ddq))
-    q += rng.uniform(-0.5, 0.5, n) * np.where(np.isin(np.arange(n), slides), 0.05, 1.0)
-    inertia = 2.0 / (1.0 + np.arange(n))
-    tau = (
-        inertia * ddq
-        + 8.0 * inertia * np.sin(q + 0.3)
-        + 3.0 * np.tanh(20.0 * dq)
-        + 1.5 * dq
-        + 0.05 * rng.normal(size=q.shape)
-    )
-    return Motion(t, q, dq, tau)
+    return register
 
 
-def urdf(
-    names: Sequence[str],
-    slides: Sequence[int] = (),
-    reach: float = 6.3,
-    effort: float = 150.0,
-    fingers: bool = False,
-) -> bytes:
-    """Return the URDF of a serial arm; with `fingers`, two sliding joints branch off its last link."""
-    parts = ['<?xml version="1.0"?><robot name="arm"><link name="base"/>']
-    ends = ["base", *(f"link_{j}" for j in range(1, len(names) + 1))]
-    body = (
-        '<inertial><mass value="2"/><origin xyz="0 0 0.1"/><inertia ixx="0.02" iyy="0.02" izz="0.02" '
-        'ixy="0" ixz="0" iyz="0"/></inertial>'
-    )
-    for j, name in enumerate(names):
-        kind, far = ("prismatic", 0.4) if j in slides else ("revolute", reach)
-        axis = "0 0 1" if j % 2 == 0 else "0 1 0"
-        parts.append(
-            f'<link name="{ends[j + 1]}">{body}</link><joint name="{name}" type="{kind}">'
-            f'<parent link="{ends[j]}"/><child link="{ends[j + 1]}"/><origin xyz="0 0 0.3"/>'
-            f'<axis xyz="{axis}"/><limit lower="{-far}" upper="{far}" effort="{effort}" velocity="10"/></joint>'
-        )
-    for side in (1, 2) if fingers else ():
-        parts.append(
-            f'<link name="finger_{side}"/><joint name="panda_finger_joint{side}" type="prismatic">'
-            f'<parent link="{ends[-1]}"/><child link="finger_{side}"/><axis xyz="0 1 0"/>'
-            '<limit lower="0" upper="0.04" effort="20" velocity="0.2"/></joint>'
-        )
-    return ("\n".join(parts) + "</robot>\n").encode()
+DEG = ("deg", "degree", "degrees", "°")
+RAD, RADS, NM = ("rad",), ("rad/s",), ("N m", "Nm", "N*m")
+DEGS, TURNS = ("deg/s", "°/s"), ("rev", "turn", "turns", "revolutions")
+
+UNITS = {"q": RAD, "q_ref": RAD, "dq": RADS, "tau": NM, "current": ("A",), "%": ("%",)}
+UNITS |= {"q°": DEG, "q_ref°": DEG, "dq°": DEGS, "counts": ("counts",), "counts/s": ("counts/s",)}
+UNITS |= {"dq_ref": RADS, "dq_ref°": DEGS, "ddq": ("rad/s^2",), "tau_ref": NM, "N mm": ("N mm",)}
+UNITS |= {"rev": ("turn", "turns", "rev"), "rev/s": ("turn/s", "turns/s", "rev/s"), "?": ()}
+UNITS |= {"mrad": ("mrad",), "mNm": ("mN m", "mNm", "N mm"), "0.1 %": ("0.1 %",), "rpm": ("rpm",)}
+UNITS |= {"mA": ("mA",), "A": ("A",), "kNm": ("kN m", "kNm"), "deg/s": ("deg/s",)}
 
 
-def cells(values: Array) -> list[list[str]]:
-    """Return the numbers of (samples, columns) as texts; whole ones without a point."""
-    return [[f"{x:.12g}" if abs(x) < 1e15 else str(int(x)) for x in row] for row in values.tolist()]
+def block(pattern: str, values: np.ndarray, start: int = 1) -> dict[str, np.ndarray]:
+    """Return columns named after a pattern with {}, one a joint."""
+    return {pattern.format(start + j): column for j, column in enumerate(values.T)}
 
 
-def table(
-    columns: Columns,
-    delimiter: str = ",",
-    header: bool = True,
-    decimal: str = ".",
-    encoding: str = "utf-8",
-) -> bytes:
-    """Return a text table; a matrix under one name is written as name0, name1, … where it has "#": its number."""
-    names: list[str] = []
-    texts: list[list[str]] = []
-    for name, values in columns.items():
-        if isinstance(values, np.ndarray):
-            block = values if values.ndim == 2 else values[:, None]
-            start = 1 if "#1" in name else 0
-            names += [
-                name.replace("#1", "#").replace("#", str(j + start)) for j in range(block.shape[1])
-            ]
-            texts += [list(column) for column in zip(*cells(block), strict=True)]
+def names(pattern: str, n: int, start: int = 1) -> tuple[str, ...]:
+    return tuple(pattern.format(start + j) for j in range(n))
+
+
+def csv(path: Path, columns: dict, head: str = "", **how: object) -> None:
+    """Write a table, below `head` as it stands."""
+    encoding = str(how.pop("encoding", "utf-8"))
+    how = {"index": False, "float_format": "%.6f", **how}
+    path.write_bytes((head + pd.DataFrame(columns).to_csv(**how)).encode(encoding))
+
+
+def table(path: Path, columns: dict, head: str = "", **how: object) -> None:
+    """Write a table with all digits."""
+    csv(path, columns, head, **{"float_format": None, **how})
+
+
+def current(run: Run) -> np.ndarray:
+    """Motor currents, with noise, by torque constants that no file states."""
+    dice = np.random.default_rng(abs(int(1e6 * float(np.sum(run.q)))) % 2**32)
+    constant = dice.uniform(5, 15, run.q.shape[1])
+    return run.tau / constant * (1 + 0.02 * dice.standard_normal(run.q.shape))
+
+
+def values(run: Run) -> dict[str, np.ndarray]:
+    """What a layout may write: the motion, its times, and a tool pose [mm, rad] that follows it."""
+    a, b = run.q[:, 0], run.q[:, 1]
+    data = {"q": run.q, "dq": run.dq, "tau": run.tau, "q_ref": run.q_ref, "ext": run.tau_ext}
+    data |= {"ddq": run.ddq, "dq_ref": run.dq_ref, "tau_ref": run.tau_ref, "amps": run.current}
+    data |= {f"{s}°": np.degrees(data[s]) for s in ("q", "dq", "q_ref", "dq_ref")}
+    data |= {"current": current(run), "temp": run.temperature, "t": run.t}
+    data |= {"count": np.arange(len(run.t)), "us": np.round(run.t * 1e6).astype(np.int64)}
+    data |= {"ms": np.round(run.t * 1e3).astype(np.int64), "x": 400 + 200 * np.cos(a)}
+    data |= {"y": 300 * np.sin(a), "z": 500 + 100 * np.sin(b), "rx": 3.1 + 0.02 * b}
+    return data | {"ry": 0.05 * a, "rz": 0.3 * a + 0.1 * b}
+
+
+def anywhere(**units: tuple[str, ...]) -> dict:
+    """State units alone, of columns whose names are not compared."""
+    return {role: (Signal((), unit),) for role, unit in units.items()}
+
+
+def state(right: dict, form: str, joints, spec: str) -> None:
+    """Add a right answer "role" or "role:unit" for the columns of a form. A current (or share of
+    a rated torque) is all that is known of torque, so it may stand under either."""
+    role, _, unit = spec.partition(":")
+    columns = tuple(form.replace("{}", str(j)) for j in joints)
+    units = UNITS[unit or role]
+    signal = Signal(columns, units) if units else Signal(columns)
+    for name in ("current", "tau") if role == "current" else (role.rstrip("°"),):
+        right[name] = (signal,)
+
+
+def wide(run: Run, specs: str, joints=None, joint_wise: bool = False, **more) -> tuple[dict, dict]:
+    """Make columns, and the right answer, of "name=value; name{}=value; *name{}=value:role:unit":
+    {} is a joint (consecutive specs with it are interleaved if `joint_wise`), * marks what is
+    true (its role is the value's name unless given), a value without array is a constant."""
+    data, columns, right = values(run) | more, {}, {}
+    joints = range(1, run.q.shape[1] + 1) if joints is None else joints
+    groups: list[list[tuple[str, str]]] = []
+    for spec in specs.split(";"):
+        name, _, value = spec.strip().rpartition("=")
+        key, _, truth = value.partition(":")
+        if name.startswith("*"):
+            name = name[1:]
+            state(right, name, joints, truth or key)
+        if joint_wise and "{}" in name and groups and "{}" in groups[-1][-1][0]:
+            groups[-1].append((name, key))
         else:
-            names.append(name)
-            texts.append(list(values))
-    rows = [[cell.replace(".", decimal) for cell in row] for row in zip(*texts, strict=True)]
-    lines = [delimiter.join(names)] * header + [delimiter.join(row) for row in rows]
-    return ("\n".join(lines) + "\n").encode(encoding)
+            groups.append([(name, key)])
+    for specs_of_group in groups:
+        for k, j in enumerate(joints if "{}" in specs_of_group[0][0] else [""]):
+            for name, key in specs_of_group:
+                v = data.get(key, key)
+                matrix = isinstance(v, np.ndarray) and v.ndim == 2
+                columns[name.replace("{}", str(j))] = v[:, k] if matrix else v
+    return columns, right
 
 
-def by_joint(
-    names: Sequence[str], pattern: str, values: Array, order: Sequence[int]
-) -> dict[str, Array]:
-    """Return one column a joint, called by `pattern` with {} for its name, in the given order."""
-    return {pattern.format(names[j]): values[:, j] for j in order}
+def stamps(run: Run, form: str) -> np.ndarray:
+    """Dates of the samples as text."""
+    times = pd.Timestamp("2024-05-03 14:02:11.25") + pd.to_timedelta(values(run)["us"], unit="us")
+    return times.strftime(form).to_numpy()
 
 
-LAYOUTS: dict[str, Callable[[], Layout]] = {}
+def vector(numbers: np.ndarray) -> str:
+    """Write numbers between commas."""
+    return ", ".join(f"{x:.6f}" for x in numbers)
 
 
-def layout(function: Callable[[], Layout]) -> Callable[[], Layout]:
-    """Register a layout under its name."""
-    LAYOUTS[function.__name__.removeprefix("layout_")] = function
-    return function
+def recorded(
+    folder: Path,
+    run: Run,
+    file: str,
+    time: dict[str, str],
+    specs: str,
+    joints=None,
+    joint_wise: bool = False,
+    known: bool = True,
+    data: dict | None = None,
+    **how: object,
+) -> Answer:
+    """Write the table of `wide` as a text file, and return its answer; `known` tells whether all of it can be known."""
+    columns, right = wide(run, specs, joints, joint_wise, **(data or {}))
+    table(folder / file, columns, **how)
+    return Answer(file, time, right=right, draftable=known)
 
 
-ALPHABETICAL = sorted(range(6), key=lambda j: UR[j])
-ARM = {"arm.urdf": urdf(UR)}
+def si(pattern: str, n: int, unit: str, start: int = 1, v: np.ndarray | None = None) -> Signal:
+    """State the columns of a pattern and the spellings of a unit."""
+    return Signal(names(pattern, n, start), UNITS[unit], v)
 
 
-def _tau_unit(unit: str = "N m") -> dict[str, Any]:
-    return {"signals.tau.unit": unit}
-
-
-@layout
-def layout_ur_rtde() -> Layout:
-    """RTDE_Python_Client_Library record.py: blanks between, target and actual of everything."""
-    m = motion(6, 0.008)
-    columns: Columns = {
-        "timestamp": 3211.5 + m.t,
-        "target_q_#": m.q + 1e-3,
-        "target_qd_#": m.dq,
-        "target_current_#": m.tau / 11.0 + 0.2,
-        "target_moment_#": m.tau - 2.0,
-        "actual_q_#": m.q,
-        "actual_qd_#": m.dq,
-        "actual_current_#": m.tau / 10.0,
-        "joint_control_output_#": m.tau / 10.0 + 0.1,
-        "actual_TCP_pose_#": m.q[:, :6] * 0.2,
-        "joint_temperatures_#": 30.0 + 0.01 * m.q,
-        "robot_mode": np.full(SAMPLES, 7.0),
-    }
-    return Layout(
-        ARM | {"run.csv": table(columns, " ")},
-        m.t,
-        m.q,
-        m.tau,
-        {"drive.torque_constant": 10.0, "signals.tau.unit": "A"},
-    )
-
-
-@layout
-def layout_ur_currents_only() -> Layout:
-    """A UR log of positions and currents, without a robot in the folder."""
-    m = motion(6, 0.008)
-    data = table({"timestamp": 3211.5 + m.t, "actual_q_#": m.q, "actual_current_#": m.tau / 10.0})
-    return Layout(
-        {"run.csv": data, "robot/arm.urdf": urdf(UR)},
-        m.t,
-        m.q,
-        m.tau,
-        {
-            "drive.torque_constant": 10.0,
-            "signals.tau.unit": "A",
-            "robot.use": "robot/arm.urdf",
-        },
-    )
-
-
-@layout
-def layout_panda_py() -> Layout:
-    """panda_py's log through pandas: an index column without a name, stamps in ms."""
-    m = motion(7, 0.001, samples=2000)
-    columns: Columns = {
-        "": np.arange(len(m.t)),
-        "time": 88000.0 + np.round(m.t * 1e3),
-        "q_#": m.q,
-        "dq_#": m.dq,
-        "tau_#": m.tau,
-    }
-    return Layout({"panda.urdf": urdf(PANDA), "run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_panda_with_fingers() -> Layout:
-    """Joint states of an arm and its gripper beside a URDF with both."""
-    m = motion(7, 0.01)
-    names = [*PANDA, "panda_finger_joint1", "panda_finger_joint2"]
-    grip = np.full((SAMPLES, 2), 0.02)
-    columns = by_joint(names, "{}_position", np.hstack([m.q, grip]), range(9)) | by_joint(
-        names, "{}_effort", np.hstack([m.tau, grip]), range(9)
-    )
-    answers = {
-        "robot.tip_link": "link_7",
-        "signals.q.columns": [f"{name}_position" for name in PANDA],
-        "signals.q.unit": "rad",
-        "signals.tau.columns": [f"{name}_effort" for name in PANDA],
-    }
-    return Layout(
-        {"panda.urdf": urdf(PANDA, fingers=True), "run.csv": table({"t": m.t, **columns})},
-        m.t,
-        m.q,
-        m.tau,
-        answers,
-    )
-
-
-@layout
-def layout_kuka_rsi() -> Layout:
-    """KUKA RSI: degrees, IPOC as the clock, Cartesian beside axis positions, motor currents in A."""
-    m = motion(6, 0.004)
-    deg = np.rad2deg(m.q)
-    columns: Columns = {"IPOC": 4208163.0 + np.round(m.t * 1e3)}
-    columns |= {f"RIst.{c}": 500.0 + 10.0 * m.q[:, k] for k, c in enumerate("XYZABC")}
-    columns |= {f"AIPos.A{j + 1}": deg[:, j] for j in range(6)} | {
-        f"ASPos.A{j + 1}": deg[:, j] + 0.01 for j in range(6)
-    }
-    columns |= {f"MACur.A{j + 1}": m.tau[:, j] / 20.0 for j in range(6)}
-    answers = {
-        "time.rate": 1000.0,
-        "time.unit": "ms",
-        "drive.torque_constant": 20.0,
-        "signals.tau.unit": "A",
-    }
-    names = tuple(f"joint_a{j}" for j in range(1, 7))
-    return Layout(
-        {"kr.urdf": urdf(names), "run.csv": table(columns, ";")}, m.t, m.q, m.tau, answers
-    )
-
-
-@layout
-def layout_matlab_writematrix() -> Layout:
-    """writematrix([t q dq tau]): no header."""
-    m = motion(6, 0.002)
-    data = table({"a": m.t, "q#": m.q, "d#": m.dq, "t#": m.tau}, header=False)
-    return Layout(ARM | {"run.txt": data}, m.t, m.q, m.tau, _tau_unit(), "run.txt")
-
-
-@layout
-def layout_matlab_struct() -> Layout:
-    """A MAT file with a structure of N x 6 arrays."""
-    from scipy.io import savemat
-
-    m = motion(6, 0.002)
-    file = io.BytesIO()
-    savemat(
-        file, {"data": {"t": m.t[:, None], "q": m.q, "qd": m.dq, "tau": m.tau, "q_ref": m.q + 1e-3}}
-    )
-    return Layout(ARM | {"run.mat": file.getvalue()}, m.t, m.q, m.tau, recording="run.mat")
-
-
-@layout
-def layout_json_frames() -> Layout:
-    """A data set of robot learning: a list of frames with observation.state and action."""
-    m = motion(6, 1 / 30)
-    frames = [
-        {
-            "timestamp": float(t),
-            "frame_index": k,
-            "observation.state": q.tolist(),
-            "observation.effort": tau.tolist(),
-            "action": (q + 0.01).tolist(),
-        }
-        for k, (t, q, tau) in enumerate(zip(m.t, m.q, m.tau, strict=True))
-    ]
-    return Layout(
-        ARM | {"run.json": json.dumps(frames).encode()}, m.t, m.q, m.tau, recording="run.json"
-    )
-
-
-@layout
-def layout_json_arrays() -> Layout:
-    """Arrays by name under a key."""
-    m = motion(6, 0.01)
-    body = {
-        "meta": {"robot": "ur5"},
-        "data": {
-            "time": m.t.tolist(),
-            "q": m.q.tolist(),
-            "dq": m.dq.tolist(),
-            "tau": m.tau.tolist(),
-        },
-    }
-    return Layout(
-        ARM | {"run.json": json.dumps(body).encode()}, m.t, m.q, m.tau, recording="run.json"
-    )
-
-
-@layout
-def layout_json_lines_by_name() -> Layout:
-    """One object a line, joints by name."""
-    m = motion(6, 0.01)
-    lines = [
-        json.dumps(
-            {
-                "stamp": {"sec": 1_700_000_000 + int(t), "nanosec": round((t % 1.0) * 1e9)},
-                "joints": {
-                    UR[j]: {"pos": m.q[k, j], "vel": m.dq[k, j], "eff": m.tau[k, j]}
-                    for j in ALPHABETICAL
-                },
-            }
+def expanded(entry: dict[str, object], n: int) -> tuple[str, ...] | None:
+    """Return the columns of one entry of [signals], or None where they are left blank."""
+    columns = entry.get("columns", entry.get("column"))
+    if isinstance(columns, str):
+        if ASK in columns:
+            return None
+        columns = (
+            [
+                re.sub(r"\{j(-1)?\}", lambda m, j=j: str(j - 1 if m[1] else j), columns)
+                for j in range(1, n + 1)
+            ]
+            if "{j" in columns
+            else [columns]
         )
-        for k, t in enumerate(m.t.tolist())
-    ]
-    return Layout(
-        ARM | {"run.jsonl": ("\n".join(lines) + "\n").encode()},
-        m.t,
-        m.q,
-        m.tau,
-        recording="run.jsonl",
-    )
+    return None if columns is None or any(ASK in c for c in columns) else tuple(columns)
 
 
-@layout
-def layout_r_write_table() -> Layout:
-    """R's write.table: the rows' numbers have no name."""
-    m = motion(3, 0.01)
-    rows = (
-        table({"x": 1.0 + np.arange(SAMPLES), "t": m.t, "q#1": m.q, "tau#1": m.tau}, " ")
-        .decode()
-        .split("\n")
-    )
-    rows[0] = " ".join(f'"{name}"' for name in rows[0].split()[1:])
-    return Layout(
-        {"run.txt": "\n".join(rows).encode()},
-        m.t,
-        m.q,
-        m.tau,
-        {"robot.use": "rrr"} | _tau_unit(),
-        "run.txt",
-    )
+def plain(name: str) -> str:
+    """Return a column's name as a draft writes it: without a unit in brackets and without the %
+    of a comment."""
+    return re.sub(r"\s*[\[(][^\])0-9]+[\])]$|,\s+\S+$", "", name).lstrip("%")
 
 
-@layout
-def layout_savetxt_header() -> Layout:
-    """numpy.savetxt with header="t, q1, …": commas in a comment above blanks."""
-    m = motion(6, 0.01)
-    body = table({"t": m.t, "q#1": m.q, "dq#1": m.dq, "tau#1": m.tau}, " ").decode().split("\n")
-    body[0] = "# " + body[0].replace(" ", ", ")
-    return Layout(ARM | {"run.txt": "\n".join(body).encode()}, m.t, m.q, m.tau, recording="run.txt")
+def unit_of(entry: dict[str, object]) -> str:
+    unit = entry.get("unit", "")
+    return ",".join(unit) if isinstance(unit, list) else str(unit)
 
 
-@layout
-def layout_percent_header_units() -> Layout:
-    """Names and units in two comments."""
-    m = motion(6, 0.01)
-    body = table({"t": m.t, "q#1": np.rad2deg(m.q), "M#1": m.tau}, " ").decode().split("\n")
-    body[0] = (
-        "% recorded on Monday by hand\n% "
-        + body[0]
-        + "\n% "
-        + " ".join(["s", *["deg"] * 6, *["Nm"] * 6])
-    )
-    return Layout(ARM | {"run.txt": "\n".join(body).encode()}, m.t, m.q, m.tau, recording="run.txt")
+def wrong_fields(draft: dict, answer: Answer, run: Run, robot: str | None) -> list[str]:
+    """Return every field of a draft that is filled in and is not true."""
+    use = draft.get("robot", {}).get("use", ASK)
+    wrong = [f"robot: {use}"] if ASK not in use and use.partition(":")[0] != robot else []
+    return wrong + wrong_clock(draft.get("time", {}), answer) + wrong_signals(draft, answer, run)
 
 
-@layout
-def layout_transposed_named() -> Layout:
-    """One line a signal, its name before the numbers."""
-    m = motion(6, 0.01)
-    names = ["t", *(f"q{j}" for j in range(1, 7)), *(f"tau{j}" for j in range(1, 7))]
-    rows = np.column_stack([m.t, m.q, m.tau]).T
-    lines = [",".join([name, *row]) for name, row in zip(names, cells(rows), strict=True)]
-    return Layout(ARM | {"run.csv": ("\n".join(lines) + "\n").encode()}, m.t, m.q, m.tau)
+def wrong_clock(time: dict, answer: Answer) -> list[str]:
+    """Return what [time] of a draft holds and is not true."""
+    wrong = []
+    column, unit = time.get("column"), time.get("unit", "")
+    column = "+".join(column) if isinstance(column, list) else column
+    unit = "+".join(unit) if isinstance(unit, list) else unit
+    clocks = {plain(name): u for name, u in answer.time.items()}
+    if (
+        column is not None
+        and ASK not in column
+        and answer.texts
+        and (column not in clocks or (ASK not in unit and clocks[column] not in ("*", unit)))
+    ):
+        wrong.append(f"time: {column} [{unit}]")
+    rate = time.get("rate")
+    if isinstance(rate, (int, float)) and (
+        answer.rate is None or abs(rate / answer.rate - 1) > 0.02
+    ):
+        wrong.append(f"rate: {rate}")
+    return wrong
 
 
-@layout
-def layout_transposed_bare() -> Layout:
-    """writematrix of 19 x N."""
-    m = motion(6, 0.01)
-    lines = [",".join(row) for row in cells(np.column_stack([m.t, m.q, m.dq, m.tau]).T)]
-    return Layout(
-        ARM | {"run.csv": ("\n".join(lines) + "\n").encode()}, m.t, m.q, m.tau, _tau_unit()
-    )
+def wrong_signals(draft: dict, answer: Answer, run: Run) -> list[str]:
+    """Return what [signals] of a draft holds and is not true."""
+    wrong = []
+    for name, entry in draft.get("signals", {}).items():
+        if not isinstance(entry, dict):
+            continue
+        columns, unit, accepted = expanded(entry, run.n), unit_of(entry), answer.right.get(name, ())
+        if columns is None:
+            continue
+        same = [s for s in accepted if not answer.texts or tuple(map(plain, s.columns)) == columns]
+        if not same:
+            wrong.append(f"{name}: {', '.join(columns[:3])} …")
+        elif ASK not in unit and not any(unit in s.units for s in same):
+            wrong.append(f"{name}: unit {unit}")
+    return wrong
 
 
-@layout
-def layout_headerless_without_velocity() -> Layout:
-    """t, q, tau without names: only a person knows which block is which."""
-    m = motion(6, 0.01)
-    data = table({"t": m.t, "q#": m.q, "u#": m.tau}, header=False)
-    answers = {
-        "signals.q.columns": [f"column_{j}" for j in range(2, 8)],
-        "signals.q.unit": "rad",
-        "signals.tau.columns": [f"column_{j}" for j in range(8, 14)],
-    }
-    return Layout(ARM | {"run.csv": data}, m.t, m.q, m.tau, answers)
-
-
-@layout
-def layout_headerless_interleaved() -> Layout:
-    """q1 dq1 tau1 q2 dq2 tau2 …, no clock, no robot."""
-    m = motion(3, 0.002)
-    data = table(
-        {"x#": np.stack([m.q, m.dq, m.tau], axis=2).reshape(SAMPLES, 9)}, " ", header=False
-    )
-    return Layout(
-        {"run.txt": data},
-        m.t,
-        m.q,
-        m.tau,
-        {"robot.use": "rrr", "time.rate": 500.0} | _tau_unit(),
-        "run.txt",
-    )
-
-
-@layout
-def layout_headerless_two_references() -> Layout:
-    """q, q_ref, dq, tau without names: measured and reference look alike."""
-    m = motion(6, 0.01)
-    data = table({"t": m.t, "r#": m.q + 1e-3, "q#": m.q, "d#": m.dq, "u#": m.tau}, header=False)
-    answers = {
-        "signals.q.columns": [f"column_{j}" for j in range(8, 14)],
-        "signals.q.unit": "rad",
-        "signals.tau.columns": [f"column_{j}" for j in range(20, 26)],
-    }
-    return Layout(ARM | {"run.csv": data}, m.t, m.q, m.tau, answers)
-
-
-@layout
-def layout_time_sec_nsec() -> Layout:
-    """time_sec and time_nsec, torques called effort, references beside."""
-    m = motion(6, 0.01)
-    columns: Columns = {
-        "time_sec": 100.0 + np.floor(m.t),
-        "time_nsec": np.round((m.t % 1.0) * 1e9),
-        "pos_des_#1": m.q + 1e-3,
-        "pos_#1": m.q,
-        "vel_#1": m.dq,
-        "eff_#1": m.tau,
-        "eff_des_#1": m.tau - 1.0,
-    }
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_microseconds() -> Layout:
-    """A microcontroller: micros() as "us", currents in mA, a status text."""
-    m = motion(3, 0.002)
-    columns: Columns = {
-        "us": 5e6 + np.round(m.t * 1e6),
-        "state": ["RUN"] * SAMPLES,
-        "pos_rad_#1": m.q,
-        "current_mA_#1": m.tau * 50.0,
-    }
-    return Layout(
-        {"run.csv": table(columns)},
-        m.t,
-        m.q,
-        m.tau,
-        {"robot.use": "rrr", "drive.torque_constant": 20.0},
-    )
-
-
-@layout
-def layout_sample_index() -> Layout:
-    """A counter instead of a clock."""
-    m = motion(6, 0.002)
-    columns: Columns = {"sample": np.arange(SAMPLES), "q#1": m.q, "tau#1": m.tau}
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau, {"time.rate": 500.0})
-
-
-@layout
-def layout_time_that_counts() -> Layout:
-    """A column t that counts 0, 1, 2 at 500 Hz: ms and samples look alike."""
-    m = motion(6, 0.002)
-    return Layout(
-        ARM | {"run.csv": table({"t": np.arange(SAMPLES), "q#1": m.q, "tau#1": m.tau})},
-        m.t,
-        m.q,
-        m.tau,
-        {"time.unit": "sample", "time.rate": 500.0},
-    )
-
-
-@layout
-def layout_clock_times() -> Layout:
-    """Date and time as text, over midnight."""
-    m = motion(6, 0.01)
-    ticks = np.round((86396.0 + m.t) * 1e3).astype(int)
-    stamps = [
-        f"2024-05-{17 + x // 86_400_000} {x // 3_600_000 % 24:02d}:{x // 60_000 % 60:02d}:{x // 1000 % 60:02d}.{x % 1000:03d}"
-        for x in ticks.tolist()
-    ]
-    return Layout(
-        ARM | {"run.csv": table({"timestamp": stamps, "q#1": m.q, "tau#1": m.tau})}, m.t, m.q, m.tau
-    )
-
-
-@layout
-def layout_names_in_front() -> Layout:
-    """pos_elbow, pos_shoulder_lift, …: the robot's names without "joint", in another order."""
-    m = motion(6, 0.01)
-    short = [name.removesuffix("_joint") for name in UR]
-    columns = by_joint(short, "pos_{}", m.q, ALPHABETICAL) | by_joint(
-        short, "torque_{}", m.tau, ALPHABETICAL
-    )
-    return Layout(ARM | {"run.csv": table({"time_s": m.t, **columns})}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_names_without_robot() -> Layout:
-    """The same names with no robot beside: the order is a person's to know."""
-    m = motion(6, 0.01)
-    columns = by_joint(UR, "{}.pos", m.q, ALPHABETICAL) | by_joint(
-        UR, "{}.torque", m.tau, ALPHABETICAL
-    )
-    answers = {
-        "robot.use": "robot/arm.urdf",
-        "signals.q.columns": [f"{name}.pos" for name in UR],
-        "signals.q.unit": "rad",
-        "signals.tau.columns": [f"{name}.torque" for name in UR],
-    }
-    return Layout(
-        {"robot/arm.urdf": urdf(UR), "run.csv": table({"t": m.t, **columns})},
-        m.t,
-        m.q,
-        m.tau,
-        answers,
-    )
-
-
-@layout
-def layout_lift_and_arm() -> Layout:
-    """An arm on a lift: the first joint slides, its columns in mm and N."""
-    m = motion(4, 0.01, slides=(0,))
-    names = ("lift_joint", "joint_1", "joint_2", "joint_3")
-    q = m.q * np.array([1e3, 1.0, 1.0, 1.0])
-    columns: Columns = (
-        {"t [s]": m.t, "lift_joint_pos [mm]": q[:, 0]}
-        | {f"joint_{j}_pos [rad]": q[:, j] for j in (1, 2, 3)}
-        | {"lift_joint_force [N]": m.tau[:, 0]}
-        | {f"joint_{j}_torque [Nm]": m.tau[:, j] for j in (1, 2, 3)}
-    )
-    answers = {
-        "signals.tau.columns": ["lift_joint_force", *(f"joint_{j}_torque" for j in (1, 2, 3))],
-        "signals.tau.unit": ["N", "N m", "N m", "N m"],
-    }
-    return Layout(
-        {"lift.urdf": urdf(names, slides=(0,)), "run.csv": table(columns)}, m.t, m.q, m.tau, answers
-    )
-
-
-@layout
-def layout_two_robots_beside() -> Layout:
-    """Two URDFs in the folder: which one is a person's to say."""
-    m = motion(6, 0.01)
-    data = table({"t": m.t, "q#1": m.q, "tau#1": m.tau})
-    return Layout(
-        {"a.urdf": urdf(UR), "b.urdf": urdf(UR), "run.csv": data},
-        m.t,
-        m.q,
-        m.tau,
-        {"robot.use": "a.urdf"} | _tau_unit(),
-    )
-
-
-@layout
-def layout_two_files() -> Layout:
-    """Positions in one file, torques in another, joints as columns."""
-    m = motion(6, 0.002)
-    return Layout(
-        ARM
-        | {
-            "joint_positions.csv": table({"joint_#1": m.q}),
-            "joint_torques.csv": table({"joint_#1": m.tau}),
-        },
-        m.t,
-        m.q,
-        m.tau,
-        {"time.rate": 500.0} | _tau_unit(),
-        "joint_positions.csv",
-    )
-
-
-@layout
-def layout_command_only() -> Layout:
-    """Only the commanded torque was recorded."""
-    m = motion(6, 0.002)
-    columns: Columns = {
-        "time": m.t,
-        "joint_positions_#": m.q,
-        "joint_velocities_#": m.dq,
-        "commanded_torques_#": m.tau,
-    }
-    return Layout(ARM | {"run.csv": table(columns)}, m.t, m.q, m.tau)
-
-
-@layout
-def layout_trailing_comma() -> Layout:
-    """Rows end in a comma that the header lacks; joints count past 9 as texts would sort."""
-    m = motion(11, 0.002)
-    rows = table({"t": m.t, "q#1": m.q, "tau#1": m.tau}).decode().split("\n")
-    rows[1:] = [row + "," for row in rows[1:] if row]
-    names = tuple(f"joint_{j}" for j in range(1, 12))
-    return Layout(
-        {"arm.urdf": urdf(names), "run.csv": ("\n".join(rows) + "\n").encode()}, m.t, m.q, m.tau
-    )
-
-
-def filled(draft: str, answers: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the recipe with every blank replaced by the answer for its place."""
-    recipe = tomllib.loads(draft)
-    for section, body in recipe.items():
-        for key, value in body.items() if isinstance(body, dict) else ():
-            if isinstance(value, dict):
-                for inner, item in list(value.items()):
-                    if BLANK in str(item):
-                        value[inner] = answers[
-                            f"{section}.{key}.{inner.replace('columns', 'column')}".replace(
-                                "column", "columns"
-                            )
-                        ]
-                        if f"{section}.{key}.scale" in answers:
-                            value["scale"] = answers[f"{section}.{key}.scale"]
-            elif BLANK in str(value):
-                body[key] = answers[f"{section}.{key}"]
-    if recipe["signals"]["tau"].get("unit") in ("A", "mA") and "drive.torque_constant" in answers:
-        recipe.setdefault("drive", {})["torque_constant"] = answers["drive.torque_constant"]
-    if recipe["time"].get("unit") == "sample":
-        recipe["time"]["rate"] = answers["time.rate"]
-    return recipe
-
-
-def verdict(made: Layout, folder: Path) -> Verdict:
-    """Draft, fill in, import, compare."""
-    out, folder = folder / "out", folder / "data"
-    for name, content in made.files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(content)
-    try:
-        draft = guess_recipe(folder / made.recording)
-    except RrridError as problem:
-        return Verdict("asks", f"refused: {problem}")
-    try:
-        recipe = filled(draft.text, {"signals.tau.unit": "N m", **made.answers})
-    except KeyError as place:
-        return Verdict("failed", f"asks for {place}, which has no answer")
-    path = folder / "recipe.toml"
-    path.write_text(tomli_w.dumps(recipe), encoding="utf-8")
+def wrong_values(recipe: str, folder: Path, answer: Answer, run: Run) -> list[str] | str:
+    """Import by a recipe, and return every signal of the log that is not the simulated motion; or why it does not run."""
+    path, out = folder.parent / "recipe.toml", folder.parent / "out"
+    path.write_text(recipe, encoding="utf-8")
     try:
         outcome = run_stage(
             STAGE, Request((), out, no_report=True), Settings(recipe=str(path), source=folder)
         )
     except RrridError as problem:
-        return Verdict("failed", str(problem))
-    log = open_log(next((outcome.folder / "logs").glob("*.h5"))).log
-    differs = [
-        name
-        for name, true, found in (
-            ("t", made.t - made.t[0], log.t - log.t[0]),
-            ("q", made.q, log.q),
-            ("tau", made.tau, log.tau),
-        )
-        if true.shape != found.shape or not np.allclose(true, found, rtol=1e-6, atol=1e-6)
+        return str(problem)
+    with h5py.File(sorted((outcome.folder / "logs").glob("*.h5"))[0]) as log:
+        signals = {name: np.asarray(values) for name, values in log["signals"].items()}
+    t = signals["t"] - signals["t"][0]
+    names = [name for name in ("q", "dq", "tau", "q_ref", "current") if name in signals]
+    return [
+        f"{name}: not the motion"
+        for name in names
+        if not _is_motion(name, t, signals[name], answer, run)
     ]
-    if differs:
-        return Verdict("wrong", f"{', '.join(differs)} differ; blanks {draft.blanks}")
-    return Verdict("asks", ", ".join(draft.blanks)) if draft.blanks else Verdict("right", "")
 
 
-def main(names: Sequence[str]) -> int:
-    """Print the verdict of every layout."""
-    counts: dict[str, int] = {}
-    for name in names or LAYOUTS:
-        with tempfile.TemporaryDirectory() as folder:
-            found = verdict(LAYOUTS[name](), Path(folder))
-        counts[found.outcome] = counts.get(found.outcome, 0) + 1
-        sys.stdout.write(f"{name:32} {found.outcome:7} {found.why[:300]}\n")
-    sys.stdout.write(
-        ", ".join(f"{key} {value}" for key, value in sorted(counts.items()))
-        + f" of {sum(counts.values())}\n"
-    )
-    return int(bool(counts.get("wrong") or counts.get("failed")))
+def _is_motion(name: str, t: np.ndarray, values: np.ndarray, answer: Answer, run: Run) -> bool:
+    """Tell whether a signal of a log is what one of the accepted ones holds."""
+    accepted = [
+        s.values if s.values is not None else getattr(run, name) for s in answer.right.get(name, ())
+    ]
+    return any(_same(t, values, run.t - run.t[0], a, name) for a in accepted)
+
+
+def _same(
+    t: np.ndarray, values: np.ndarray, t_true: np.ndarray, truth: np.ndarray, name: str
+) -> bool:
+    size, truth = truth.std(axis=0), np.column_stack([np.interp(t, t_true, c) for c in truth.T])
+    if values.shape != truth.shape:
+        return False
+    error = values - truth
+    if name in ("q", "q_ref"):
+        error -= 2 * np.pi * np.round(np.median(error, axis=0) / (2 * np.pi))
+    return bool(np.all(np.sqrt(np.mean(error**2, axis=0)) <= SAME * 4 * size))
+
+
+def written(lay: Layout, folder: Path, seed: int) -> tuple[Run, Answer]:
+    """Write a recording, and the robot beside it, into `folder`."""
+    run = simulate(lay.arm, seed, lay.rate, how=lay.how, size=lay.size)
+    if lay.robot:
+        text = lay.arm.urdf() if lay.robot.endswith("urdf") else lay.arm.toml()
+        (folder / lay.robot).write_text(text)
+    return run, lay.write(folder, run)
+
+
+def asks(draft: str) -> list[str]:
+    """Return the lines of a draft that hold a blank."""
+    return [line.strip() for line in draft.splitlines() if ASK in line.partition("#")[0]]
+
+
+def untrue(draft: str, lay: Layout, answer: Answer, run: Run) -> list[str]:
+    """Return what a draft claims that is not true, advice in its comments included."""
+    recipe = tomllib.loads(draft)
+    wrong = wrong_fields(recipe, answer, run, lay.robot)
+    torque = recipe.get("log", {}).get("torque")
+    line = next((line for line in draft.splitlines() if line.startswith("torque =")), "")
+    claimed = torque not in (None, ASK, *answer.torque) and "unsure" not in line
+    if claimed and recipe.get("signals", {}).get("tau"):
+        wrong.append(f"torque: {torque}")
+    if "add sign = -1" in draft:
+        wrong.append("sign")
+    if not asks(draft) and not answer.draftable:
+        wrong.append("a draft without blanks")
+    return wrong
+
+
+def filled(draft: str, answer: Answer, run: Run) -> str | None:
+    """Return the recipe with its blanks filled in from the truth; None where the answer does not say what belongs there."""
+    if not answer.draftable:
+        return None
+    recipe = tomllib.loads(draft)
+    robot, time = recipe.get("robot", {}), recipe.get("time", {})
+    if ASK in str(robot.get("use", "")):
+        robot["use"] = "truth/arm.urdf"
+    if ASK in str(robot.get("tip_link", "")):
+        robot["tip_link"] = f"link_{run.n}"
+    column = time.get("column")
+    known = {plain(name): unit for name, unit in answer.time.items()}
+    if isinstance(column, str) and ASK in time.get("unit", ""):
+        time["unit"] = known.get(column, ASK)
+    if ASK in str(time.get("rate", "")) or time.get("unit") == "sample":
+        time["rate"] = float(1.0 / (run.t[1] - run.t[0]))
+    for name, entry in recipe["signals"].items():
+        truth = answer.right.get(name, (Signal(()),))[0]
+        if ASK in str(entry) and not (truth.columns and answer.texts and truth.units):
+            return None
+        if ASK in str(entry.get("columns", "")):
+            entry["columns"] = list(map(plain, truth.columns))
+        if ASK in str(entry.get("unit", "")):
+            several = truth.units[0].split(",")
+            entry["unit"] = several if len(several) > 1 else several[0]
+    text = tomli_w.dumps(recipe)
+    return None if ASK in text else text
+
+
+def judge(lay: Layout, folder: Path, seed: int) -> tuple[str, str]:
+    """Return (class, details) of one layout, written into `folder`."""
+    folder = folder / "data"
+    folder.mkdir()
+    run, answer = written(lay, folder, seed)
+    try:
+        draft = draft_recipe(folder / answer.file).text
+    except RrridError as problem:
+        return ("refused" if answer.table else "asks"), str(problem)[-300:]
+    (folder.parent / "draft.toml").write_text(draft, encoding="utf-8")
+    blanks, wrong = asks(draft), untrue(draft, lay, answer, run)
+    if wrong:
+        return "wrong", "; ".join(wrong)
+    (folder / "truth").mkdir()
+    (folder / "truth" / "arm.urdf").write_text(lay.arm.urdf())
+    recipe = filled(draft, answer, run) if blanks else draft
+    wrong = wrong_values(recipe, folder, answer, run) if recipe is not None else []
+    if isinstance(wrong, str):
+        return ("failed" if blanks else "refused"), wrong[-300:]
+    if wrong:
+        return "wrong", "; ".join(wrong)
+    return ("asks" if blanks else "right"), ", ".join(line[:60] for line in blanks)
+
+
+def wilson(k: int, n: int) -> tuple[float, float]:
+    """Return the 95 % interval of a rate (Wilson 1927, eq. 4)."""
+    z, p = 1.96, k / n
+    middle, half = p + z * z / (2 * n), z * sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    return (middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)
+
+
+def load(sets: Sequence[str] = SETS) -> list[Layout]:
+    """Return the layouts of some modules, in the order in which they are written."""
+    wanted = [f"benchmarks.layouts_{part}" for part in sets]
+    for module in wanted:
+        import_module(module)
+    return [lay for lay in LAYOUTS if lay.write.__module__ in wanted]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--set", choices=SETS, action="append")
+    parser.add_argument("--keep", type=Path)
+    parser.add_argument("--seed", type=int, default=5100, help="of the first motion")
+    options = parser.parse_args()
+    layouts = load(options.set or SETS)
+    chosen = [lay for lay in layouts if not options.names or lay.name in options.names]
+    counts: Counter[str] = Counter()
+    for k, lay in enumerate(chosen):
+        with tempfile.TemporaryDirectory() as scratch:
+            folder = (options.keep or Path(scratch)) / lay.name
+            folder.mkdir(parents=True, exist_ok=True)
+            verdict, details = judge(lay, folder, seed=options.seed + k)
+        counts[verdict] += 1
+        print(f"{lay.name:26} {verdict:8} {details}", flush=True)
+    good, n = counts["right"] + counts["asks"], len(chosen)
+    low, high = wilson(good, n)
+    print(f"{dict(counts)}: right or asks {good}/{n} = {good / n:.3f} [{low:.3f}, {high:.3f}]")
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.modules["benchmarks.import_layouts"] = sys.modules["__main__"]
+    main()

@@ -50,14 +50,25 @@ UNITS: Final[dict[str, Unit]] = {
     "degC": Unit("temperature", 1.0), "°C": Unit("temperature", 1.0), "K": Unit("temperature", 1.0, -273.15),
 }
 
-_SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "²": "^2", "\u03bc": "µ"})
-_ALIASES: Final = {"µs": "us",
+_SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "•": " ", "∙": " ", "・": " ", "²": "^2", "\u03bc": "µ"})
+_ALIASES = {"µs": "us",
                    "Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
                    "radian": "rad", "radians": "rad", "seconds": "s", "sec": "s", "rad/s2": "rad/s^2",
                    "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "N-m": "N m", "1/min": "rpm",
                    "rad/sec": "rad/s",
                    "deg/sec": "deg/s", "Rad": "rad", "RAD": "rad", "Deg": "deg", "DEG": "deg", "msec": "ms", "usec": "us",
-                   "nsec": "ns", "Grad": "deg", "Grad/s": "deg/s", "U/min": "rpm", "°": "deg", "°/s": "deg/s", "°/s^2": "deg/s^2"}
+                   "nsec": "ns", "Grad": "deg", "Grad/s": "deg/s", "U/min": "rpm",
+                   "°": "deg", "°/s": "deg/s", "°/s^2": "deg/s^2", "r/min": "rpm", "℃": "degC"}
+_IN_OTHER_LANGUAGES: Final = {
+    "rad": "弧度 ラジアン рад radians radianes radianti radianos",
+    "deg": "度 град град. grados degrés gradi graus graden grader stopnie",
+    "rad/s": "弧度/秒 弧度/s рад/с", "deg/s": "度/秒 度/s град/с grados/s degrés/s gradi/s",
+    "rpm": "转/分 об/мин tr/min giri/min obr/min ot/min",
+    "s": "秒 с Sekunden secondes segundos secondi", "ms": "毫秒 ミリ秒 мс", "us": "微秒",
+    "N m": "牛米 牛顿米 Нм", "A": "安 安培 А", "mA": "毫安 мА",
+}  # fmt: skip
+_ALIASES |= {word: unit for unit, words in _IN_OTHER_LANGUAGES.items() for word in words.split()}
+_ALIASES |= {"牛 米": "N m", "Н м": "N m"}
 
 
 def canonical_unit(unit: str) -> str:

@@ -22,7 +22,7 @@ from pipelines.log.recording.evidence import Guess, Slope, units_of_ratio
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.units import UNITS
 
-__all__ = ["Clock", "find_clock", "unit_of_clock"]
+__all__ = ["Clock", "find_clock", "round_rate", "unit_of_clock"]
 
 _COMMON = ("s", "ms", "us", "ns")
 SECONDS = {unit: UNITS[unit].factor for unit in (*_COMMON, "100 ns", "min", "d")}
@@ -241,3 +241,10 @@ def _paced(units: Sequence[str], t: Array, q: Array) -> list[str]:
         return list(units)
     pace = float((moved[good] / elapsed[good]).max()) / span if good.any() else 0.0
     return [unit for unit in units if _PACE[0] <= pace / SECONDS[unit] <= _PACE[1]]
+
+
+def round_rate(rate: float) -> float:
+    """Return the next round rate below, as recorders are set to. [Hz]"""
+    decade = 10.0 ** np.floor(np.log10(rate))
+    rounds = (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+    return float(max(m for m in rounds if m * decade <= rate * (1 + 1e-9)) * decade)

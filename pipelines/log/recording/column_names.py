@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
+from pipelines.log.recording.vocabulary import ALL_WORDS, QUANTITIES, WORDS, plain_letters
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["ColumnName", "read_name", "signal_of", "words_of"]
@@ -21,77 +22,27 @@ __all__ = ["ColumnName", "read_name", "signal_of", "words_of"]
 Origin = Literal["measured", "plain", "commanded"]
 
 
-def _set(words: str) -> frozenset[str]:
-    return frozenset(words.split())
+_COMMANDED, _MEASURED, _MOTOR, _JOINT = (WORDS[k] for k in ("commanded", "measured", "motor", "joint"))
+_PARTIAL = WORDS["partial"]  # of a torque, or what a controller computed: not the torque that moved the joint
+_ESTIMATED = WORDS["estimated"]  # a computed torque; of a motion, what the drive makes of its encoder: the measurement
+_VARIANT = WORDS["variant"]
+_NOUNS = {quantity: WORDS[quantity] for quantity in QUANTITIES}
+_LEAST_OF_COMPOUND = 3  # Latin letters of a word that others are written to without a space, but for these
+_SHORT = frozenset({"q", "qd", "dq", "iq", "fb", "ff", "sp", "tq", "ee", "ft", "io", "est", "soll", "ist"})
 
 
-_QUANTITIES: dict[str, frozenset[str]] = {
-    "position": _set(
-        "q qpos pos position positions posn angle angles theta enc encoder winkel lage jpos "
-        "qs stellung joint_angle ang drehwinkel"
-    ),
-    "velocity": _set(
-        "dq qd qdot dqdt qvel vel vels velo velocity velocities speed speeds omega dtheta "
-        "geschwindigkeit drehzahl jvel winkelgeschwindigkeit spd"
-    ),
-    "acceleration": _set(
-        "ddq qdd qddot acc accel acceleration accelerations beschleunigung ddtheta qacc jacc"
-    ),
-    "torque": _set(
-        "tau torque torques trq tq moment moments effort efforts eff mom drehmoment moment "
-        "drehmomente qfrc jtau tauj jtrq"
-    ),
-    "current": _set("i iq isq curr current currents cur amp amps ampere strom motorstrom"),
-    "time": _set(
-        "t time times timestamp timestamps stamp zeit clock sec secs second seconds nsec nsecs nanosec "
-        "nanosecs nanosecond nanoseconds usec usecs microsec microseconds msec millisec milliseconds "
-        "millis micros nanos elapsed zeitstempel ts uptime datetime date uhrzeit"
-    ),
-    "index": _set(
-        "idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id cycle"
-    ),
-    "temperature": _set("temp temperature temperatures temperatur tmp"),
-    # Numbers of the tool, the mains and the state of the machine: of no joint, or no motion of it.
-    "other": _set(
-        "pose ee eef eff_pose tcp tool flange cart cartesian force forces wrench ft voltage voltages volt volts "
-        "gripper finger fingers status mode error errors err deviation lag limit limits flag digital "
-        "analog io quat quaternion orientation rpy euler translation rotation dtau dtauj jacobian "
-        "power energy pwm duty safety imu gyro camera reward done success rate bus supply battery "
-        "rel relative delta spannung kraft temp_core protective payload mass elbow_config distance schleppfehler"
-    ),
-}
-_COMMANDED = _set(
-    "cmd command commanded commands des desired ref reference references target targets tgt set "
-    "setpoint setpoints sp goal goals soll demand demanded nominal plan planned action actions "
-    "traj trajectory input output vorgabe request requested sollwert cmds as"
-)
-_MEASURED = _set(
-    "meas measured measure measurement msr act actual fb feedback ist real present istwert read "
-    "observation observed sensor sensed obs ai"
-)
-# A part of a torque, or what a controller computed: not the torque that moved the joint.
-_PARTIAL = _set(
-    "ext external gravity grav friction residual inertia coriolis ff feedforward dist disturbance contact "
-    "collision model modelled calc calculated computed predicted sim simulated disturb "
-    "rnea bias observer expected compensation ripple"
-)
-# A computed torque; of a motion, what the drive makes of its encoder: the measurement.
-_ESTIMATED = _set("est estimate estimated")
-_VARIANT = _set("filtered filt filter lp smooth smoothed lowpass hat")
-_MOTOR = _set("motor mot motors rotor drive antrieb encoder servo")
-_JOINT = _set("joint joints jnt jnts axis axes achse gelenk link actuator actuators arm j a")
-_NOISE = _set(
-    "field fields data msg value values val state states robot robots header vector array log record signal "
-    "channel ch info feedback_data raw side of the in and ma active applied control norm normalized normalised scaled"
-)
+def _compounding(word: str) -> bool:
+    """Tell whether a word may be part of another: any of a script without spaces, and the longer ones of Latin letters."""
+    return len(word) >= _LEAST_OF_COMPOUND or not word.isascii() or word in _SHORT
+
+
 _COMPOUND = sorted(
-    {word for words in _QUANTITIES.values() for word in words if len(word) > 1}
-    | _COMMANDED
-    | _MEASURED
-    | _PARTIAL
-    | _ESTIMATED
-    | _MOTOR
-    | {"joint", "jnt", "axis", "achse", "q"} - {"a", "j"},
+    (
+        word
+        for meaning, words in WORDS.items()
+        for word in words
+        if _compounding(word) and (meaning not in ("noise", "variant") or not word.isascii())
+    ),
     key=len,
     reverse=True,
 )
@@ -121,8 +72,7 @@ _UNIT_WORDS = {
 _SUFFIX_UNITS = {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
 
 
-_OTHERS = (_COMMANDED, _MEASURED, _PARTIAL, _ESTIMATED, _VARIANT, _MOTOR, _JOINT, _NOISE)
-_ROLE_WORDS = frozenset[str]().union(*_OTHERS, {"d", "hat"})
+_ROLE_WORDS = frozenset[str]().union(*(words for meaning, words in WORDS.items() if meaning not in QUANTITIES), {"d"})
 
 
 @dataclass(frozen=True)
@@ -143,9 +93,9 @@ class ColumnName:
 def words_of(name: str) -> list[str]:
     """Return the words and numbers of a name in lower case: "measuredJointPos_A1" -> measured joint pos a 1."""
     words: list[str] = []
-    name = _whole_words(name)
+    name = _whole_words(plain_letters(name))
     for part in re.findall(r"\d+|[^\W\d_]+", name):
-        pieces = re.findall(r"[A-ZÄÖÜ]+(?![a-zäöüß])|[A-ZÄÖÜ]?[^A-ZÄÖÜ]+", part)
+        pieces = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[^A-Z]+", part)
         for piece in pieces if len(pieces) > 1 else [part]:
             words += _parts(piece.lower())
     # "q_dot" and "q_ddot" are one word, and so is "d_q".
@@ -177,9 +127,7 @@ def _whole_words(name: str) -> str:
 @lru_cache(maxsize=4096)
 def _parts(word: str) -> tuple[str, ...]:
     """Return the known words that `word` is made of without a rest, else `word` alone."""
-    if len(word) > 40 or any(
-        word in words for words in (*_QUANTITIES.values(), *_OTHERS, _SUFFIX_UNITS)
-    ):
+    if len(word) > 40 or word in ALL_WORDS or word in _SUFFIX_UNITS:
         return (word,)
     for first in _COMPOUND:
         if word.startswith(first) and len(word) > len(first):
@@ -217,7 +165,7 @@ def read_name(column: str, unit: str = "") -> ColumnName:
     nouns = [
         (k, quantity)
         for k, word in enumerate(words)
-        for quantity, known in _QUANTITIES.items()
+        for quantity, known in _NOUNS.items()
         if word in known and not (word in ("a", "j") and len(words) > 2)
     ]
     at, quantity = _head(nouns)
@@ -228,7 +176,9 @@ def read_name(column: str, unit: str = "") -> ColumnName:
         quantity = _without_noun(held)
     named, unit_words = _unit_in_name(column, quantity)
     # A unit in the header is stronger than a word: "temps (s)" is a time, in French.
-    quantity = quantity if quantity == "other" else _quantity_of(unit) or quantity
+    by_unit = quantity if quantity == "other" else _quantity_of(unit) or quantity
+    misused = {words[at]} if at is not None and quantity not in (by_unit, "time") and len(words[at]) > 1 else set()
+    quantity = by_unit
     unit = unit or named
     quantity = quantity or _quantity_of(unit)
     desired = at is not None and "d" in words[at + 1 :]  # Franka Emika: q_d, tau_J_d
@@ -239,7 +189,7 @@ def read_name(column: str, unit: str = "") -> ColumnName:
     now = now or (estimated and moves)
     measured = bool(held & _MEASURED) or now or any(word.startswith("ist") for word in words)
     origin: Origin = "commanded" if commanded else "measured" if measured else "plain"
-    places = {place for place, _ in nouns}
+    places = {place for place, _ in nouns if words[place] not in misused}
     is_role = [
         k in places or word in _ROLE_WORDS or word in unit_words for k, word in enumerate(words)
     ]

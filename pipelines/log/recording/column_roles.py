@@ -23,7 +23,7 @@ __all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quanti
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
-
+_SYMBOLS = frozenset({"q", "qpos", "jpos", "tau", "jtau", "tauj", "qfrc"})  # of mechanics, in SI units
 
 Order = Literal["robot", "numbers", "file", "text"]
 
@@ -44,8 +44,8 @@ class Group:
 
     @property
     def in_si(self) -> bool:
-        """Tell whether a torque has the symbol of mechanics, not a drive's word for what may be a share of a rated torque."""
-        return bool({"tau", "jtau", "tauj", "qfrc"} & {word.rstrip("0123456789") for word in self.words.split()})
+        """Tell whether it has the symbol of mechanics, not a word for degrees or a share of a rated torque."""
+        return bool(_SYMBOLS & {word.rstrip("0123456789") for word in self.words.split()})
 
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:
@@ -186,7 +186,8 @@ def _ordered(members: list[tuple[ColumnName, int | None]], joints: Sequence[str]
         columns, by_text = by_texts(columns, texts, joints)
         order = by_text or order
     first = names[0]
-    unknown = frozenset.intersection(*(frozenset(w for w in name.label if w.isalpha() and len(w) > 1) for name in names))
+    said = [{w for w in name.label if w.isalpha() and (len(w) > 1 or not w.isascii())} for name in names]
+    unknown = frozenset(said[0].intersection(*said[1:]))
     words = " ".join(first.role) or " ".join(first.label)
     return Group(first.quantity, first.origin, first.motor, first.partial, first.filtered,
                  tuple(columns), order, words, unknown if len(names) > 1 else frozenset())

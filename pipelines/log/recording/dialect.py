@@ -8,11 +8,19 @@ from collections import Counter
 from dataclasses import dataclass
 
 from pipelines.errors import Check, InputRejected
+from pipelines.log.recording.column_names import words_of
+from pipelines.log.recording.vocabulary import ALL_WORDS
+from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["MISSING", "Dialect", "TextFormat", "cells_of", "decode", "find_dialect", "is_number", "lines_of"]
+__all__ = ["MISSING", "WITH_UNIT", "Dialect", "TextFormat", "cells_of", "decode", "find_dialect", "holds_number", "is_number",
+           "lines_of"]
 
 MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "-nan", "-NaN", "-"})
 _NUMBER = re.compile(r"[+-]?(\d++\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|Inf|INF|infinity|Infinity)")
+WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d+")  # as spreadsheets show numbers, in quotes
+_ENCODINGS = ("latin-1", "cp932", "gb18030", "cp949", "cp1250", "cp1251")  # without a mark; the first where none fits better
+_HEAD = 8192  # [bytes] in which the names of the columns are
 _COMMENTS = ("#", "%", "//")
 _DELIMITERS = (",", ";", "\t", "|", " ")
 _WORDS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks", "": "one column"}
@@ -90,8 +98,13 @@ def _encoding_of(data: bytes) -> str:
     try:
         data.decode("utf-8")
     except UnicodeDecodeError:
-        return "latin-1"
+        return max(_ENCODINGS, key=lambda encoding: _words_in(data[:_HEAD], encoding))
     return "utf-8"
+
+
+def _words_in(head: bytes, encoding: str) -> int:
+    """Return how many words that name columns the head of a file has in an encoding."""
+    return sum(word in ALL_WORDS for word in words_of(head.decode(encoding, "ignore")))
 
 
 def lines_of(text: str, comment: str | None) -> list[tuple[int, str]]:
@@ -113,7 +126,8 @@ def cells_of(line: str, delimiter: str) -> list[str]:
         import csv
 
         try:
-            return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+            cells = [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]
+            return [cell.replace(",", "") if _THOUSANDS.fullmatch(cell) else cell for cell in cells]
         except (csv.Error, StopIteration):
             pass
     return [cell.strip().strip("'\"") for cell in line.split(delimiter)]
@@ -121,6 +135,14 @@ def cells_of(line: str, delimiter: str) -> list[str]:
 
 def is_number(cell: str, decimal: str = ".") -> bool:
     return _NUMBER.fullmatch(cell.replace(",", ".") if decimal == "," and "." not in cell else cell) is not None
+
+
+def holds_number(cell: str, decimal: str = ".") -> bool:
+    """Tell whether a cell is a number, or one with a known unit behind it: "0.004 sec"."""
+    if is_number(cell, decimal):
+        return True
+    found = WITH_UNIT.fullmatch(cell)
+    return found is not None and canonical_unit(found[2]) in UNITS
 
 
 def find_dialect(lines: list[tuple[int, str]], source: str, given: TextFormat) -> Dialect:
@@ -150,7 +172,7 @@ def _score(sample: list[str], delimiter: str, decimal: str, first: str) -> tuple
     split = [cells_of(line, delimiter) for line in sample]
     width = Counter(map(len, split)).most_common(1)[0][0]
     same = [cells for cells in split if len(cells) == width]
-    numeric = sum(is_number(cell, decimal) or cell in MISSING for cells in same for cell in cells) / (width * len(same))
+    numeric = sum(holds_number(cell, decimal) or cell in MISSING for cells in same for cell in cells) / (width * len(same))
     head = cells_of(first, delimiter)
     fits = float(len(head) == width or all(is_number(cell, decimal) for cell in head))
     # Rounded, so that one torn line does not outweigh a header that fits.

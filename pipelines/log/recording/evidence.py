@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -11,17 +12,16 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
+from pipelines.log.recording.link_evidence import LinkFit, best_unit, unlike_links
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
 from pipelines.log.units import UNITS
 
 __all__ = [
     "Guess",
-    "LinkFit",
     "Slope",
-    "fit_of_links",
+    "crossed",
     "held",
-    "motion_of",
     "position_unit",
     "quarter_turns",
     "rollover",
@@ -50,6 +50,7 @@ class Guess:
     why: str
 
 
+_RAD_OR_DEG = Guess("", "unsure", "less than a turn in rad: rad, or the degrees of a small motion?")
 _RAD_OR_TURNS = Guess("", "unsure", "within half a turn in rad and in revolutions: rad, or rev as servo drives count?")
 
 
@@ -123,12 +124,13 @@ def _slope_over(q: Array, summed: Array, width: int) -> Slope | None:
     return Slope(factor, float(correlation.min()))
 
 
-def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | None,
-                  joints: Sequence[Joint] = (), side: Side = "joint") -> tuple[Guess, str]:
+def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequence[Joint] = (), side: Side = "joint",
+                  fits: Mapping[str, LinkFit] | None = None, in_si: bool = False) -> tuple[Guess, str]:
     """The unit of the positions of turning joints, "" where it stays open, and further keys of the recipe (counts_per_rev, wrap).
 
     `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot;
-    `side` is what the names say: only of a joint does its range of motion say anything.
+    `side` is what the names say: only of a joint does its range of motion say anything. `fits` compare the torque with
+    the robot's links for units that positions can have; `in_si` says that the names are those of a convention in SI units.
     """
     span = float(np.ptp(q, axis=0).max())
     wrap = rollover(q)
@@ -158,7 +160,11 @@ def position_unit(q: Array, t: Array | None, slope: Slope | None, named: str | N
     far = float(np.abs(q).max())  # neither -1..1 nor, of which it would be 6 %, -100..100
     if side == "motor" or (side == "scaled" and not 1.0 < far <= 2.0 * math.pi):
         return Guess("", "unsure", _OPEN_SIDES[side]), further
-    return _by_limits(q, joints, side) or _by_size(q, t, span), further
+    unit, proved = best_unit(fits or {})
+    in_si = in_si and unit in ("", "rad")
+    if proved:
+        return Guess(unit, "likely", f"the torque follows from the motion by the robot's links if it is in {unit}"), further
+    return _by_limits(q, joints, in_si) or _by_size(q, in_si), further
 
 
 def unknown_unit(named: str) -> Guess:
@@ -182,8 +188,8 @@ def _beyond(q: Array, joints: Sequence[Joint], unit: str) -> str:
     return ""
 
 
-def _by_limits(q: Array, joints: Sequence[Joint], side: Side) -> Guess | None:
-    """The unit under which the motion keeps the robot's limits."""
+def _by_limits(q: Array, joints: Sequence[Joint], in_si: bool) -> Guess | None:
+    """The unit under which the motion keeps the robot's limits; a small motion keeps them in any."""
     limited = [(j, joint) for j, joint in enumerate(joints) if all(map(math.isfinite, joint.position))]
     if not limited or len(joints) != q.shape[1]:
         return None
@@ -193,25 +199,25 @@ def _by_limits(q: Array, joints: Sequence[Joint], side: Side) -> Guess | None:
 
     if inside(1.0) and inside(2.0 * math.pi):
         return _RAD_OR_TURNS
+    if inside(1.0) and in_si:
+        return Guess("rad", "likely", f"named so in SI units, and inside the robot's limits; the largest range is "
+                     f"{np.ptp(q, axis=0).max():.3g}")
     if inside(1.0):
-        return Guess("rad", "likely", f"inside the robot's limits in rad; the largest range is {np.ptp(q, axis=0).max():.3g}")
-    if inside(math.pi / 180.0) and side == "":
-        return Guess("", "unsure", "beyond the robot's limits in rad, inside them in deg: deg, or the motor's side in rad?")
+        return _RAD_OR_DEG
     if inside(math.pi / 180.0):
-        return Guess("deg", "likely", "beyond the robot's limits in rad, inside them in deg")
+        return Guess("", "unsure", "beyond the robot's limits in rad, inside them in deg: deg, or the motor's side in rad?")
     return Guess("", "unsure", "outside the robot's limits in rad and in deg: motor side, counts, or another robot?")
 
 
-def _by_size(q: Array, t: Array | None, span: float) -> Guess:
+def _by_size(q: Array, in_si: bool) -> Guess:
     """The unit by what a joint can do, where no limits are known."""
     far = float(np.abs(q).max())
     if far <= 0.5:
         return _RAD_OR_TURNS
+    if far <= 2.05 * math.pi and in_si:
+        return Guess("rad", "likely", f"named so in SI units, and within {far:.3g}")
     if far <= 2.05 * math.pi:
-        speed = (float(np.abs(np.diff(q, axis=0) / np.diff(t)[:, None]).max())
-                 if t is not None and (np.diff(t) > 0).all() else math.nan)
-        why = f"ranges up to {span:.3g}" + (f", speeds up to {speed:.3g} a second" if math.isfinite(speed) else "")
-        return Guess("rad", "likely", f"{why}: a joint's in rad, hardly a movement in deg")
+        return _RAD_OR_DEG
     if far <= 720.0:
         return Guess("", "unsure", f"up to {far:.4g}: more than a turn in rad, so deg? or the motor's side in rad, then [drive]")
     return Guess("", "unsure", f"up to {far:.5g}: neither an arm's in rad nor in deg; motor side, or counts?")
@@ -223,10 +229,9 @@ def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
         return Guess(named, "sure", "named so")
     if named is not None:
         return unknown_unit(named)
-    for unit, factor in (("m", 1.0), ("mm", 1e-3)):
-        if all(map(math.isfinite, joint.position)) and _inside(factor * q, joint):
-            return Guess(unit, "likely", f"inside the limits of sliding joint '{joint.name}' in {unit}")
-    return Guess("", "unsure", f"'{joint.name}' slides: m or mm?")
+    if all(map(math.isfinite, joint.position)) and _inside(q, joint):
+        return Guess("m", "likely", f"inside the limits of sliding joint '{joint.name}' in m")
+    return Guess("", "unsure", f"'{joint.name}' slides: m, cm or mm?")
 
 
 def quarter_turns(q: Array) -> dict[int, int]:
@@ -248,8 +253,8 @@ def held(tau: Array, q: Array) -> Guess:
     both = np.diff(tau, axis=0)[moving[:, :tau.shape[1]]] if tau.shape == q.shape else np.diff(tau, axis=0).ravel()
     share = float(np.mean(both == 0)) if both.size else 0.0
     if share > 0.4 and np.unique(tau).size > 50:
-        return Guess("held-command", "likely", f"{100 * share:.0f} % of the steps between samples are zero while the position "
-                     "moves: a command, held over several samples")
+        return Guess("held-command", "unsure", f"{100 * share:.0f} % of the steps between samples are zero while the position "
+                     "moves: a command, held over several samples, or a measurement from a slower bus?")
     return Guess("measured", "unsure", 'nothing in the numbers tells; ask who recorded them: "held-command" where this is what '
                  "the drive was commanded, to be held until the next sample")
 
@@ -263,7 +268,9 @@ def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tup
     if abs(span / near - 1.0) < _ONE_TURN:
         return (Guess("counts", "likely", f"{why}; the range of {span:.5g} is likely one revolution of {near}; "
                       "add wrap where the counter starts again"), f", counts_per_rev = {near}")
-    return (Guess("counts", "likely" if named else "unsure", f"{why}; the counts of a revolution are in the encoder's data sheet"),
+    if named is None:
+        return Guess("", "unsure", f"{why}: counts (then add counts_per_rev), or thousandths of a degree?"), ""
+    return (Guess("counts", "likely", f"{why}; the counts of a revolution are in the encoder's data sheet"),
             f', counts_per_rev = "{BLANK}"')
 
 
@@ -286,6 +293,14 @@ def _by_velocity(slope: Slope) -> Guess | None:
     return Guess(unit, "likely", f"its slope is {slope.factor:.4g} times the recorded velocity, as with {unit} and {speed}")
 
 
+def crossed(q: Array, dq: Array, t: Array | None) -> tuple[int, int] | None:
+    """Return two joints (from 0) of which the position of one has the velocity of the other for its slope."""
+    for j, k in itertools.permutations(range(q.shape[1]), 2):
+        if slope_of(q[:, [j]], dq[:, [k]], t) is not None and slope_of(q[:, [j]], dq[:, [j]], t) is None:
+            return j, k
+    return None
+
+
 def velocity_unit(slope: Slope, position: str) -> str:
     """The unit of a velocity by that of the position whose slope it is, "" where their ratio fits none."""
     units = units_of_ratio(slope.factor)
@@ -294,29 +309,6 @@ def velocity_unit(slope: Slope, position: str) -> str:
     unit, speed = units
     same = {"rad": "rad/s", "deg": "deg/s", "m": "m/s", "mm": "mm/s", "rev": "rev/s", "turn": "rev/s"}
     return same.get(position, "") if not unit else speed if unit == position else ""
-
-
-@dataclass(frozen=True)
-class Config:
-    """How a torque is compared with what the robot's own links ask for."""
-
-    window: float = 0.1  # [s] of the cubic that is differentiated (Savitzky & Golay 1964): an arm's moves take longer
-    fewest: int = 5  # samples in it: a cubic has four coefficients
-    changes: float = 0.1  # of the links' torque over the motion: else friction and noise are most of what changes
-    explained: float = 0.5  # of the power that friction leaves: most of it, or the torque is not said to follow
-    most: float = 0.8  # of the links' torque is at joints they explain: the light ones of a wrist may be friction alone
-    alone: float = 0.99  # of the torque with its friction, which takes more than a hundredth of any drive's
-    gain: float = 3.0  # a payload as heavy as the links, whose masses are roughly known
-    samples: int = 4000  # of a recording that are compared: ten seconds of a fast one
-
-
-@dataclass(frozen=True)
-class LinkFit:
-    """How a torque follows from the motion by weight and inertia of the robot's own links."""
-
-    gains: Array  # (joints,) recorded torque per N m of the links; nan where they do not explain it
-    followed: bool  # at the joints that have most of the links' torque
-    alone: bool  # without any friction: computed, or simulated
 
 
 def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | None, in_si: bool) -> Guess:
@@ -330,7 +322,7 @@ def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | Non
         return unknown_unit(named)
     if named is None and current:
         return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or a share of the drive's rated current?")
-    off = "" if fit is None or unit not in UNITS or current else _unlike_links(fit, UNITS[unit].factor, named is not None)
+    off = "" if fit is None or unit not in UNITS or current else unlike_links(fit, UNITS[unit].factor, named is not None)
     if off:
         return Guess("", "unsure", f"{'named so, but ' if named else ''}up to {peak:.4g} {unit}: {off}")
     if named is not None:
@@ -341,53 +333,6 @@ def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | Non
         return Guess("", "unsure", f"up to {peak:.4g}, and no links of a robot to compare with: N m of the joint or of the "
                      "motor, a share of a rated torque, or a current in A?")
     return Guess("N m", "likely", f"up to {peak:.4g}, and it follows from the motion by weight and inertia of the robot's links")
-
-
-def _unlike_links(fit: LinkFit, factor: float, named: bool, config: Config = Config()) -> str:
-    """Say how torques differ from what the robot's links ask for, "" where they do not; `factor` is the SI value of their unit."""
-    known = factor * fit.gains[np.isfinite(fit.gains)]
-    if not (fit.followed or named):
-        return "they do not follow from the motion by the robot's own links: measured joint torques in N m?"
-    if not known.size:
-        return ""
-    off = float(known[np.argmax(np.abs(np.log(np.abs(known))))])
-    return "" if 1.0 / config.gain <= abs(off) <= config.gain else (
-        f"{off:.3g} times what weight and inertia of the robot's own links ask for at one joint: a share of a rated torque, "
-        "or the motor's side?")
-
-
-def motion_of(q: Array, t: Array, config: Config = Config()) -> tuple[Array, Array, Array]:
-    """Return q, dq, ddq (samples, joints) [rad] of a recording by local cubics, at samples without a gap nearby."""
-    from scipy.signal import savgol_filter
-
-    step = float(np.median(np.diff(t)))
-    width = max(config.fewest, min(round(config.window / step), (len(q) - 1) // 2) | 1)
-    half = width // 2
-    lasts = t[2 * half :] - t[: -2 * half]  # a window over a gap lasts longer
-    some = half + np.flatnonzero(np.abs(lasts - (width - 1) * step) < 0.5 * width * step)
-    some = some[:: max(1, len(some) // config.samples)]
-    q, dq, ddq = (savgol_filter(q, width, 3, deriv=k, delta=step, axis=0)[some] for k in range(3))
-    return q, dq, ddq
-
-
-def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config()) -> LinkFit | None:
-    """Fit the recorded torque by that of the links' model and by friction, joint by joint; None where the model hardly changes.
-
-    tau = a·model + F sign(dq) + B dq + c; the model explains where it takes most of what friction leaves.
-    """
-    gains, power = np.full(tau.shape[1], math.nan), np.zeros(tau.shape[1])
-    for j in range(tau.shape[1]):
-        friction = np.column_stack([np.sign(dq[:, j]), dq[:, j], np.ones(len(dq))])
-        both = np.column_stack([tau[:, j], model[:, j]])
-        rest, links = (both - friction @ np.linalg.lstsq(friction, both, rcond=None)[0]).T
-        inner, power[j] = float(rest @ links), float(links @ links)
-        if inner**2 > config.explained * float(rest @ rest) * power[j]:
-            gains[j] = inner / power[j]
-    if power.sum() < config.changes**2 * float(np.sum(model**2)):
-        return None  # at rest, or one joint at even speeds
-    followed = float(power[np.isfinite(gains)].sum()) > config.most * float(power.sum())
-    left = np.var(tau - np.nan_to_num(gains) * model, axis=0).sum()
-    return LinkFit(gains, followed, bool(left < (1.0 - config.alone) * np.var(tau, axis=0).sum()))
 
 
 def sign_of(q: Array, tau: Array) -> Guess:

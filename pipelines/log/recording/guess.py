@@ -10,25 +10,21 @@ from __future__ import annotations
 
 import json
 import math
-from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
-from pipelines.log.limits import FEWEST
-from pipelines.log.recording.clock_guess import SECONDS, unit_of_clock
+from pipelines.log.recording.clock_guess import SECONDS, round_rate, unit_of_clock
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
-    LinkFit,
     Slope,
-    fit_of_links,
     held,
-    motion_of,
     position_unit,
     quarter_turns,
     sign_of,
@@ -36,6 +32,7 @@ from pipelines.log.recording.evidence import (
     torque_unit,
     velocity_unit,
 )
+from pipelines.log.recording.link_evidence import LinkFit, fits_by_unit
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.reading import (
     BY_FILE,
@@ -48,6 +45,7 @@ from pipelines.log.recording.reading import (
     with_companion,
 )
 from pipelines.log.recording.recipe_reader import BLANK
+from pipelines.log.recording.sound import lost_numbers, sound_samples
 from pipelines.log.recording.sources import read_table
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.log.units import UNITS
@@ -56,9 +54,7 @@ __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
-_USABLE = 0.8  # of the cells of a column that is looked at
-_FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
-_NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
+_ANGLES, _NAMED = ("rad", "deg", "rev"), "as named"  # what positions may be in where no unit is named; else that
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
 gravity = [0.0, 0.0, -9.81]
@@ -102,49 +98,14 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
     if len(table.columns) > _MOST_COLUMNS:
         raise InputRejected("F16", f"{len(table.columns)} columns: too many to guess what each is", where=path,
                             remedy="export the joints' signals alone, or write the recipe")
-    lost = _lost_numbers(table)
-    table = _sound(table, lost)
+    lost = lost_numbers(table)
+    table = sound_samples(table, lost)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
     companion = companion_for(reading)
     if companion is not None:
-        companion = _sound(companion, lost)
+        companion = sound_samples(companion, lost)
         reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
     return _Drafting(reading, lost, model).draft()
-
-
-def _lost_numbers(table: RawTable) -> list[float]:
-    """Return whole numbers that mark a lost sample: in cells of their own, farther off than all others are apart."""
-    found: Counter[float] = Counter()
-    for column in table.columns.values():
-        values = column[np.isfinite(column) & (np.abs(column) < _NO_NUMBER)]
-        for number in (float(values.min()), float(values.max())) if values.size else ():
-            others = values[values != number]
-            rare = others.size > _USABLE * values.size and np.unique(others[:1000]).size >= 50
-            if number == 0.0 or number != round(number) or not rare:
-                continue  # zero is also a joint at rest
-            room = float(np.ptp(others))
-            if min(abs(number - others.min()), abs(number - others.max())) > _FAR_OFF * room > 0.0:
-                found[number] += values.size - others.size
-    return sorted(number for number, cells in found.items() if cells > 1)
-
-
-def _sound(table: RawTable, lost: Sequence[float]) -> RawTable:
-    """Leave out what would disturb a guess: rows with a hole, an absurd or a lost number, columns of nothing else."""
-    usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
-              for name, values in table.columns.items()}
-    # A table of several topics leaves the cells of the others empty: the rows in which most columns hold numbers.
-    masks = Counter(known.tobytes() for known in usable.values() if known.any())
-    topic = np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
-    usable = {name: known[topic] for name, known in usable.items()}
-    table = replace(table, columns={name: values[topic] for name, values in table.columns.items()}, rows=table.rows[topic],
-                    lines=None if table.lines is None else table.lines[topic])
-    columns = {name: values for name, values in table.columns.items() if usable[name].mean() > _USABLE}
-    keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
-    if keep.sum() < FEWEST:
-        raise InputRejected("T08", f"{int(keep.sum())} samples without a hole", where=table.source,
-                            remedy="give a recording of a motion")
-    return replace(table, columns={name: values[keep] for name, values in columns.items()}, rows=table.rows[keep],
-                   lines=None if table.lines is None else table.lines[keep])
 
 
 class _Drafting:
@@ -171,6 +132,8 @@ class _Drafting:
                 self.t = reading.clock.values * factor
                 self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
         self.current = tau is not None and tau.quantity == "current"
+        self.fits: dict[str, LinkFit] = {}  # by the unit of the positions
+        self.fits = self._fits()
         self.links = self._links()
         self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
 
@@ -255,9 +218,9 @@ class _Drafting:
 
     def _rate(self) -> list[str]:
         """Return [time] without a column: the rate, which a recorded velocity may show."""
-        slope = self.reading.slope
+        slope = self.reading.slope if self._one_unit_of_angle() else None
         rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
-        near = _round_below(1.005 * rate) if math.isfinite(rate) else math.nan
+        near = round_rate(1.005 * rate) if math.isfinite(rate) else math.nan
         if abs(rate / near - 1.0) < 5e-3:  # recorders are set to round rates
             guess = Guess(f"{near:g} Hz", "likely", f"the recorded velocity is {rate:.5g} times the step of the position from "
                           "sample to sample, if both are in one unit of angle")
@@ -266,6 +229,14 @@ class _Drafting:
         self.blanks.append("time.rate")
         return ["[time]", f'rate = "{BLANK}"                        # Hz; no column rises steadily, so only you know it',
                 *self._map_hint(), ""]
+
+    def _one_unit_of_angle(self) -> bool:
+        """Tell whether a velocity without a clock is in the positions' unit: both name it, or are in SI units."""
+        q, dq = self.reading.q.group, self.reading.dq.group
+        if q is None or dq is None:
+            return False
+        position, speed = (unit_of_group(group.columns, self.reading.table)[0] for group in (q, dq))
+        return speed == f"{position}/s" if position or speed else self.reading.in_si
 
     def _map_hint(self) -> list[str]:
         """Positions that rise in even steps without a clock are a map rather than a motion."""
@@ -304,7 +275,8 @@ class _Drafting:
         if turning:
             slope = self.slope if self.t is not None else None  # decides the unit of angle once that of time is known
             joints = [self.joints[j] for j in turning] if self.joints else ()
-            guess, further = position_unit(self.q[:, turning], self.t, slope, named[turning[0]], joints, group.side)
+            guess, further = position_unit(self.q[:, turning], slope, named[turning[0]], joints, group.side,
+                                           self.fits, self.reading.in_si)
             for j in turning:
                 said = named[j] or ""
                 units[j] = said if guess.value and (said in UNITS or said == "counts") else guess.value
@@ -344,8 +316,9 @@ class _Drafting:
         group, slope = self.reading.dq.group, self.slope
         if group is None or slope is None or self.t is None or self.q is None or not self.reading.q.group:
             return []
+        position = self.reading.q.group
         if any(joint.type != "revolute" for joint in self.joints) or self._out_of_order(group) or (
-                self.reading.q.group.order != group.order):
+                position.order != group.order or self._doubt("q", position, self.reading.tau.group) is not None):
             return []
         named = unit_of_group(group.columns, self.reading.table)[0]
         unit = velocity_unit(slope, self._position_units(self.reading.q.group)[0][0])
@@ -366,9 +339,13 @@ class _Drafting:
             return ""
         confirmed = links is not None and links.followed and not links.alone
         words = group.unknown - (other.unknown if other else frozenset())
-        if words and not confirmed and (signal == "tau" or self.slope is None):
+        if words and not (signal == "tau" and confirmed):
             return f"what does '{clean(min(words), 40)}' say of it?"
         named = any(unit_of_group(group.columns, self.reading.torque_table))
+        best = min(self.fits.values(), key=lambda fit: fit.left, default=None)
+        if exchanged := next((fit.exchanged for fit in (links, best) if fit is not None and fit.exchanged is not None), None):
+            first, second = exchanged[0] + 1, exchanged[1] + 1
+            return f"the robot's own links agree far better with joints {first} and {second} exchanged: in which order are they?"
         if links is not None and not links.followed and (signal == "q" or not named):
             return ("torque and motion do not agree by the robot's own links: "
                     "other torques, or the order, unit or zero of the joints?")
@@ -408,21 +385,31 @@ class _Drafting:
             return Guess("", "unsure", f"{peak}, of a file named '{file}': a torque in N m, or a current in A?")
         return guess
 
-    def _links(self) -> LinkFit | None:
-        """Return how the torque follows from the motion by the robot's links; None where links or motion are unknown."""
+    def _fits(self) -> dict[str, LinkFit]:
+        """Return how the torque follows from the motion by the robot's links, for each unit the positions may be in."""
         q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
         if self.model is None or robot is None or group is None or q is None or self.tau is None or self.t is None:
-            return None
-        units = self._position_units(group)[0]
+            return {}
         turning = all(joint.revolute for joint in robot.joints)
-        if not turning or not set(units) <= UNITS.keys() or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
+        if not turning or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
+            return {}
+        named = self._position_units(group)[0]
+        units = {unit: [unit] * self.n for unit in _ANGLES}
+        units = {_NAMED: named} if any(unit_of_group(group.columns, self.reading.table)) else units
+        if not {unit for each in units.values() for unit in each} <= UNITS.keys():
+            return {}
+        factors = {key: np.array([UNITS[unit].factor for unit in each]) for key, each in units.items()}
+        return fits_by_unit(partial(self.model, robot), q, self.tau, self.t, factors)
+
+    def _links(self) -> LinkFit | None:
+        """Return the fit by links in the unit of the positions, where that is open the best; None where the links say nothing."""
+        if not self.fits or self.reading.q.group is None:
             return None
-        tau = motion_of(self.tau, self.t)[0]
-        motion = motion_of(np.unwrap(q * [UNITS[unit].factor for unit in units], axis=0), self.t)
-        if len(tau) < FEWEST:
-            return None  # the steps of time are too uneven
-        model = self.model(robot, *motion)
-        return None if model is None or not np.isfinite(model).all() else fit_of_links(tau, model, motion[1])
+        unit = self._position_units(self.reading.q.group)[0][0]
+        fits = [fit for key, fit in self.fits.items() if key in (_NAMED, unit)] or list(self.fits.values())
+        fits = [fit for fit in fits if fit.followed] or [fit for fit in fits if fit.varies]
+        best = min(fits, key=lambda fit: fit.left, default=None)
+        return best if best is not None and best.varies else None
 
     def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
         """Return a blank line with the candidates, and why none of them was taken."""
@@ -485,7 +472,7 @@ class _Drafting:
         if uneven < 0.05:
             self.evidence.append(f"time is even within {100 * uneven:.2g} %")
             return [f"# time is even within {100 * uneven:.2g} %, every {1e3 * median:.6g} ms: nothing to resample"]
-        rate = _round_below(1.0 / median)
+        rate = round_rate(1.0 / median)
         guess = Guess(f"{rate:g} Hz", "likely",
                       f"steps of {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms, median {1e3 * median:.4g} ms: "
                       "the next round rate below, so that no sample is invented")
@@ -496,11 +483,6 @@ def _also(choice: Choice, table: RawTable) -> list[str]:
     """Return comments that name the other columns of that quantity."""
     return [f"    # also there: {group.words} ({group.quantity}, {group.origin}), {_columns(group.columns, table)}"
             for group in choice.others[:6] if not group.partial]
-
-
-def _round_below(rate: float) -> float:
-    decade = 10.0 ** np.floor(np.log10(rate))
-    return float(max(m for m in (1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0) if m * decade <= rate * (1 + 1e-9)) * decade)
 
 
 def _columns(names: Sequence[str], table: RawTable) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
-from pipelines.log.recording.dialect import MISSING, Dialect, cells_of, is_number
+from pipelines.log.recording.dialect import MISSING, Dialect, cells_of, holds_number, is_number
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["FORMULA", "Header", "find_header", "names_and_units", "split_unit", "without_repeats"]
@@ -28,6 +28,7 @@ _SEARCHED = 40  # lines above the numbers
 _SAMPLED = 20  # lines of numbers that say which columns are numbers
 _MARKS = "#%/*! "  # what a comment begins with
 _DELIMITERS = (",", ";", "\t", " ", "|")
+_BEHIND_SIGN = re.compile(r"(.*[^\s,/])(?:,| /)\s+(\S(?:.{0,18}\S)?)")  # a unit as quantities and axes are labelled
 _NO_UNIT = frozenset({"", "-", "1", "none", "n/a", "[]"})
 FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
@@ -100,7 +101,7 @@ def _numeric_columns(rows: Sequence[Sequence[str]], dialect: Dialect) -> list[in
     columns = []
     for j in range(dialect.width):
         filled = [row[j] for row in rows if row[j] not in MISSING]
-        if sum(is_number(cell, dialect.decimal) for cell in filled) > 0.5 * len(filled):
+        if sum(holds_number(cell, dialect.decimal) for cell in filled) > 0.5 * len(filled):
             columns.append(j)
     return columns
 
@@ -110,7 +111,7 @@ def _is_data(row: Sequence[str], numeric: Sequence[int], dialect: Dialect) -> bo
     if len(numeric) > 2 and [row[j] for j in numeric] == [str(k) for k in range(len(numeric))]:
         return False
     filled = [row[j] for j in numeric if row[j] not in MISSING]
-    return bool(filled) and all(is_number(cell, dialect.decimal) for cell in filled)
+    return bool(filled) and all(holds_number(cell, dialect.decimal) for cell in filled)
 
 
 def _raw_lines_above(text: str, number: int, known: set[int]) -> list[tuple[int, str, bool]]:
@@ -244,8 +245,10 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return ("q1", "deg") for "q1 [deg]" or "q1 (deg)"; an index in brackets is no unit."""
+    """Return ("q1", "deg") for "q1 [deg]", "q1 (deg)", "q1, deg" or "q1 / deg"; an index in brackets is no unit."""
     text = name.strip()
+    if (behind := _BEHIND_SIGN.fullmatch(text)) and canonical_unit(behind[2]) in UNITS:
+        return behind[1], behind[2]
     stem, bracket, rest = text.rpartition(max("[(", key=text.rfind))
     unit = rest[:-1].strip()
     if not bracket or not stem.strip() or rest[-1:] not in ("]", ")") or not 0 < len(unit) <= 20:

@@ -50,7 +50,7 @@ def read_json(data: bytes, source: str) -> RawTable:
             where=source,
             remedy="split the recording, or save it as CSV or NPY",
         )
-    document = _parsed(data, source)
+    document = _of_pandas(_parsed(data, source))
     frames = _frames(document, _DEEPEST)
     if frames is not None:
         return table_of_frames(frames, source)
@@ -66,6 +66,18 @@ def read_json(data: bytes, source: str) -> RawTable:
             remedy="save a list of frames, or one array a signal",
         )
     return columns_of_arrays(arrays, source)
+
+
+def _of_pandas(document: Any) -> Any:
+    """Return a frame that pandas wrote by columns, or as names and rows, as one array a column; anything else as it is."""
+    if not isinstance(document, dict) or not document:
+        return document
+    names, rows = document.get("columns"), document.get("data")
+    if isinstance(names, list) and isinstance(rows, list) and all(isinstance(name, str) for name in names):
+        alike = all(isinstance(row, list) and len(row) == len(names) for row in rows)
+        return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)) if alike and rows else document
+    numbered = all(isinstance(value, dict) and value and all(key.isdecimal() for key in value) for value in document.values())
+    return {name: list(value.values()) for name, value in document.items()} if numbered else document
 
 
 def _parsed(data: bytes, source: str) -> Any:

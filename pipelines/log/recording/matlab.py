@@ -119,7 +119,11 @@ def read_mat73(path: Path, source: str) -> Arrays:
             declared = sum(dataset.nbytes for dataset in members.values())
             if declared > BUDGET or declared > 1100 * path.stat().st_size + (64 << 20):
                 raise InputRejected("X05", f"declares {declared} bytes of samples", where=source, remedy="split the recording")
-            return {name + unit_in(dataset.attrs): _read(dataset) for name, dataset in members.items()}
+            found: Arrays = {}
+            for name, dataset in members.items():
+                for key, values in _columns(name, dataset):
+                    found[distinct(key, found, source)] = values
+            return found
     except InputRejected:
         raise
     except (*_DAMAGE, UnicodeError):
@@ -154,9 +158,30 @@ def _usable(dataset: Any, name: str, source: str) -> Any:
                             remedy="store the data in the file itself")
     if dataset.is_virtual:
         raise InputRejected("X03", f"'{name}' is virtual: refused", where=source, remedy="store the data in the file itself")
-    plain = dataset.dtype.kind in "fiub" and dataset.shape is not None and "MATLAB_empty" not in dataset.attrs
+    numbers = dataset.dtype.kind in "fiub" or dataset.dtype.names is not None
+    plain = numbers and dataset.shape is not None and "MATLAB_empty" not in dataset.attrs
     cell = dataset.attrs.get("MATLAB_class", b"double") in (b"char", "char", b"cell", "cell", b"function_handle", "function_handle")
     return dataset if plain and not cell and 1 <= len(dataset.shape) <= 2 else None
+
+
+def _columns(name: str, dataset: Any) -> list[tuple[str, npt.NDArray[np.generic]]]:
+    """Return the arrays of a data set: itself, the fields of a table of records, or the columns of a frame of pandas by name."""
+    if dataset.dtype.names is not None:
+        return _fields(name, np.asarray(dataset[()]))
+    values = _read(dataset)
+    items = dataset.parent.get(dataset.name.rpartition("/")[2].removesuffix("_values") + "_items")
+    labels = [] if items is None or items.dtype.kind != "S" or items.ndim != 1 else [label.decode() for label in items[()]]
+    if values.ndim == 2 and len(labels) == values.shape[1]:
+        return [(label, values[:, k]) for k, label in enumerate(labels)]
+    return [(name + unit_in(dataset.attrs), values)]
+
+
+def _fields(name: str, records: npt.NDArray[Any]) -> list[tuple[str, npt.NDArray[np.generic]]]:
+    """Return the fields of numbers of a table of records, those of records within them by their path."""
+    if records.dtype.names is None:
+        return [(name, records)] if records.dtype.kind in "fiub" else []
+    parts = [_fields(f"{name}.{field}", records[field]) for field in records.dtype.names[:_MOST_MEMBERS]]
+    return [part for found in parts for part in found]
 
 
 def _read(dataset: Any) -> npt.NDArray[np.generic]:

@@ -26,7 +26,7 @@ from pipelines.log.recording.column_roles import (
     groups_of,
     texts_of,
 )
-from pipelines.log.recording.evidence import Slope, slope_of
+from pipelines.log.recording.evidence import Slope, crossed, slope_of
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
@@ -89,6 +89,13 @@ class Reading:
         return (
             self.arm.robot.n_joints if self.arm.robot else len(groups[0].columns) if groups else 1
         )
+
+    @property
+    def in_si(self) -> bool:
+        """Tell whether the positions have the symbol of mechanics, or stand beside efforts as in ROS, whose units are SI."""
+        q, tau = self.q.group, self.tau.group
+        ros = tau is not None and bool({"effort", "efforts", "eff"} & set(tau.words.split()))
+        return q is not None and (ros or q.in_si)
 
 
 def arm_beside(folder: Path, named: str | None = None) -> Arm:
@@ -164,6 +171,8 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
         alternatives = [g for g in q.others if g.origin != "commanded" and len(g.columns) == speed.shape[1]]
         if slope is None and any(slope_of(matrix(table, g.columns), speed, t) for g in alternatives):
             q = Choice(None, (q.group, *q.others))  # the velocity is another position's
+        elif slope is None and q.group and dq.group.columns and crossed(matrix(table, q.group.columns), speed, t):
+            q, dq = Choice(None, (q.group, *q.others)), Choice(None, (dq.group, *dq.others))  # in two orders of the joints
     return Reading(path, table, arm, clock, q, dq, _in_one_order(q, tau), table, slope, by_evidence)
 
 

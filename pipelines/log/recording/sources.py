@@ -30,7 +30,12 @@ _ENDINGS = {"npy": (".npy",), "npz": (".npz",), "parquet": (".parquet",), "json"
             "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5")}
 _REFUSED = ((b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
             (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
-            (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"))
+            (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"),
+            (b"#ROSBAG", "F06", "a bag of ROS 1", "export its topics: rostopic echo -b FILE -p /joint_states > run.csv"),
+            (b"\x89MCAP0", "F06", "an MCAP file", "export its topics as CSV or JSON"),
+            (b"SQLite format 3", "F06", "a data base, such as a bag of ROS 2", "export its topics or tables as CSV"),
+            (b"TDSm", "F06", "a TDMS file of LabVIEW", "export it as CSV, or save it as MAT"),
+            (b"ARROW1", "F06", "an Arrow (Feather) file", "save it as Parquet"))
 
 
 def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> RawTable:

@@ -17,7 +17,17 @@ import numpy as np
 from pipelines.errors import Check, InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
-from pipelines.log.recording.dialect import MISSING, Dialect, TextFormat, cells_of, decode, find_dialect, is_number, lines_of
+from pipelines.log.recording.dialect import (
+    MISSING,
+    WITH_UNIT,
+    Dialect,
+    TextFormat,
+    cells_of,
+    decode,
+    find_dialect,
+    is_number,
+    lines_of,
+)
 from pipelines.log.recording.header import FORMULA, Header, find_header, names_and_units, without_repeats
 from pipelines.log.recording.labelled import LabelledLines, labelled_lines
 from pipelines.log.recording.raw import RawTable
@@ -34,7 +44,6 @@ _MOST_NOTES = 40  # lines above a table
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
-_WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
 
 
 def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawTable:
@@ -70,6 +79,11 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
                                remedy="give header or comment under [format] if these are data"))
     if not body:
         raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
+    head = text.split("\n")[header.line - 1] if header.line else ""
+    if again := [number for number, line in body if head and line == head]:
+        body = [line for line in body if line[1] != head]
+        checks.append(Check.of("F16", "warn", f"the header comes again in {len(again)} lines, left out: the recorder was started "
+                               "again", where=f"{source}, line {again[0]}", remedy="none where the clock goes on"))
     kept, columns, words, labels = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
     columns = without_repeats(columns, header, source)
     above = list(enumerate(text.split("\n", body[0][0])[: body[0][0] - 1], start=1))[-_MOST_NOTES:]
@@ -232,7 +246,7 @@ def _period(cells: list[str]) -> int | None:
 
 def _with_units(cells: list[str]) -> tuple[Array, str] | None:
     """Numbers that have one known unit behind them, as MATLAB writes a duration: "0.004 sec"."""
-    found = [_WITH_UNIT.fullmatch(cell) for cell in cells]
+    found = [WITH_UNIT.fullmatch(cell) for cell in cells]
     units = {m[2] for m in found if m is not None}
     if not all(found) or len(units) != 1 or (unit := canonical_unit(units.pop())) not in UNITS:
         return None

@@ -9,9 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.import_layouts import motion, urdf
-from benchmarks.outside_formats import THREE
-from benchmarks.outside_layouts import Arm, Run, simulate
+from benchmarks.recorded_arm import THREE, Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
 from pipelines.log.files import open_log
@@ -19,6 +17,8 @@ from pipelines.log.recording.evidence import rollover, sign_of
 from pipelines.log.recording.guess import guess_recipe
 from pipelines.log.recording.recipe_reader import parse_recipe
 from tests.log.recording.good import Array, good, run, text, write
+
+ABC = Arm("abc", ("a", "b", "c"), "zyy", (150, 150, 150))
 
 
 def drafted(folder: Path, content: str, name: str = "run.csv") -> str:
@@ -152,7 +152,7 @@ def test_a_handful_of_samples_is_refused(tmp_path: Path) -> None:
 
 def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
     columns = good()
-    odd = {"t": columns["t"], 'pos "1" \\': columns["q_1"], "tau #1": columns["tau_1"]}
+    odd = {"t": columns["t"], 'pos "1" \\ (rad)': columns["q_1"], "tau #1": columns["tau_1"]}
     draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
     assert parse_recipe(draft.text).signals["q"].column
 
@@ -183,12 +183,12 @@ def test_positions_that_differ_by_a_constant_are_asked_about(tmp_path: Path) -> 
 
 def _table(folder: Path, edit: Callable[[dict[str, Array]], None], header: Mapping[str, str]) -> str:
     """Return the draft for 700 samples at 250 Hz of three joints, edited, with their robot in the folder."""
-    moved = motion(3)
+    moved = simulate(ABC, seed=1, rate=250.0, seconds=2.8)
     columns: dict[str, Array] = {"t": moved.t}
     for name, values in (("q", moved.q), ("dq", moved.dq), ("tau", moved.tau)):
         columns |= {f"{name}{j + 1}": column for j, column in enumerate(values.T)}
     edit(columns)
-    (folder / "arm.urdf").write_bytes(urdf(("a", "b", "c")))
+    (folder / "arm.urdf").write_text(ABC.urdf())
     named = {header.get(name.rstrip("123"), name).replace("#", name[-1]): v for name, v in columns.items()}
     return drafted(folder, text(named))
 
@@ -312,7 +312,7 @@ def test_a_list_of_names_in_one_cell_orders_the_joints(tmp_path: Path) -> None:
     """As a message of ROS holds them, in an order that is not the robot's."""
     rows = text(good()).splitlines()
     content = "\n".join([f"name,{rows[0]}", *(f"\"['c', 'a', 'b']\",{row}" for row in rows[1:])]) + "\n"
-    (tmp_path / "arm.urdf").write_bytes(urdf(("a", "b", "c")))
+    (tmp_path / "arm.urdf").write_text(ABC.urdf())
     assert 'q = { columns = ["q_2", "q_3", "q_1"],' in drafted(tmp_path, content)
 
 
@@ -332,9 +332,83 @@ def test_a_number_that_marks_a_lost_sample_is_proposed(tmp_path: Path) -> None:
 
 def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
     """Four columns whose squares add up to one, called q0 to q3, and the four joints' angles."""
-    half, moved = 0.5 * motion(4).q[:, 0], motion(4)
+    four = Arm("abcd", ("a", "b", "c", "d"), "zyyy", (150,) * 4)
+    moved = simulate(four, seed=1, rate=250.0)
+    half = 0.5 * moved.q[:, 0]
     turned = (np.cos(half), 0.6 * np.sin(half), 0.8 * np.sin(half), 0.0 * half)
     columns = {"t": moved.t} | {f"q{k}": v for k, v in enumerate(turned)}
     columns |= {f"angle{j + 1}": v for j, v in enumerate(moved.q.T)} | {f"tau{j + 1}": v for j, v in enumerate(moved.tau.T)}
-    (tmp_path / "arm.urdf").write_bytes(urdf(("a", "b", "c", "d")))
-    assert 'q = { columns = "angle{j}", unit = "rad" }' in drafted(tmp_path, text(columns))
+    (tmp_path / "arm.urdf").write_text(four.urdf())
+    assert 'q = { columns = "angle{j}", unit = "rad" }' in draft_recipe(write(tmp_path, text(columns))).text
+
+
+@pytest.mark.parametrize(("position", "torque", "encoding"), [
+    ("Posizione misurata giunto # [gradi]", "Coppia giunto # [N·m]", "utf-8"), ("実角度J#[deg]", "関節トルクJ#[Nm]", "cp932"),
+    ("关节#实际角度(度)", "关节#力矩(牛米)", "gb18030"), ("Угол оси #, град", "Момент оси #, Нм", "cp1251")])
+def test_names_in_other_languages_and_encodings_are_read(tmp_path: Path, position: str, torque: str, encoding: str) -> None:
+    columns = good()
+    named = {"t": columns["t"]}
+    for name, signal in ((position, "q"), (torque, "tau")):
+        named |= {name.replace("#", str(j)): columns[f"{signal}_{j}"] * (57.3 if signal == "q" else 1.0) for j in (1, 2, 3)}
+    (tmp_path / "run.csv").write_bytes(text(named, ";").encode(encoding))
+    draft = guess_recipe(tmp_path / "run.csv")
+    assert draft.blanks == ("robot.use",)
+    assert 'unit = "deg" }' in draft.text
+    assert 'unit = "N m" }' in draft.text
+
+
+@pytest.mark.parametrize(("factor", "unit"), [(1.0, "rad"), (180.0 / np.pi, "deg"), (55.0, "FILL IN")])
+def test_the_torque_proves_the_unit_of_positions_without_a_velocity(tmp_path: Path, factor: float, unit: str) -> None:
+    """Weight turns with sin(q): a motor's radians behind a gear of 55 would be degrees by their size alone."""
+    load = 55.0 if unit == "FILL IN" else 1.0
+    draft = _arm(tmp_path, lambda run: _block("position #", run.q * factor) | _block("torque #", run.tau / load))
+    assert f'q = {{ columns = "position {{j}}", unit = "{unit}" }}' in draft
+
+
+def test_a_small_motion_without_a_unit_is_asked_about(tmp_path: Path) -> None:
+    """Up to 5.7: less than a turn in rad, and as well a few degrees."""
+    columns = good()
+    named = {"t": columns["t"]} | {f"axis position {j}": 4.0 * columns[f"q_{j}"] for j in (1, 2, 3)}
+    named |= {f"axis torque {j} [Nm]": columns[f"tau_{j}"] for j in (1, 2, 3)}
+    assert "rad, or the degrees of a small motion?" in drafted(tmp_path, text(named))
+
+
+@pytest.mark.parametrize("also", [True, False])
+def test_joints_that_stand_in_each_others_place_are_asked_about(tmp_path: Path, also: bool) -> None:
+    """Joints 2 and 3 exchanged in both, or in the torques alone: the robot's links agree far better the other way round."""
+    order = [0, 2, 1]
+    draft = _arm(tmp_path, lambda run: _block("q#", run.q[:, order] if also else run.q) | _block("tau#", run.tau[:, order]))
+    assert "agree far better with joints 2 and 3 exchanged" in draft
+
+
+def test_velocities_in_another_order_than_the_positions_are_asked_about(tmp_path: Path) -> None:
+    draft = _arm(tmp_path, lambda run: _block("q#_rad", run.q) | _block("dq#", run.dq[:, [1, 0, 2]]) | _block("tau#_Nm", run.tau))
+    assert 'q = { columns = "FILL IN"' in draft
+
+
+def test_a_table_of_records_in_hdf5_is_read_like_named_columns(tmp_path: Path) -> None:
+    import h5py
+
+    columns = good()
+    records = np.zeros(len(columns["t"]), [("t", "f8"), ("state", "S4"), ("q", "f8", 3), ("tau", "f8", 3)])
+    records["t"] = columns["t"]
+    for signal in ("q", "tau"):
+        records[signal] = np.column_stack([columns[f"{signal}_{j}"] for j in (1, 2, 3)])
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["session/samples"] = records
+    draft = guess_recipe(tmp_path / "run.h5")
+    assert 'q = { columns = "session.samples.q_{j}", unit = "rad" }' in draft.text
+    assert draft.blanks == ("robot.use",)
+
+
+@pytest.mark.parametrize("orient", ["columns", "split", "records"])
+def test_a_frame_that_pandas_wrote_as_json_is_read(tmp_path: Path, orient: str) -> None:
+    pd.DataFrame(good()).to_json(tmp_path / "run.json", orient=orient)
+    assert guess_recipe(tmp_path / "run.json").blanks == ("robot.use",)
+
+
+def test_a_header_that_comes_again_is_left_out(tmp_path: Path) -> None:
+    rows = text(good()).splitlines()
+    draft = drafted(tmp_path, "\n".join([*rows[:600], rows[0], *rows[600:]]) + "\n")
+    assert "the header comes again in 1 lines" in draft
+    assert "1200 samples" in draft

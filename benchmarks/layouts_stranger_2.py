@@ -13,35 +13,24 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.outside_formats import (
-    FOUR,
-    GEN3,
-    IIWA,
-    LEFT,
-    PANDA,
-    SCARA,
-    SIX,
-    THREE,
-    TWO,
+from benchmarks.import_layouts import (
     UNITS,
-    UR,
+    Answer,
+    Signal,
     current,
+    layout,
+    recorded,
+    si,
     stamps,
     state,
     table,
     values,
     wide,
 )
-from benchmarks.outside_formats_5 import SEVEN as ARM7
-from benchmarks.outside_layouts import Answer, Run, Signal, layout
+from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEFT, PANDA, SCARA, SEVEN, SIX, THREE, TWO, UR, Run
 
 turns = partial(layout, how="turns")
 moves = partial(layout, how="points")
-UNITS |= {"mA": ("mA",), "A": ("A",), "kNm": ("kN m", "kNm"), "deg/s": ("deg/s",)}
-
-
-def si(pattern: str, n: int, unit: str, start: int = 1, v: np.ndarray | None = None) -> Signal:
-    return Signal(tuple(pattern.format(start + j) for j in range(n)), UNITS[unit], v)
 
 
 @turns(SIX, rate=125.0)
@@ -60,15 +49,13 @@ def dobot_feedback(folder: Path, run: Run) -> Answer:
     return Answer("dobot.csv", {"time_stamp": "ms"}, right=right, draftable=False)
 
 
-@turns(ARM7, rate=500.0)
+@turns(SEVEN, rate=500.0)
 def flexiv_rdk(folder: Path, run: Run) -> Answer:
     """Flexiv RDK states: q, theta, dq, dtheta, tau, tau_des, tau_dot, tau_ext of seven joints."""
     specs = "t=t; *q{}=q; theta{}=theta; *dq{}=dq; dtheta{}=dq; *tau{}=tau; tau_des{}=tau_ref;"
     specs += "tau_dot{}=rate; tau_ext{}=ext; ext_wrench_in_tcp_x=x"
     more = {"theta": run.q + run.tau / 9000, "rate": run.tau_ext * 100}
-    columns, right = wide(run, specs, **more)
-    table(folder / "rdk.csv", columns, float_format="%.7g")
-    return Answer("rdk.csv", {"t": "s"}, right=right)
+    return recorded(folder, run, "rdk.csv", {"t": "s"}, specs, data=more, float_format="%.7g")
 
 
 @moves(SIX, rate=125.0)
@@ -132,9 +119,8 @@ def slow_fieldbus(folder: Path, run: Run) -> Answer:
     specs = "Date=date; Time=time; ms=ms; *Axis{}_ActPos_deg=q°; *Axis{}_ActTorque_Nm=tau"
     more = {"date": stamps(run, "%d.%m.%Y"), "time": stamps(run, "%H:%M:%S")}
     more |= {"ms": (values(run)["ms"] + 250) % 1000}
-    columns, right = wide(run, specs, **more)
-    table(folder / "plc.csv", columns, sep=";", float_format="%.4f")
-    return Answer("plc.csv", {}, right=right, draftable=False)
+    return recorded(folder, run, "plc.csv", {}, specs, known=False, data=more, sep=";",
+        float_format="%.4f")
 
 
 @turns(UR, rate=125.0)
@@ -230,11 +216,9 @@ def percent_speed(folder: Path, run: Run) -> Answer:
 def torque_in_kilonewton(folder: Path, run: Run) -> Answer:
     """A heavy robot's log in kN m, angles in mrad, time in µs: odd units, all of them named."""
     more = {"mrad": 1000 * run.q, "kn": run.tau / 1000}
-    columns, right = wide(
-        run, "T [µs]=us; *phi{} [mrad]=mrad:q:mrad; *M{} [kNm]=kn:tau:kNm", **more
-    )
-    table(folder / "heavy.csv", columns, float_format="%.8f")
-    return Answer("heavy.csv", {"T [µs]": "us"}, right=right)
+    return recorded(folder, run, "heavy.csv", {"T [µs]": "us"},
+        "T [µs]=us; *phi{} [mrad]=mrad:q:mrad; *M{} [kNm]=kn:tau:kNm", data=more,
+        float_format="%.8f")
 
 
 @moves(UR, rate=125.0)
@@ -269,18 +253,17 @@ def reversed_numbers(folder: Path, run: Run) -> Answer:
 def sensor_offsets(folder: Path, run: Run) -> Answer:
     """A torque sensor's log with raw and tared values; both are measured, the tared one is right."""
     specs = "t [s]=t; *q{} [rad]=q; tau{}_raw [Nm]=raw; *tau{}_tared [Nm]=tau"
-    columns, right = wide(run, specs, raw=run.tau + np.array([4.1, -7.3, 2.2]))
-    table(folder / "sensors.csv", columns, float_format="%.6f")
-    return Answer("sensors.csv", {"t [s]": "s"}, right=right)
+    return recorded(folder, run, "sensors.csv", {"t [s]": "s"}, specs,
+        data={"raw": run.tau + np.array([4.1, -7.3, 2.2])}, float_format="%.6f")
 
 
 @turns(SIX, rate=200.0)
 def gravity_free_torque(folder: Path, run: Run) -> Answer:
     """An impedance controller logs tau_J_d as libfranka wants it: without gravity and friction."""
     part = 0.15 * run.tau_ext + 3 * (run.q_ref - run.q)
-    columns, right = wide(run, "time=t; *q_{}=q; *dq_{}=dq; tau_J_d_{}=part", part=part)
-    table(folder / "impedance.csv", columns, float_format="%.6f")
-    return Answer("impedance.csv", {"time": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "impedance.csv", {"time": "s"},
+        "time=t; *q_{}=q; *dq_{}=dq; tau_J_d_{}=part", known=False, data={"part": part},
+        float_format="%.6f")
 
 
 @layout(IIWA, rate=200.0)
@@ -301,18 +284,16 @@ def deviation_first(folder: Path, run: Run) -> Answer:
         "Zeit [ms]=ms; Regelabweichung A{} [°]=lag; *Istlage A{} [°]=q°; *Solllage A{} [°]=q_ref°;"
     )
     specs += "*Antriebsmoment A{} [Nm]=tau"
-    columns, right = wide(run, specs, lag=np.degrees(run.q_ref - run.q))
-    table(folder / "achsen.csv", columns, sep=";", decimal=",", float_format="%.5f")
-    return Answer("achsen.csv", {"Zeit [ms]": "ms"}, right=right)
+    return recorded(folder, run, "achsen.csv", {"Zeit [ms]": "ms"}, specs,
+        data={"lag": np.degrees(run.q_ref - run.q)}, sep=";", decimal=",", float_format="%.5f")
 
 
 @moves(SIX, rate=250.0)
 def deviation_alone(folder: Path, run: Run) -> Answer:
     """Only the control deviation and the torque were recorded: no position is there at all."""
     specs = "Zeit [ms]=ms; Regelabweichung A{} [°]=lag; *Moment A{} [Nm]=tau"
-    columns, right = wide(run, specs, lag=np.degrees(run.q_ref - run.q))
-    table(folder / "nur_abweichung.csv", columns, sep=";", decimal=",", float_format="%.5f")
-    return Answer("nur_abweichung.csv", {"Zeit [ms]": "ms"}, right=right, draftable=False)
+    return recorded(folder, run, "nur_abweichung.csv", {"Zeit [ms]": "ms"}, specs, known=False,
+        data={"lag": np.degrees(run.q_ref - run.q)}, sep=";", decimal=",", float_format="%.5f")
 
 
 @turns(TWO, robot=None, rate=500.0)
@@ -420,18 +401,16 @@ def chinese_headers(folder: Path, run: Run) -> Answer:
 @moves(THREE, rate=250.0)
 def chinese_external_alone(folder: Path, run: Run) -> Answer:
     """The same tool with the external torque (外力矩) as the only one: it is no joint torque."""
-    columns, right = wide(run, "时间(ms)=ms; *关节位置{}(deg)=q°; 外力矩{}(Nm)=ext")
-    table(folder / "日志.csv", columns, float_format="%.5f")
-    return Answer("日志.csv", {"时间(ms)": "ms"}, right=right, draftable=False)
+    return recorded(folder, run, "日志.csv", {"时间(ms)": "ms"},
+        "时间(ms)=ms; *关节位置{}(deg)=q°; 外力矩{}(Nm)=ext", known=False, float_format="%.5f")
 
 
 @turns(SIX, rate=250.0)
 def sim_ground_truth(folder: Path, run: Run) -> Answer:
     """A simulator with sensor noise: q_true, q_meas, tau_true, tau_meas; both sets are the motion."""
     specs = "sim_time=t; q_true_{}=q; *q_meas_{}=q; *tau_meas_{}=tau; tau_true_{}=model"
-    columns, right = wide(run, specs, model=run.tau_ref)
-    table(folder / "sim.csv", columns, float_format="%.7f")
-    return Answer("sim.csv", {"sim_time": "s"}, right=right)
+    return recorded(folder, run, "sim.csv", {"sim_time": "s"}, specs, data={"model": run.tau_ref},
+        float_format="%.7f")
 
 
 @moves(SIX, rate=200.0)
@@ -477,7 +456,7 @@ def half_hourly_zip(folder: Path, run: Run) -> Answer:
     columns, _ = wide(run, "t=t; q{}=q; tau{}=tau")
     text = pd.DataFrame(columns).to_csv(index=False)
     (folder / "log.csv.gz").write_bytes(gzip.compress(text.encode()))
-    return Answer("log.csv.gz", draftable=False)
+    return Answer("log.csv.gz", table=False)
 
 
 @moves(SIX, rate=250.0)
@@ -525,9 +504,8 @@ def sparse_topics(folder: Path, run: Run) -> Answer:
 def restarted_counter(folder: Path, run: Run) -> Answer:
     """A 16-bit millisecond counter that starts again during the run, beside nothing else of time."""
     tick = (values(run)["ms"] + 60000) % 65536
-    columns, right = wide(run, "tick_ms=tick; *q{}_rad=q; *tau{}_Nm=tau", tick=tick)
-    table(folder / "tick.csv", columns, float_format="%.6f")
-    return Answer("tick.csv", {"tick_ms": "ms"}, right=right)
+    return recorded(folder, run, "tick.csv", {"tick_ms": "ms"},
+        "tick_ms=tick; *q{}_rad=q; *tau{}_Nm=tau", data={"tick": tick}, float_format="%.6f")
 
 
 @moves(SIX, rate=250.0)

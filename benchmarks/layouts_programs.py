@@ -1,4 +1,4 @@
-"""Write one simulated motion as drives, tools and file formats store it (see outside_formats)."""
+"""Write one simulated motion as drives, tools and file formats store it (see import_layouts)."""
 
 import json
 from pathlib import Path
@@ -7,35 +7,26 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from benchmarks.outside_formats import (
+from benchmarks.import_layouts import (
     DEG,
     DEGS,
-    FOUR,
-    GEN3,
-    IIWA,
-    LEFT,
     NM,
-    PANDA,
     RAD,
     RADS,
-    SCARA,
-    SIX,
-    THREE,
     TURNS,
-    TWO,
     UNITS,
-    UR,
+    Answer,
+    Signal,
     anywhere,
     block,
     csv,
+    layout,
     names,
+    recorded,
     values,
     wide,
-)  # fmt: skip
-from benchmarks.outside_layouts import Answer, Arm, Run, Signal, layout
-
-JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll")
-SO100 = Arm("so100", JOINTS, "zyyyx", (60, 60, 40, 20, 10))
+)
+from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEFT, PANDA, SCARA, SIX, SO100, THREE, TWO, UR, Run
 
 
 @layout(TWO, robot=None)
@@ -277,9 +268,8 @@ def arduino_bridge(folder: Path, run: Run) -> Answer:
     rng = np.random.default_rng(2)
     specs = "pc_time_s=pc; arduino_ms=board; *q{}=q; *q{}_ref=q_ref; *u{}=share:tau:?"
     more = {"pc": 1.7e9 + run.t + 0.004 * rng.random(len(run.t)), "board": values(run)["ms"] + 512}
-    columns, right = wide(run, specs, share=run.tau / abs(run.tau).max(axis=0), **more)
-    csv(folder / "log.csv", columns)
-    return Answer("log.csv", {"pc_time_s": "s", "arduino_ms": "ms"}, right=right, draftable=False)
+    return recorded(folder, run, "log.csv", {"pc_time_s": "s", "arduino_ms": "ms"}, specs,
+        known=False, data={"share": run.tau / abs(run.tau).max(axis=0), **more})
 
 
 @layout(SIX, robot=None, rate=500.0)
@@ -290,9 +280,8 @@ def abb_test_signals(folder: Path, run: Run) -> Answer:
     """
     gear = np.array([100.0, -120.0, 110.0, 80.0, 90.0, 60.0])
     specs = "Time=t; *1718 ROB_1 axis {}=angle:q:?; *1717 ROB_1 axis {}=speed:dq:?; *4947 ROB_1 axis {}=torque:tau:?"
-    columns, right = wide(run, specs, angle=run.q * gear, speed=run.dq * gear, torque=run.tau / gear)
-    csv(folder / "signals.log", columns, sep=";")
-    return Answer("signals.log", {"Time": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "signals.log", {"Time": "s"}, specs, known=False,
+        data={"angle": run.q * gear, "speed": run.dq * gear, "torque": run.tau / gear}, sep=";")
 
 
 @layout(SIX, rate=100.0)
@@ -300,9 +289,7 @@ def xarm_report(folder: Path, run: Run) -> Answer:
     """xArm SDK report saved by a script: angles in deg without a unit, currents, no torque."""
     specs = "stamp=stamp; state=1; mode=0; cmdnum=3; *angle_j{}=q°; *speed_j{}=dq°; *current_j{}=amps:current; "
     specs += "voltage_j{}=24.000000; temp_j{}=temp; err=OK"
-    columns, right = wide(run, specs, stamp=1.7e9 + run.t)
-    csv(folder / "report.csv", columns)
-    return Answer("report.csv", {"stamp": "s"}, right=right)
+    return recorded(folder, run, "report.csv", {"stamp": "s"}, specs, data={"stamp": 1.7e9 + run.t})
 
 
 @layout(THREE, robot="robot.toml")
@@ -318,9 +305,8 @@ def matlab_timetable(folder: Path, run: Run) -> Answer:
 def excel_quoted(folder: Path, run: Run) -> Answer:
     """Excel-minded logger: a line "sep=;", numbers in quotes with decimal commas, German names."""
     specs = "Zeit [s]=t; *Istwinkel {} [°]=q°; *Sollwinkel {} [°]=q_ref°; *Drehmoment {} [Nm]=tau"
-    columns, right = wide(run, specs)
-    csv(folder / "messung.csv", columns, head="sep=;\r\n", sep=";", decimal=",", quoting=1)
-    return Answer("messung.csv", {"Zeit [s]": "s"}, right=right)
+    return recorded(folder, run, "messung.csv", {"Zeit [s]": "s"}, specs, head="sep=;\r\n", sep=";",
+        decimal=",", quoting=1)
 
 
 @layout(UR)
@@ -366,9 +352,8 @@ def canopen_objects(folder: Path, run: Run) -> Answer:
     specs += "*Axis{}_0x606C=speed:dq:counts/s; *Axis{}_0x6077=load:tau:?; Axis{}_0x6041=4663"
     more = {name: np.round(v).astype(int) for name, v in data.items()}
     ns = np.round(run.t * 1e9).astype(np.int64)
-    columns, right = wide(run, specs, joint_wise=True, ns=ns, **more)
-    csv(folder / "bus.csv", columns)
-    return Answer("bus.csv", {"timestamp_ns": "ns"}, right=right, draftable=False)
+    return recorded(folder, run, "bus.csv", {"timestamp_ns": "ns"}, specs, joint_wise=True,
+        known=False, data={"ns": ns, **more})
 
 
 @layout(PANDA, rate=20.0)
@@ -403,9 +388,7 @@ def dymola_result(folder: Path, run: Run) -> Answer:
     """Modelica result as CSV: quoted paths, phi, w, a, tau (Modelica.Mechanics.Rotational)."""
     at = "*robot.axis{}."
     specs = f"time=t; {at}phi=q; {at}w=dq; {at}a=ddq; {at}flange_a.tau=tau"
-    columns, right = wide(run, specs, joint_wise=True)
-    csv(folder / "result.csv", columns, quoting=2)
-    return Answer("result.csv", {"time": "s"}, right=right)
+    return recorded(folder, run, "result.csv", {"time": "s"}, specs, joint_wise=True, quoting=2)
 
 
 @layout(THREE, robot="robot.toml", rate=500.0)
@@ -428,9 +411,8 @@ def sinamics_trace(folder: Path, run: Run) -> Answer:
     specs += "*Drive_{}.r61 Actual speed [rpm]=rpm:dq:rpm; *Drive_{}.r80 Actual torque [Nm]=torque:tau"
     more = {"counts": np.round(run.q * gear * 1e4), "rpm": run.dq * gear * 30 / np.pi}
     more |= {"torque": run.tau / gear, "time": run.t * 1000}
-    columns, right = wide(run, specs, joint_wise=True, **more)
-    csv(folder / "trace.csv", columns, sep=";")
-    return Answer("trace.csv", {"Time [ms]": "ms"}, right=right, draftable=False)
+    return recorded(folder, run, "trace.csv", {"Time [ms]": "ms"}, specs, joint_wise=True,
+        known=False, data=more, sep=";")
 
 
 @layout(UR, rate=125.0)
@@ -448,18 +430,15 @@ def webots_sensors(folder: Path, run: Run) -> Answer:
 def coppelia_graph(folder: Path, run: Run) -> Answer:
     """CoppeliaSim graph export: "/m0609/joint_1: position (deg)", forces in N*m, time in s."""
     specs = "Time (s)=t; */m0609/{}: position (deg)=q°; */m0609/{}: target position (deg)=q_ref°; "
-    columns, right = wide(run, specs + "*/m0609/{}: force (N*m)=tau", run.arm.joints, joint_wise=True)
-    csv(folder / "graph.csv", columns)
-    return Answer("graph.csv", {"Time (s)": "s"}, right=right)
+    return recorded(folder, run, "graph.csv", {"Time (s)": "s"},
+        specs + "*/m0609/{}: force (N*m)=tau", run.arm.joints, joint_wise=True)
 
 
 @layout(SIX, rate=500.0)
 def dot_by_letter_p(folder: Path, run: Run) -> Answer:
     """A German laboratory's notation: q, qp and qpp for the derivatives ("Punkt")."""
     specs = "t=t; *q{}=q; *qp{}=dq; *qpp{}=ddq; *qsoll{}=q_ref; *tauM{}=tau; tauExt{}=ext"
-    columns, right = wide(run, specs)
-    csv(folder / "versuch.dat", columns, sep=" ", float_format="%.8e")
-    return Answer("versuch.dat", {"t": "s"}, right=right)
+    return recorded(folder, run, "versuch.dat", {"t": "s"}, specs, sep=" ", float_format="%.8e")
 
 
 @layout(THREE, robot="robot.toml")
@@ -490,9 +469,7 @@ def two_arms(folder: Path, run: Run) -> Answer:
 def greek_names(folder: Path, run: Run) -> Answer:
     """A notebook's data frame with Greek names, written by pandas with its index."""
     specs = "t [s]=t; *φ{} [°]=q°; *φ̇{} [°/s]=dq°; *τ{} [N·m]=tau; ϑ{} [°C]=temp"
-    columns, right = wide(run, specs)
-    csv(folder / "greek.csv", columns, index=True)
-    return Answer("greek.csv", {"t [s]": "s"}, right=right)
+    return recorded(folder, run, "greek.csv", {"t [s]": "s"}, specs, index=True)
 
 
 @layout(SO100, rate=30.0)
@@ -501,6 +478,5 @@ def so100_normalised(folder: Path, run: Run) -> Answer:
     reach = np.array([1.9, 1.7, 1.6, 1.8, 2.8])
     specs = "timestamp=t; frame_index=count; *observation.{}.pos=state:q:?; observation.gripper.pos=42.000000; "
     more = {"state": 100 * run.q / reach, "goal": 100 * run.q_ref / reach}
-    columns, right = wide(run, specs + "*action.{}.pos=goal:q_ref:?", run.arm.joints, **more)
-    csv(folder / "episode.csv", columns)
-    return Answer("episode.csv", {"timestamp": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "episode.csv", {"timestamp": "s"},
+        specs + "*action.{}.pos=goal:q_ref:?", run.arm.joints, known=False, data=more)

@@ -17,23 +17,20 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.outside_formats import (
-    SIX,
-    THREE,
-    UR,
+from benchmarks.import_layouts import (
+    Answer,
     current,
+    layout,
+    recorded,
     stamps,
     state,
     table,
     values,
     vector,
     wide,
-)  # fmt: skip
-from benchmarks.outside_layouts import Answer, Arm, Run, layout
+)
+from benchmarks.recorded_arm import LEG, SEVEN, SIX, THREE, UR, Run
 
-ARM7 = tuple(f"arm7_joint{j}" for j in range(1, 8))
-TWO = Arm("leg2", ("hip", "knee"), "yy", (60, 40))
-SEVEN = Arm("arm7", ARM7, "zyzyzyz", (80, 80, 60, 60, 12, 12, 10))
 DATE = "*"  # time of day and date as text: it has no unit
 
 
@@ -79,11 +76,10 @@ def kuka_trace_de(folder: Path, run: Run) -> Answer:
     specs = "Zeit [s]=t; *Sollposition A{} [°]=q_ref°; *Istposition A{} [°]=q°;"
     specs += "*Istgeschwindigkeit A{} [°/s]=dq°; *Istmoment A{} [Nm]=tau; Strom A{} [A]=current;"
     specs += "Motortemperatur A{} [K]=kelvin"
-    columns, right = wide(run, specs, kelvin=run.temperature + 273)
     head = "KRC Trace;V8.6.9\nDatei;TRACE_DEF_Übung.r64\nDatum;12.03.2024 09:41\n\n"
     how = {"sep": ";", "decimal": ",", "float_format": "%.5f"}
-    table(folder / "Trace.csv", columns, head, encoding="cp1252", **how)
-    return Answer("Trace.csv", {"Zeit [s]": "s"}, right=right)
+    return recorded(folder, run, "Trace.csv", {"Zeit [s]": "s"}, specs,
+        data={"kelvin": run.temperature + 273}, head=head, encoding="cp1252", **how)
 
 
 @layout(SEVEN, rate=100.0)
@@ -93,9 +89,8 @@ def sunrise_data_recorder(folder: Path, run: Run) -> Answer:
     specs = "ZeitInSec=s; ZeitInNanoSec=ns; axisTauExtMsr_LBR_iiwa_14_R820_1_A{}=ext;"
     specs += "*axisTauMsr_LBR_iiwa_14_R820_1_A{}=tau; *axisQCmd_LBR_iiwa_14_R820_1_A{}=q_ref;"
     specs += "*axisQMsr_LBR_iiwa_14_R820_1_A{}=q; cartPosMsr_X=x; cartPosMsr_Y=y; cartPosMsr_Z=z"
-    columns, right = wide(run, specs, s=ticks // 1000, ns=ticks % 1000 * 1_000_000)
-    table(folder / "Recording_3.log", columns, sep=" ", float_format="%.9f")
-    return Answer("Recording_3.log", {"ZeitInSec+ZeitInNanoSec": "s+ns"}, right=right)
+    return recorded(folder, run, "Recording_3.log", {"ZeitInSec+ZeitInNanoSec": "s+ns"}, specs,
+        data={"s": ticks // 1000, "ns": ticks % 1000 * 1_000_000}, sep=" ", float_format="%.9f")
 
 
 @layout(SEVEN, robot=None, rate=200.0)
@@ -134,10 +129,9 @@ def abb_motor_signals(folder: Path, run: Run) -> Answer:
     more = {"angle": run.q * gear, "set": run.dq * gear * 1.001, "speed": run.dq * gear}
     specs = "Time=t; *ROB_1 axis {} (1) resolver_angle=angle:q; ROB_1 axis {} (4) speed_ref=set;"
     specs += "*ROB_1 axis {} (6) speed=speed:dq; *ROB_1 axis {} (9) torque_ref=torque:tau"
-    columns, right = wide(run, specs, joint_wise=True, torque=run.tau / gear, **more)
     head = "Test Signal Viewer 1.5\t2023-11-20 08:13\nController\tIRB4600_cell3\n"
-    table(folder / "signals.txt", columns, head, sep="\t", float_format="%.6g")
-    return Answer("signals.txt", {"Time": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "signals.txt", {"Time": "s"}, specs, joint_wise=True, known=False,
+        data={"torque": run.tau / gear, **more}, head=head, sep="\t", float_format="%.6g")
 
 
 @layout(SIX, rate=125.0)
@@ -145,9 +139,8 @@ def fanuc_j519(folder: Path, run: Run) -> Answer:
     """FANUC stream motion status packets: pose before joints, nine axes of which six are used."""
     specs = "packet_type=0; version=1; seq=count; status=15; io_value=0; timestamp_ms=tick; X=x;"
     specs += "Y=y; Z=z; W=rx; P=ry; R=rz; *J{}=q°; J7=0; J8=0; J9=0; *I{}=current; I7=0; I8=0; I9=0"
-    columns, right = wide(run, specs, tick=values(run)["ms"] + 883120)
-    table(folder / "j519.csv", columns, float_format="%.4f")
-    return Answer("j519.csv", {"timestamp_ms": "ms"}, right=right, draftable=False)
+    return recorded(folder, run, "j519.csv", {"timestamp_ms": "ms"}, specs, known=False,
+        data={"tick": values(run)["ms"] + 883120}, float_format="%.4f")
 
 
 @layout(SIX, robot=None, rate=125.0)
@@ -171,9 +164,8 @@ def ur_rtde_record(folder: Path, run: Run) -> Answer:
     specs += "*actual_qd_{}=dq; *actual_current_{}=current; joint_temperatures_{}=temp;"
     specs += "actual_TCP_pose_0=x; actual_TCP_pose_1=y; actual_TCP_pose_2=z; robot_mode=7"
     more = {"clock": 51234.008 + run.t, "model": 0.93 * run.tau + 0.4}
-    columns, right = wide(run, specs, range(6), **more)
-    table(folder / "robot_data.csv", columns, sep=" ")
-    return Answer("robot_data.csv", {"timestamp": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "robot_data.csv", {"timestamp": "s"}, specs, range(6), known=False,
+        data=more, sep=" ")
 
 
 @layout(SEVEN, rate=200.0)
@@ -219,9 +211,8 @@ def xarm_sdk(folder: Path, run: Run) -> Answer:
     specs += "angles_6=0.0; *realtime_joint_speeds_{}=dq°; realtime_joint_speeds_6=0.0;"
     specs += "*joints_torque_{}=torque:tau; joints_torque_6=0.0; error_code=0; cmd_num=3"
     more = {"torque": np.where(lost[:, None], np.nan, run.tau)}
-    columns, right = wide(run, specs, range(6), date=stamps(run, "%Y-%m-%dT%H:%M:%S.%f"), **more)
-    table(folder / "xarm6_run.csv", columns, float_format="%.5f")
-    return Answer("xarm6_run.csv", {"ts": DATE}, right=right)
+    return recorded(folder, run, "xarm6_run.csv", {"ts": DATE}, specs, range(6),
+        data={"date": stamps(run, "%Y-%m-%dT%H:%M:%S.%f"), **more}, float_format="%.5f")
 
 
 @layout(SIX, rate=125.0)
@@ -230,10 +221,10 @@ def denso_control_log(folder: Path, run: Run) -> Answer:
     load = 100 * run.tau / np.array([300.0, 300.0, 180.0, 40.0, 40.0, 20.0])
     specs = "Time[ms]=ms; Program=PRO1; Line=14; *J{} Command[deg]=q_ref°; *J{} Encoder[deg]=q°;"
     specs += "*J{} Current[%]=load:current:%; J{} Load[%]=heat"
-    columns, right = wide(run, specs, joint_wise=True, load=load, heat=0.8 * np.abs(load))
     how = {"quoting": 2, "float_format": "%.4f", "encoding": "shift_jis"}
-    table(folder / "ControlLog.csv", columns, '"制御ログ","VS-060A4","RC8"\n"8ms"\n', **how)
-    return Answer("ControlLog.csv", {"Time[ms]": "ms"}, right=right, draftable=False)
+    return recorded(folder, run, "ControlLog.csv", {"Time[ms]": "ms"}, specs, joint_wise=True,
+        known=False, data={"load": load, "heat": 0.8 * np.abs(load)},
+        head='"制御ログ","VS-060A4","RC8"\n"8ms"\n', **how)
 
 
 @layout(SIX, robot=None, rate=250.0)
@@ -245,9 +236,8 @@ def yaskawa_pulses(folder: Path, run: Run) -> Answer:
     more |= {"trq": np.round(load, 1), "clock": stamps(run, "%H:%M:%S")}
     specs = "No.=count; Date=2023/09/14; Time=clock; Elapsed(ms)=ms; JOB=TEST-01; LINE=7;"
     specs += "*PLS_{}=pls:q:counts; *SPD_{}=spd:dq:counts/s; *TRQ_{}=trq:tau:%"
-    columns, right = wide(run, specs, "SLURBT", **more)
-    table(folder / "YRC1000_0914.CSV", columns)
-    return Answer("YRC1000_0914.CSV", {"Elapsed(ms)": "ms"}, right=right, draftable=False)
+    return recorded(folder, run, "YRC1000_0914.CSV", {"Elapsed(ms)": "ms"}, specs, "SLURBT",
+        known=False, data=more)
 
 
 def dynamixel(run: Run) -> dict[str, np.ndarray]:
@@ -257,7 +247,7 @@ def dynamixel(run: Run) -> dict[str, np.ndarray]:
     return {name: np.round(v).astype(int) for name, v in raw.items()}
 
 
-@layout(TWO, robot=None, rate=100.0)
+@layout(LEG, robot=None, rate=100.0)
 def dynamixel_lines(folder: Path, run: Run) -> Answer:
     """Dynamixel read_write output with epoch times: a line a servo, ticks of 4096 and 2.69 mA."""
     raw = dynamixel(run)
@@ -295,12 +285,11 @@ def moteus_registers(folder: Path, run: Run) -> Answer:
     specs = "timestamp=stamp; servo{}.MODE=10; *servo{}.POSITION=rev:q:rev;"
     specs += "*servo{}.VELOCITY=speed:dq:rev/s; *servo{}.TORQUE=tau; servo{}.Q_CURRENT=current;"
     specs += "servo{}.COMMAND_POSITION=nan; servo{}.TEMPERATURE=temp; servo{}.FAULT=0"
-    columns, right = wide(run, specs, (11, 12, 13), joint_wise=True, **more)
-    table(folder / "moteus.csv", columns)
-    return Answer("moteus.csv", {"timestamp": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "moteus.csv", {"timestamp": "s"}, specs, (11, 12, 13),
+        joint_wise=True, known=False, data=more)
 
 
-@layout(TWO, rate=500.0)
+@layout(LEG, rate=500.0)
 def elmo_recorder(folder: Path, run: Run) -> Answer:
     """Elmo Application Studio recording: signals grouped by quantity, counts, active current."""
     counts = np.array([1048576, 524288]) / (2 * np.pi)
@@ -308,10 +297,10 @@ def elmo_recorder(folder: Path, run: Run) -> Answer:
     specs = "Time [sec]=t; *Position [cnt] (a0{})=pos:q:counts;"
     specs += "*Velocity [cnt/sec] (a0{})=vel:dq:counts/s; *Active Current [A] (a0{})=current;"
     specs += "Position Error [cnt] (a0{})=lag"
-    columns, right = wide(run, specs, lag=np.round((run.q_ref - run.q) * counts), **more)
     head = "Recording Name,Rec_17\nSampling Time [usec],2000\nTrigger,Immediate\n\n"
-    table(folder / "Rec_17.csv", columns, head, float_format="%.6f")
-    return Answer("Rec_17.csv", {"Time [sec]": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "Rec_17.csv", {"Time [sec]": "s"}, specs, known=False,
+        data={"lag": np.round((run.q_ref - run.q) * counts), **more}, head=head,
+        float_format="%.6f")
 
 
 @layout(THREE, robot="robot.toml", rate=500.0)
@@ -330,7 +319,7 @@ def twincat_scope_pairs(folder: Path, run: Run) -> Answer:
     return Answer("scope.txt", {"Name": "ms", "SymbolName": "ms"}, right=right, draftable=False)
 
 
-@layout(TWO, rate=1000.0)
+@layout(LEG, rate=1000.0)
 def dspace_mat(folder: Path, run: Run) -> Answer:
     """dSPACE ControlDesk MAT: struct with X (time) and Y, signals named by the block's output."""
     kind = [(key, object) for key in ("Name", "Path", "Unit", "XIndex", "Data")]
@@ -343,7 +332,7 @@ def dspace_mat(folder: Path, run: Run) -> Answer:
     record = {"X": axis, "Y": np.array(rows, dtype=kind)[None], "Capture": {"SamplingPeriod": 1e-3}}
     savemat(folder / "rec_012.mat", {"rec_012": record})
     specs = "q=q; qd=dq; T=tau"
-    return answer("rec_012.mat", {"HostService": "s"}, "@_{}", TWO.joints, specs)
+    return answer("rec_012.mat", {"HostService": "s"}, "@_{}", LEG.joints, specs)
 
 
 @layout(SIX, rate=500.0)
@@ -378,14 +367,14 @@ def labview_lvm_german(folder: Path, run: Run) -> Answer:
     return Answer("messung.lvm", {"X_Value": "s"}, right=right)
 
 
-@layout(TWO, rate=200.0)
+@layout(LEG, rate=200.0)
 def excel_unicode_text(folder: Path, run: Run) -> Answer:
     """Excel's "Unicode text": UTF-16, tabs, decimal commas, German words, a title above."""
     specs = "Zeit in ms=time; *{} Soll in Grad=q_ref°; *{} Winkel in Grad=q°; *{} Moment in Nm=tau"
-    columns, right = wide(run, specs, ("Hüfte", "Knie"), joint_wise=True, time=1000 * run.t)
     how = {"sep": "\t", "decimal": ",", "float_format": "%.5f", "encoding": "utf-16"}
-    table(folder / "Versuch 3.txt", columns, "Prüfstand Bein\t\t\t\t\t\t\n\t\t\t\t\t\t\n", **how)
-    return Answer("Versuch 3.txt", {"Zeit in ms": "ms"}, right=right)
+    return recorded(folder, run, "Versuch 3.txt", {"Zeit in ms": "ms"}, specs, ("Hüfte", "Knie"),
+        joint_wise=True, data={"time": 1000 * run.t},
+        head="Prüfstand Bein\t\t\t\t\t\t\n\t\t\t\t\t\t\n", **how)
 
 
 @layout(UR, rate=125.0)
@@ -504,12 +493,11 @@ def matlab_timetable_sec(folder: Path, run: Run) -> Answer:
     """MATLAB writetimetable: times "0.004 sec", matrices split into _1 … _3, units nowhere."""
     specs = "Time=time; *Theta_{}=q°; *ThetaDes_{}=q_ref°; *Omega_{}=dq°; *Torque_{}=tau; Enabled=1"
     time = np.array([f"{t:.5g} sec" for t in run.t])
-    columns, right = wide(run, specs + "; Phase=ident", time=time)
-    table(folder / "TT.txt", columns, float_format="%.15g")
-    return Answer("TT.txt", {"Time": "s"}, right=right, draftable=False)
+    return recorded(folder, run, "TT.txt", {"Time": "s"}, specs + "; Phase=ident", known=False,
+        data={"time": time}, float_format="%.15g")
 
 
-@layout(TWO, rate=500.0)
+@layout(LEG, rate=500.0)
 def json_channels(folder: Path, run: Run) -> Answer:
     """JSON by channel with units mrad and mNm; only a sampling rate, no times."""
     channels = []
@@ -519,7 +507,7 @@ def json_channels(folder: Path, run: Run) -> Answer:
             channels.append({"name": f"{part}_{name}", "unit": unit, "values": samples})
     meta = {"device": "legbench", "fs_hz": 500, "start": "2024-01-15T10:00:00Z"}
     (folder / "bench.json").write_text(json.dumps({"meta": meta, "channels": channels}, indent=1))
-    right = answer("bench.json", {}, "{}_@", TWO.joints, "angle=q:mrad; torque=tau:mNm")
+    right = answer("bench.json", {}, "{}_@", LEG.joints, "angle=q:mrad; torque=tau:mNm")
     return replace(right, rate=500.0)
 
 
@@ -552,9 +540,9 @@ def mecademic_log(folder: Path, run: Run) -> Answer:
     specs += "TargetCartPos_3=z; *JointPos_{}=q°; *JointVel_{}=dq°; *JointTorq_{}=load:tau:%;"
     load = 100 * run.tau / np.array([200.0, 200.0, 90.0, 30.0, 25.0, 12.0])
     more = {"stamp": 83_120_000 + values(run)["us"], "load": load}
-    columns, right = wide(run, specs + "CartPos_1=x; CartPos_2=y; CartPos_3=z", **more)
-    table(folder / "Meca500_R3_log.csv", columns, float_format="%.4f")
-    return Answer("Meca500_R3_log.csv", {"Timestamp": "us"}, right=right, draftable=False)
+    return recorded(folder, run, "Meca500_R3_log.csv", {"Timestamp": "us"},
+        specs + "CartPos_1=x; CartPos_2=y; CartPos_3=z", known=False, data=more,
+        float_format="%.4f")
 
 
 @layout(THREE, robot="robot.toml", rate=200.0)
@@ -584,4 +572,4 @@ def influx_annotated(folder: Path, run: Run) -> Answer:
             rows.append(f",,{number},{date},{x:.9g},{tail}")
     (folder / "query.csv").write_text((text + "".join(rows)).replace("\n", "\r\n"))
     specs = "position=q; velocity=dq; effort=tau"
-    return answer("query.csv", {"_time": DATE}, "@[{}]", run.arm.joints, specs)
+    return answer("query.csv", {"_time": DATE}, "@[{}]", run.arm.joints, specs, known=False)
