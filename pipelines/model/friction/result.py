@@ -269,7 +269,7 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
 def drift_of_joint(joint: JointFit) -> Drift | None:
     """The change of friction at half of the fastest speed, relative to the law."""
     course, fit = joint.course, joint.fit
-    if course is None:
+    if course is None or not course.named:
         return None
     speed = 0.5 * joint.covered.fastest
     level = float(np.mean(np.abs(fit.curve(np.array([speed, -speed])))))

@@ -78,6 +78,7 @@ class Course:
     part: int = 0  # stretch of a step
     curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
     change: float = 0.0  # α of the fit before, of a trend: beside c g then stands α ∂c/∂(ln T) g, and T is fitted
+    named: bool = True  # shown by the rows; else not excluded by them: it widens the intervals
 
     def at(self, part: int, t: Array) -> Array:
         """c(t) in one of the stretches: it rises by one."""
