@@ -9,14 +9,16 @@ does: logarithms of the ratio of their squared errors, in closed form by leverag
 (fit/flips.py). A course that costs a number and gains nothing loses there. A step may lie between any two rows; the time
 constant of a trend is fitted once more with the law (joint.py).
 
-Logs that visit every speed once, one after the other, show a drift as a part of the friction curve. A trend that the rows
-neither show nor exclude is not named; it takes part where no law without it is as good (joint.py).
+Logs that visit every speed once, one after the other, show a drift as a part of the friction
+curve. A trend that the rows neither show nor exclude is not named; it takes part where no law
+without it is as good (joint.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -45,15 +47,16 @@ class DriftConfig:
     fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
     ends: float = 0.08  # of all rows, that lie before and after a step
-    times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)  # over the duration, between which it is searched; 5: straight
+    times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)  # over the duration; 5: straight
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
     sure: float = 2.0  # standard deviations beyond which a larger change is excluded: two-sided .05
 
 
 def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> Course | None:
-    """The course of friction in time that rows show beyond chance: the first that is not measurably worse than the best.
+    """The course of friction in time that rows show beyond chance, or a trend not excluded.
 
-    All friction by one share comes before a part of it, and a trend before a step. Where the rows show none, a trend of all
+    Of those shown the first that is not measurably worse than the best: all friction by one share
+    comes before a part of it, and a trend before a step. Where the rows show none, a trend of all
     friction that they do not exclude, not named; None where they do.
 
     Args:
@@ -89,17 +92,18 @@ class _Rows:
     basis: Array  # orthonormal columns of the space of `known`
     config: DriftConfig
 
-    @property
+    @cached_property
     def left(self) -> Array:
         """What is left of the torque without a drift (rows,) [N m]."""
         return np.asarray(self.y - self.basis @ (self.basis.T @ self.y))
 
     def course(self, course: Course) -> Array:
         """c(t) of every row (rows,)."""
-        return np.concatenate([course.at(part, stretch.middle[2]) for part, stretch in enumerate(self.stretches)])
+        parts = [course.at(part, one.middle[2]) for part, one in enumerate(self.stretches)]
+        return np.concatenate(parts)
 
     def gain(self, column: Array) -> float:
-        """Return by how much a column (rows,) beside all others lowers the sum of squares [N² m²]."""
+        """Return by how much a column (rows,) lowers the sum of squares [N² m²]."""
         outside = column - self.basis @ (self.basis.T @ column)
         return float(np.square(outside @ self.left) / max(float(outside @ outside), 1e-300))
 
@@ -135,11 +139,12 @@ def _best(kind: str, form: str, rows: _Rows) -> _Found:
         own = rows.course(course) * shape
         columns = np.column_stack([rows.known, own])
         beta = _least(columns, rows.y)
-    return _Found(course, own, float(np.median(np.abs(shape))), float(beta[-1]), rows.y - columns @ beta)
+    typical = float(np.median(np.abs(shape)))
+    return _Found(course, own, typical, float(beta[-1]), rows.y - columns @ beta)
 
 
 def _deviation(found: _Found, basis: Array, blocks: Index) -> float:
-    """Standard deviation of the size of a drift [N m], errors within a block as dependent as they may be (White 1984)."""
+    """Standard deviation of the size of a drift [N m], errors within a block dependent (White 1984)."""
     outside = found.column - basis @ (basis.T @ found.column)
     scatter = float(np.sqrt(np.sum(np.square(np.bincount(blocks, outside * found.residual)))))
     return found.typical * scatter / max(float(outside @ outside), 1e-300)
@@ -181,7 +186,8 @@ def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     times = np.log(rows.config.times)
     k = int(np.argmin([loss(time) for time in times]))
     ends = (float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)]))
-    return course(float(np.exp(minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-2}).x)))
+    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-2})
+    return course(float(np.exp(found.x)))
 
 
 def _step(form: str, shape: Array, rows: _Rows) -> Course:

@@ -22,9 +22,9 @@ class FindingsConfig:
     """When a fit shows that its logs are wrong."""
 
     sure: float = 3.0  # std below zero (two-sided .003)
-    far: float = 2.0  # times the inertia of the described links: motor constants and gears are off by more, tolerances by less
-    nothing: float = 0.01  # of the torque (std): gravity that is not there; the noise of a torque sensor
-    coarse: float = 0.05  # bias of the inertia by errors in variables: as much as links are described to (issue 50, 2)
+    far: float = 2.0  # times the inertia of the described links; a choice, not measured
+    nothing: float = 0.01  # of the torque (std): no gravity; a choice, not measured
+    coarse: float = 0.05  # bias of the inertia by errors in variables; a choice, not measured
 
 
 _CONFIG = FindingsConfig()

@@ -235,14 +235,16 @@ class _Choice:
     course: Course | None
 
 
-def _chosen(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit, arm: OneJoint,
-            law: Law | None) -> _Choice:
+def _chosen(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit,
+            arm: OneJoint, law: Law | None) -> _Choice:
     """Choose among laws, or fit `law`, while friction changes along `course`."""
     stretches, fit, course = _with_course(stretches, fitted, course, fit, arm)
-    identify, validate = stretches[:fitted], tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
-    judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
+    identify = stretches[:fitted]
+    validate = tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
+    judged = LawEquations.of(validate, arm) if validate else None
+    judge = Judge(LawEquations.of(identify, arm), judged)
     sticks = any(stretch.sticks is not None for stretch in identify)
-    laws = tuple(one for one in LADDER if one.pointwise or not sticks)  # what is left out is what presliding would show
+    laws = tuple(one for one in LADDER if one.pointwise or not sticks)  # presliding is left out
     return _Choice(identify, validate, climb(judge, (law,) if law is not None else laws), course)
 
 

@@ -28,7 +28,7 @@ class MisfitConfig:
     resolved: float = 0.9  # of a wave along the travel, by which two of them differ (Rayleigh: 1)
     several: float = 4.0  # waves along the travel: fewer, beside others like it, a bend has as well
     most: float = 0.5  # of all waves (mean square): the largest is more than all others together
-    moved: float = 0.1  # of the inertia, that a user feels in a controller; judged by no bench
+    moved: float = 0.1  # of the inertia: more is not to be relied on; a choice
 
 
 _CONFIG = MisfitConfig()

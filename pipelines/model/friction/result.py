@@ -272,13 +272,13 @@ def drift_of_joint(joint: JointFit) -> Drift | None:
 
 
 def _not_excluded(joint: JointFit) -> tuple[Missing, ...]:
-    """A change of friction that takes part in the fit, for the logs exclude it as little as they show it."""
+    """A change of friction that takes part in the fit: the logs neither show nor exclude it."""
     if joint.course is None or joint.course.named:
         return ()
     change = _drift(joint, joint.course).change
-    return (Missing("whether friction changes in the course of a log, which these logs do not tell from its change with speed: by "
-                    f"{100.0 * change.value:.2g} ± {100.0 * (change.std or 0.0):.2g} % if the law is right; the intervals "
-                    "allow for it", "drive every speed early and late in the log"),)
+    size = f"{100.0 * change.value:.2g} ± {100.0 * (change.std or 0.0):.2g} %"
+    return (Missing(f"whether friction changes in the course of a log (by {size} if the law is right) "
+                    "or with speed alone: these logs do not tell", "drive every speed early and late in the log"),)
 
 
 def _drift(joint: JointFit, course: Course) -> Drift:

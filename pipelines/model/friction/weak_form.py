@@ -40,11 +40,11 @@ _KINKED = 2  # order of a smoother for motion whose acceleration jumps
 class WeakFormConfig:
     """Which samples and stretches make equations, and which joints move."""
 
-    vague: float = 2.0  # times the usual std of the speed, which a smoother has some samples off ends and gaps
+    vague: float = 2.0  # times the usual std of the speed: near ends and gaps; a choice
     sway: float = 10.0  # encoder steps: rounding moves a held joint by one
     fast: float = 3.0  # std of a speed: a slower one (rms) may be zero (two-sided .003)
-    fewest: int = 10  # windows of a stretch: three rigid numbers and a law of Coulomb and viscous friction, twice
-    shortest: int = 4  # samples of a window, whose ends two samples of a kinked motion each may spoil
+    fewest: int = 10  # windows of a stretch that is worth using: a choice, not measured
+    shortest: int = 4  # samples of a window: a choice, not measured
 
 
 _CONFIG = WeakFormConfig()
