@@ -9,7 +9,7 @@ import numpy as np
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.break_away import REST, WITHIN
 from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.misfit import POOR
+from pipelines.model.friction.misfit import MisfitConfig
 from pipelines.model.friction.nuisances import drift_in_words, sticking_in_words
 from pipelines.model.friction.result import JointResult, Result, Value
 from pipelines.report.diagnosis_words import spoken
@@ -91,7 +91,7 @@ def _law_and_errors(joint: JointResult) -> str:
     words = f"{_capital(joint.name)}: {_plain(joint.law)}"
     if not judged.by:
         error = judged.torque_error
-        if error is None or error >= POOR:  # the finding says it
+        if error is None or error >= MisfitConfig().poor:  # the finding says it
             return words
         return f"{words}, which leaves {format_number(100.0 * error, 2)} % of held-out torque (rms)"
     with_, without, unit = judged.velocity_error_with, judged.velocity_error_without, _speed_unit(joint)

@@ -180,3 +180,15 @@ def test_a_validation_log_at_rest_judges_nothing(logs: dict[str, ExperimentLog])
                                   Settings(law="coulomb+viscous"))
     assert result.joints[0].judged_by == "blocks"
     assert any(check.code == "RRID-D09" and "validation" in check.message for check in result.checks)
+
+
+@pytest.mark.slow
+def test_a_drift_that_looks_like_a_law_is_no_part_of_the_curve() -> None:
+    """Speeds rise while friction falls by a sixth: the curve holds, and the doubt is reported."""
+    machine = draw("trend", 7011)
+    joint, _ = computed(logs_of([machine])["trend-7011"], None)
+    speed = joint.driven[1] * np.array([-0.9, -0.5, -0.25, 0.25, 0.5, 0.9])
+    truth = machine.friction(speed) * machine.scale(np.array([machine.seconds / 2]))
+    curve = np.interp(speed, joint.series.speed, joint.series.curve)
+    assert np.abs(curve / truth - 1.0).max() < 0.01
+    assert joint.drift is not None or any("in the course of a log" in gap.what for gap in joint.unseen)

@@ -7,13 +7,18 @@ on rows that slide, beside inertia, gravity and a free curve of friction (slidin
 a curve can hold is no drift. The course that leaves least must predict blocks of time that were held out better than no change
 does: logarithms of the ratio of their squared errors, in closed form by leverage, against draws of their signs
 (fit/flips.py). A course that costs a number and gains nothing loses there. A step may lie between any two rows; the time
-constant of a trend is fitted later with the law (joint.py).
+constant of a trend is fitted once more with the law (joint.py).
+
+Logs that visit every speed once, one after the other, show a drift as a part of the friction
+curve. A trend that the rows neither show nor exclude is not named; it takes part where no law
+without it is as good (joint.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -42,14 +47,17 @@ class DriftConfig:
     fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
     rows: int = 3  # for every column beside the drift: fewer leave no residual to judge by
     ends: float = 0.08  # of all rows, that lie before and after a step
-    times: tuple[float, ...] = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.65, 0.8, 1.0, 1.5, 5.0)  # over the duration; 5: straight
+    times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)  # over the duration; 5: straight
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
+    sure: float = 2.0  # standard deviations beyond which a larger change is excluded: two-sided .05
 
 
 def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array, config: DriftConfig) -> Course | None:
-    """The course of friction in time, where rows show one beyond chance: the first that is not measurably worse than the best.
+    """The course of friction in time that rows show beyond chance, or a trend not excluded.
 
-    All friction by one share comes before a part of it, and a trend before a step.
+    Of those shown the first that is not measurably worse than the best: all friction by one share
+    comes before a part of it, and a trend before a step. Where the rows show none, a trend of all
+    friction that they do not exclude, not named; None where they do.
 
     Args:
         stretches: whose rows these are; they slide.
@@ -57,20 +65,47 @@ def drift_of(stretches: Sequence[Stretch], y: Array, rigid: Array, curve: Array,
         rigid: (rows, columns) of inertia, gravity and all else that is no friction.
         curve: (rows, columns) of a free curve of friction.
     """
-    speed = np.concatenate([stretch.middle[1] for stretch in stretches])
     known = np.hstack([rigid, curve])
     basis, blocks = orthonormal(known), blocks_of_time(stretches, config.block)
     if blocks.max() + 1 < config.fewest or len(y) < config.rows * basis.shape[1]:
         return None
-    trends = _trends(stretches, config)
-    found = [_best(kind, form, stretches, y, known, curve, basis, speed, trends, config)
-             for form in _FORMS for kind in ("trend", "step")]
+    rows = _Rows(stretches, y, known, curve, basis, config)
+    found = [_best(kind, form, rows) for form in _FORMS for kind in ("trend", "step")]
     best = min(found, key=lambda one: float(one.residual @ one.residual))
     gains = np.log(_held_out(basis, y, blocks) / _held_out(orthonormal(np.column_stack([known, best.column])), y, blocks))
     whole = curve @ _least(np.column_stack([known, best.column]), y)[rigid.shape[1]:-1]
-    if best.size < config.least * float(np.median(np.abs(whole))) or by_flips(gains) > config.chance:
-        return None
-    return next(one.course for one in found if no_worse(one.residual, best.residual))
+    least = config.least * float(np.median(np.abs(whole)))
+    if best.size >= least and by_flips(gains) <= config.chance:
+        return next(one.course for one in found if no_worse(one.residual, best.residual))
+    most = found[0].size + config.sure * _deviation(found[0], basis, blocks)
+    return replace(found[0].course, named=False) if most > least else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """The rows of `drift_of`, and all that is fitted beside a drift."""
+
+    stretches: Sequence[Stretch]
+    y: Array  # (rows,) [N m]
+    known: Array  # (rows, columns)
+    curve: Array  # (rows, columns) the last columns of `known`
+    basis: Array  # orthonormal columns of the space of `known`
+    config: DriftConfig
+
+    @cached_property
+    def left(self) -> Array:
+        """What is left of the torque without a drift (rows,) [N m]."""
+        return np.asarray(self.y - self.basis @ (self.basis.T @ self.y))
+
+    def course(self, course: Course) -> Array:
+        """c(t) of every row (rows,)."""
+        parts = [course.at(part, one.middle[2]) for part, one in enumerate(self.stretches)]
+        return np.concatenate(parts)
+
+    def gain(self, column: Array) -> float:
+        """Return by how much a column (rows,) lowers the sum of squares [N² m²]."""
+        outside = column - self.basis @ (self.basis.T @ column)
+        return float(np.square(outside @ self.left) / max(float(outside @ outside), 1e-300))
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,32 +114,40 @@ class _Found:
 
     course: Course
     column: Array  # (rows,) c(t) g(v)
-    size: float  # [N m] by which it changes friction
+    typical: float  # [N m] median of |g(v)|
+    change: float  # α
     residual: Array  # (rows,) [N m]
 
+    @property
+    def size(self) -> float:
+        """By how much it changes friction [N m]."""
+        return abs(self.change) * self.typical
 
-def _best(kind: str, form: str, stretches: Sequence[Stretch], y: Array, known: Array, curve: Array, basis: Array,
-          speed: Array, trends: Sequence[Course], config: DriftConfig) -> _Found:
+
+def _best(kind: str, form: str, rows: _Rows) -> _Found:
     """The course of this kind and form that leaves least.
 
     The curve that changes as a whole is itself fitted: scan, fit, scan again.
     """
-    left = y - basis @ (basis.T @ y)
+    speed = np.concatenate([stretch.middle[1] for stretch in rows.stretches])
     shape = speed if form == "viscous" else np.sign(speed)
-    beta = _least(known, y)
+    beta, width = _least(rows.known, rows.y), rows.known.shape[1]
     for _ in range(_ROUNDS if form == "whole" else 1):
         if form == "whole":
-            shape = curve @ beta[known.shape[1] - curve.shape[1]:known.shape[1]]
-        if kind == "step":
-            course = _step(stretches, form, shape, basis, left, config)
-        else:
-            course = max((one for one in trends if one.form == form),
-                         key=lambda one: _gain(_outside(one, stretches, shape, basis), left))
-        own = np.concatenate([course.at(part, stretch.middle[2]) for part, stretch in enumerate(stretches)]) * shape
-        columns = np.column_stack([known, own])
-        beta = _least(columns, y)
-    size = abs(float(beta[-1])) * float(np.median(np.abs(shape)))
-    return _Found(course, own, size, y - columns @ beta)
+            shape = rows.curve @ beta[width - rows.curve.shape[1]:width]
+        course = (_step if kind == "step" else _trend)(form, shape, rows)
+        own = rows.course(course) * shape
+        columns = np.column_stack([rows.known, own])
+        beta = _least(columns, rows.y)
+    typical = float(np.median(np.abs(shape)))
+    return _Found(course, own, typical, float(beta[-1]), rows.y - columns @ beta)
+
+
+def _deviation(found: _Found, basis: Array, blocks: Index) -> float:
+    """Standard deviation of the size of a drift [N m], errors within a block dependent (White 1984)."""
+    outside = found.column - basis @ (basis.T @ found.column)
+    scatter = float(np.sqrt(np.sum(np.square(np.bincount(blocks, outside * found.residual)))))
+    return found.typical * scatter / max(float(outside @ outside), 1e-300)
 
 
 def _least(columns: Array, y: Array) -> Array:
@@ -112,18 +155,6 @@ def _least(columns: Array, y: Array) -> Array:
     scale = np.linalg.norm(columns, axis=0)
     scale = np.where(scale > 0.0, scale, 1.0)
     return np.asarray(np.linalg.lstsq(columns / scale, y, rcond=_RANK)[0] / scale)
-
-
-def _outside(course: Course, stretches: Sequence[Stretch], shape: Array, basis: Array) -> Array:
-    """c(t) g(v) (rows, 1), without what all else could take of it."""
-    value = np.concatenate([course.at(part, stretch.middle[2]) for part, stretch in enumerate(stretches)])
-    columns = (value * shape)[:, None]
-    return np.asarray(columns - basis @ (basis.T @ columns))
-
-
-def _gain(column: Array, left: Array) -> float:
-    """Return by how much a column (rows, 1) lowers the sum of squares."""
-    return float(np.square(column[:, 0] @ left) / max(float(np.square(column).sum()), 1e-300))
 
 
 def orthonormal(columns: Array) -> Array:
@@ -139,18 +170,32 @@ def _held_out(basis: Array, y: Array, blocks: Index) -> Array:
     return np.asarray(np.maximum(np.bincount(blocks, np.square(rest)), 1e-300))
 
 
-def _trends(stretches: Sequence[Stretch], config: DriftConfig) -> list[Course]:
-    starts = tuple(float(stretch.t[0]) for stretch in stretches)
-    duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in stretches)
-    return [Course("trend", form, starts, share * duration, 0.5 * duration, duration) for share in config.times for form in _FORMS]
+def _trend(form: str, shape: Array, rows: _Rows) -> Course:
+    """The course of a trend with the time constant by which it explains most."""
+    from scipy.optimize import minimize_scalar
+
+    starts = tuple(float(stretch.t[0]) for stretch in rows.stretches)
+    duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in rows.stretches)
+
+    def course(time: float) -> Course:
+        return Course("trend", form, starts, time * duration, 0.5 * duration, duration)
+
+    def loss(logarithm: float) -> float:
+        return -rows.gain(rows.course(course(float(np.exp(logarithm)))) * shape)
+
+    times = np.log(rows.config.times)
+    k = int(np.argmin([loss(time) for time in times]))
+    ends = (float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)]))
+    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-2})
+    return course(float(np.exp(found.x)))
 
 
-def _step(stretches: Sequence[Stretch], form: str, shape: Array, basis: Array, left: Array,
-          config: DriftConfig) -> Course:
+def _step(form: str, shape: Array, rows: _Rows) -> Course:
     """The course of a step at the instant between two rows from which it explains most."""
+    stretches = rows.stretches
     t = np.concatenate([stretch.middle[2] for stretch in stretches])
     log = np.repeat(np.arange(len(stretches)), [stretch.rows for stretch in stretches])
-    row = step_row(shape, basis, left, config)
+    row = step_row(shape, rows.basis, rows.left, rows.config)
     before, here = int(log[row - 1]), int(log[row])
     starts = tuple(float(stretch.t[0]) for stretch in stretches)
     when = 0.5 * float(t[row - 1] + t[row]) - starts[here] if before == here else 0.0

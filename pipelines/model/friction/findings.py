@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from pipelines.errors import Check, RrridError
@@ -10,12 +12,22 @@ from pipelines.model.arm import Arm
 from pipelines.model.friction.joint import JointFit
 from pipelines.model.rigid.choose import rigid_body
 
-__all__ = ["findings"]
+__all__ = ["FindingsConfig", "findings"]
 
-_SURE = 3.0  # standard deviations
-_FAR = 2.0  # times the inertia of the described links: not a matter of tolerances
-_NOTHING = 0.01  # of the torque: gravity that is not there
 _SEED = 20040509
+
+
+@dataclass(frozen=True)
+class FindingsConfig:
+    """When a fit shows that its logs are wrong."""
+
+    sure: float = 3.0  # std below zero (two-sided .003)
+    far: float = 2.0  # times the inertia of the described links; a choice, not measured
+    nothing: float = 0.01  # of the torque (std): no gravity; a choice, not measured
+    coarse: float = 0.05  # bias of the inertia by errors in variables; a choice, not measured
+
+
+_CONFIG = FindingsConfig()
 
 
 def findings(joint: JointFit) -> tuple[Check, ...]:
@@ -27,7 +39,7 @@ def findings(joint: JointFit) -> tuple[Check, ...]:
 
 
 def _sign(joint: JointFit, log: ExperimentLog) -> Check | None:
-    if joint.fit.inertia > -_SURE * float(joint.fit.std[0]):
+    if joint.fit.inertia > -_CONFIG.sure * float(joint.fit.std[0]):
         return None
     return Check.of("S14", "warn", f"the inertia of joint {joint.logs.joint} comes out negative, {joint.fit.inertia:.3g}: torque "
                     "and position have opposite signs, or are of different joints", where=log.source or log.name, gate=True,
@@ -42,7 +54,7 @@ def _amperes(joint: JointFit, log: ExperimentLog) -> Check | None:
         return Check.of("S10", "warn", f"torque of joint {j + 1} is its motor current, sample for sample", gate=True,
                         where=log.source or log.name, remedy="give the torque constant at the import: torque_constant in [drive]")
     known = _known_inertia(log, j)
-    if known is None or joint.fit.inertia <= 0.0 or 1.0 / _FAR < joint.fit.inertia / known < _FAR:
+    if known is None or joint.fit.inertia <= 0.0 or 1.0 / _CONFIG.far < joint.fit.inertia / known < _CONFIG.far:
         return None
     return Check.of("S10", "warn", f"the inertia of joint {j + 1} is {joint.fit.inertia:.3g}, that of the described links "
                     f"{known:.3g}: torque in A, at the motor's side of a gear, or links that are not these", gate=True,
@@ -69,7 +81,7 @@ def _compensated(joint: JointFit, log: ExperimentLog) -> Check | None:
     states = np.random.default_rng(_SEED).uniform(-3.0, 3.0, (16, log.n_joints))
     acts = np.abs(rigid_body(log.robot).regressor(states, 0.0 * states, 0.0 * states)[:, j]).max() > 1e-9
     size = float(np.nanstd(log.tau[:, j]))
-    if not acts or float(np.hypot.reduce(joint.fit.gravity)) > _NOTHING * size:
+    if not acts or float(np.hypot.reduce(joint.fit.gravity)) > _CONFIG.nothing * size:
         return None
     return Check.of("D18", "warn", f"gravity of joint {j + 1} was compensated, but the torque shows none: it is not the whole",
                     where=log.source or log.name, gate=True, remedy="log the total torque, compensation included")

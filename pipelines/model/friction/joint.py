@@ -21,7 +21,7 @@ from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
 from pipelines.model.friction.drift import DriftConfig, drift_of
 from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.fit_law import fit_law
-from pipelines.model.friction.ladder import Judge, Ladder, climb
+from pipelines.model.friction.ladder import Judge, Ladder, climb, no_worse
 from pipelines.model.friction.law_fit import LawFit
 from pipelines.model.friction.laws import LADDER, Law
 from pipelines.model.friction.one_joint import OneJoint, gravity_columns
@@ -128,13 +128,15 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     stretches, fit = _about_a_flexible_law(left_out(rows.stretches, moves), rows.fitted, arm, resolution)
     if rows.any_slide and not _followed(stretches, fit, rows.sliding, moves, config):
         stretches = left_out(rows.stretches, rows.sliding.slides)
-    course = _course(stretches, rows, arm, config, DriftConfig())
-    stretches, fit, course = _with_course(stretches, rows.fitted, course, fit, arm)
-    identify, validate = stretches[:rows.fitted], tuple(stretch for stretch in stretches[rows.fitted:] if stretch.rows)
-    judge = Judge(LawEquations.of(identify, arm), LawEquations.of(validate, arm) if validate else None)
+    found = _course(stretches, rows, arm, config, DriftConfig())
+    course = found if found is not None and found.named else None
+    choice = _chosen(stretches, rows.fitted, course, fit, arm, law)
+    if found is not course:
+        other = _chosen(stretches, rows.fitted, found, fit, arm, law)
+        if not no_worse(choice.ladder.chosen.residual, other.ladder.chosen.residual):
+            choice = other
+    identify, validate, ladder, course = choice.identify, choice.validate, choice.ladder, choice.course
     sticks = any(stretch.sticks is not None for stretch in identify)
-    laws = tuple(one for one in LADDER if one.pointwise or not sticks)  # what is left out is what presliding would show
-    ladder = climb(judge, (law,) if law is not None else laws)
     chosen = ladder.chosen.fit
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
         identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
@@ -221,6 +223,29 @@ def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: 
     fitted = left_out(stretches, rows.sliding.slides)[:rows.fitted]
     equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
     return drift_of(fitted, equations.y, equations.fixed, free_curve(speed, config), drift)
+
+
+@dataclass(frozen=True, eq=False)
+class _Choice:
+    """A law chosen with a course of friction in time, or without."""
+
+    identify: tuple[Stretch, ...]
+    validate: tuple[Stretch, ...]
+    ladder: Ladder
+    course: Course | None
+
+
+def _chosen(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit,
+            arm: OneJoint, law: Law | None) -> _Choice:
+    """Choose among laws, or fit `law`, while friction changes along `course`."""
+    stretches, fit, course = _with_course(stretches, fitted, course, fit, arm)
+    identify = stretches[:fitted]
+    validate = tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
+    judged = LawEquations.of(validate, arm) if validate else None
+    judge = Judge(LawEquations.of(identify, arm), judged)
+    sticks = any(stretch.sticks is not None for stretch in identify)
+    laws = tuple(one for one in LADDER if one.pointwise or not sticks)  # presliding is left out
+    return _Choice(identify, validate, climb(judge, (law,) if law is not None else laws), course)
 
 
 def _with_course(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit,

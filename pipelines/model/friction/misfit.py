@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,17 +12,26 @@ from pipelines.errors import Check
 from pipelines.model.friction.result import JointResult, Rippled, Value
 from pipelines.model.words import plain_number
 
-__all__ = ["NAMED", "POOR", "depends_in_words", "inertia_in_words", "misfits"]
+__all__ = ["NAMED", "MisfitConfig", "depends_in_words", "inertia_in_words", "misfits"]
 
-POOR = 0.5  # of torque that was held out (rms): more than that left is no model
-_SURE = 3.0  # standard deviations below zero: no chance (two-sided .003)
-_SEEN = 2.0  # standard deviations: an inertia that is less is not seen
-NAMED = "let 'rrrid diagnose' say what makes it: a motor that cogs, a spring, a cable, a stop"
-_TOLD_APART = 0.9  # of a wave along the travel, that two of them differ by at least
-_SEVERAL = 4.0  # waves along the travel: fewer beside others like it are a bend
-_MOST = 0.5  # of all waves (mean square), that the largest is where it is named beside others like it
 _MANY = 10.0  # deviations in a value: it then has digits before the first of the deviation
-_MOVED = 0.1  # of the inertia: less is within what a fit is good for
+NAMED = "let 'rrrid diagnose' say what makes it: a motor that cogs, a spring, a cable, a stop"
+
+
+@dataclass(frozen=True)
+class MisfitConfig:
+    """What a fit may leave before it is said."""
+
+    poor: float = 0.5  # of the held-out torque (rms): a quarter of its power is not described
+    sure: float = 3.0  # std below zero (two-sided .003)
+    seen: float = 2.0  # std: an inertia that is less may be zero (two-sided .05)
+    resolved: float = 0.9  # of a wave along the travel, by which two of them differ (Rayleigh: 1)
+    several: float = 4.0  # waves along the travel: fewer, beside others like it, a bend has as well
+    most: float = 0.5  # of all waves (mean square): the largest is more than all others together
+    moved: float = 0.1  # of the inertia: more is not to be relied on; a choice
+
+
+_CONFIG = MisfitConfig()
 
 
 def misfits(joints: Sequence[JointResult], where: str) -> tuple[Check, ...]:
@@ -37,7 +47,7 @@ def misfits(joints: Sequence[JointResult], where: str) -> tuple[Check, ...]:
 def _negative(joint: JointResult, where: str) -> Check | None:
     """S14: an inertia below zero. That of a joint driven alone, where it is surely negative, is a finding of its log."""
     value, std = joint.inertia.value, joint.inertia.std
-    surely = std is not None and value < -_SURE * std
+    surely = std is not None and value < -_CONFIG.sure * std
     if not joint.moved or value >= 0.0 or (surely and joint.validation.by):
         return None
     meaning = ("torque and position have opposite signs, or the torque lacks a part" if surely else
@@ -49,7 +59,7 @@ def _negative(joint: JointResult, where: str) -> Check | None:
 
 def _unexplained(joint: JointResult, where: str) -> Check | None:
     error = joint.validation.torque_error
-    if joint.validation.by or not joint.moved or error is None or error < POOR:
+    if joint.validation.by or not joint.moved or error is None or error < _CONFIG.poor:
         return None
     return Check.of("D19", "warn", f"rigid body and friction leave {100.0 * error:.0f} % of the held-out torque of joint "
                     f"{joint.joint} (rms): neither this inertia nor this friction describes it", where=where, gate=True,
@@ -79,8 +89,8 @@ def _waves_in_words(joint: JointResult, ripple: Rippled) -> str:
     """
     order, *others = ripple.orders
     apart = 2.0 * math.pi / max(float(np.ptp(ripple.along.angle)), 1e-12)
-    near = min((abs(other - order) for other in others), default=math.inf) < _TOLD_APART * apart
-    if near and (order < _SEVERAL * apart or not ripple.largest_share >= _MOST):
+    near = min((abs(other - order) for other in others), default=math.inf) < _CONFIG.resolved * apart
+    if near and (order < _CONFIG.several * apart or not ripple.largest_share >= _CONFIG.most):
         return ""
     length = f"a wave every {plain_number(2000.0 * math.pi / order)} mm"
     size = f"about {plain_number(order)} cycles per revolution" if joint.revolute else length
@@ -97,11 +107,11 @@ def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value
     if with_ is None:
         return ""
     words = f"The inertia {shown(without)} is fitted without it; with it the same logs give {shown(with_)}"
-    if with_.std is not None and with_.value < -_SEEN * with_.std:
+    if with_.std is not None and with_.value < -_CONFIG.seen * with_.std:
         return f"{words}: no inertia is negative; look at the sign of this torque"
-    if with_.std is None or with_.value <= _SEEN * with_.std:
+    if with_.std is None or with_.value <= _CONFIG.seen * with_.std:
         return f"{words}: these logs do not show it, and neither is to be relied on"
-    moved = abs(with_.value - without.value) > _MOVED * with_.value
+    moved = abs(with_.value - without.value) > _CONFIG.moved * with_.value
     return f"{words}: do not rely on the first" if moved else words
 
 

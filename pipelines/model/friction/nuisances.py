@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 
 from pipelines.errors import Check
+from pipelines.model.friction.findings import FindingsConfig
 from pipelines.model.friction.joint import JointFit
 from pipelines.model.friction.result import Drift, Sticking, drift_of_joint
 from pipelines.model.words import plain_number
 
 __all__ = ["drift_in_words", "nuisance_findings", "sticking_in_words"]
 
-_SURE = 3.0  # standard deviations below zero: no chance (two-sided .003)
 _FALLING = {"stribeck", "concave_friction", "three_sigmoid"}  # laws that may fall with speed and be right
-_COARSE = 0.05  # of the inertia, its bias by errors in variables: beyond it is not an estimate
+_CONFIG = FindingsConfig()
 
 
 def drift_in_words(drift: Drift | None, name: str, revolute: bool) -> str:
@@ -55,7 +55,7 @@ def nuisance_findings(joint: JointFit, name: str) -> tuple[Check, ...]:
         found.append(Check.of("D26", "warn", words[:-1], where=where,
                               remedy="warm the joint up before it is measured, or record one speed for minutes to see it settle"))
     attenuation = joint.sliding.attenuation
-    if attenuation > _COARSE or not math.isfinite(attenuation):
+    if attenuation > _CONFIG.coarse or not math.isfinite(attenuation):
         noise = 100.0 * min(attenuation, 1.0)
         found.append(Check.of(
             "D08", "warn", f"the encoder is too coarse for these motions: {noise:.0f} % of the acceleration of joint "
@@ -77,7 +77,7 @@ def _negative_viscous(joint: JointFit, where: str) -> Check | None:
         if one.law.name not in ("coulomb+viscous", joint.fit.law.name):
             continue
         for number in one.fit.numbers:
-            if number.name == "viscous.coefficient" and number.value < -_SURE * number.std:
+            if number.name == "viscous.coefficient" and number.value < -_CONFIG.sure * number.std:
                 return Check.of(
                     "S14", "warn", f"viscous friction of joint {joint.logs.joint} comes out negative, {number.value:.3g} ± "
                     f"{number.std:.2g} {number.unit}: torque falls as speed rises", where=where,

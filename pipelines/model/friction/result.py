@@ -19,7 +19,7 @@ from pipelines.model.friction.one_joint import gravity_names
 from pipelines.model.friction.ripple import Along, Ripple
 from pipelines.model.friction.several import SeveralFit
 from pipelines.model.friction.undecided import undecided
-from pipelines.model.friction.weak_form import moved
+from pipelines.model.friction.weak_form import Course, moved
 
 __all__ = ["CandidateLaw", "Drift", "Event", "JointResult", "Posture", "Result", "Rippled", "Series", "Sticking", "Validation",
            "Value", "drift_of_joint", "joint_result", "several_results"]
@@ -260,17 +260,30 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
     return JointResult(
         joint.logs.joint, name, fit.law.name, method, parameters, postures[0].inertia, postures[0].gravity, postures,
         Validation(errors[0], errors[1], driven.stretch.name, driven.judging, _torque_error(ladder)), laws, ladder.by,
-        tuple(Missing(gap.what, gap.record) for gap in joint.unseen), events, joint.held,
+        (*(Missing(gap.what, gap.record) for gap in joint.unseen), *_not_excluded(joint)), events, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)), _series(joint),
         _rippled(joint.ripple, _beside_ripple(joint), fit.joint.revolute), True, drift_of_joint(joint), _sticking(joint))
 
 
 def drift_of_joint(joint: JointFit) -> Drift | None:
+    """The change of friction that is named; None where the logs show none."""
+    return _drift(joint, joint.course) if joint.course is not None and joint.course.named else None
+
+
+def _not_excluded(joint: JointFit) -> tuple[Missing, ...]:
+    """A change of friction that takes part in the fit: the logs neither show nor exclude it."""
+    if joint.course is None or joint.course.named:
+        return ()
+    change = _drift(joint, joint.course).change
+    size = f"{100.0 * change.value:.2g} ± {100.0 * (change.std or 0.0):.2g} %"
+    return (Missing(f"whether friction changes in the course of a log (by {size} if the law is right) "
+                    "or with speed alone: these logs do not tell", "drive every speed early and late in the log"),)
+
+
+def _drift(joint: JointFit, course: Course) -> Drift:
     """The change of friction at half of the fastest speed, relative to the law."""
-    course, fit = joint.course, joint.fit
-    if course is None:
-        return None
+    fit = joint.fit
     speed = 0.5 * joint.covered.fastest
     level = float(np.mean(np.abs(fit.curve(np.array([speed, -speed])))))
     own = joint.stretches[0].course or course

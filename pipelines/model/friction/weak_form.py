@@ -32,13 +32,22 @@ from pipelines.signal.tuning import tune_jerk
 __all__ = ["Course", "Stretch", "Windows", "blocks_of_time", "moved", "stretches_of", "swaying"]
 
 _MOTIONLESS = ("edges", "usable", "impulse", "length", "torque")
-_VAGUE = 2.0  # times the usual standard deviation of the speed: near ends and gaps
-_SWAY = 10.0  # encoder steps: a held joint that moves further is seen to
-_FAST = 3.0  # standard deviations of a speed: what is slower (rms) may stand still
-_FEWEST = 10  # windows of a stretch that is worth using
-_SHORTEST = 4  # samples of a window
 _PART = 1e-3  # of a finite difference, relative
 _KINKED = 2  # order of a smoother for motion whose acceleration jumps
+
+
+@dataclass(frozen=True)
+class WeakFormConfig:
+    """Which samples and stretches make equations, and which joints move."""
+
+    vague: float = 2.0  # times the usual std of the speed: near ends and gaps; a choice
+    sway: float = 10.0  # encoder steps: rounding moves a held joint by one
+    fast: float = 3.0  # std of a speed: a slower one (rms) may be zero (two-sided .003)
+    fewest: int = 10  # windows of a stretch that is worth using: a choice, not measured
+    shortest: int = 4  # samples of a window: a choice, not measured
+
+
+_CONFIG = WeakFormConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +87,7 @@ class Course:
     part: int = 0  # stretch of a step
     curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
     change: float = 0.0  # α of the fit before, of a trend: beside c g then stands α ∂c/∂(ln T) g, and T is fitted
+    named: bool = True  # shown by the rows; else neither shown nor excluded
 
     def at(self, part: int, t: Array) -> Array:
         """c(t) in one of the stretches: it rises by one."""
@@ -269,7 +279,7 @@ def blocks_of_time(stretches: Sequence[Stretch], length: float) -> npt.NDArray[n
 def swaying(found: Reconstructed, joint: int, resolution: Array) -> tuple[int, ...]:
     """Joints, counted from 1, that are held in the log but visibly give way."""
     q = found.motion.q[found.good.kept[found.good.fit]]
-    moved = np.ptp(q, axis=0) > _SWAY * resolution
+    moved = np.ptp(q, axis=0) > _CONFIG.sway * resolution
     return tuple(int(k) + 1 for k in np.flatnonzero(moved) if k != joint - 1)
 
 
@@ -278,10 +288,10 @@ def moved(seen: Sequence[Reconstructed]) -> npt.NDArray[np.bool_]:
     found = []
     for one in seen:
         rows = one.good.kept[one.good.fit]
-        moves = np.ptp(one.motion.q[rows], axis=0) > _SWAY * encoder_resolution(one.good)
+        moves = np.ptp(one.motion.q[rows], axis=0) > _CONFIG.sway * encoder_resolution(one.good)
         if one.std is not None:
             speed = np.sqrt(np.nanmean(np.square(one.motion.dq[rows]), axis=0))
-            moves &= speed > _FAST * np.nanmedian(one.std[1][rows], axis=0)
+            moves &= speed > _CONFIG.fast * np.nanmedian(one.std[1][rows], axis=0)
         found.append(moves)
     return np.asarray(np.any(found, axis=0))
 
@@ -295,7 +305,7 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
     """
     good, j = found.good, joint - 1
     others = tuple(float(np.nanmedian(good.log.q[:, k])) for k in range(log.n_joints) if k != j)
-    size = max(_SHORTEST, round(window / log.sample_time))
+    size = max(_CONFIG.shortest, round(window / log.sample_time))
     motion, stretches = found.motion, []
     weighs = gravity_acts(log.robot, joint, others)
     for run in good.runs:
@@ -306,14 +316,14 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
         doubt = 0.0
         if found.std is not None:
             speed = found.std[1][rows, j]
-            spoilt |= speed > _VAGUE * np.nanmedian(found.std[1][:, j])
+            spoilt |= speed > _CONFIG.vague * np.nanmedian(found.std[1][:, j])
             doubt = float(np.nanmedian(speed))
         measured = np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j])
         stretch = Stretch(log.name, good.log.t[run], measured, good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
                           np.where(np.isfinite(dq), dq, 0.0), spoilt, True, size,
                           log.robot.joints[j].revolute, others, sways, doubt, weighs,
                           untimed=log.torque == "measured")
-        if len(stretch.edges) > _FEWEST and stretch.rows >= _FEWEST:
+        if len(stretch.edges) > _CONFIG.fewest and stretch.rows >= _CONFIG.fewest:
             stretches.append(stretch)
     return tuple(stretches)
 
