@@ -29,7 +29,7 @@ __all__ = ["Later", "State"]
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
 _DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
-_HALF = 0.5  # numerics: of the time
+_HALF = 0.5  # numerics: of the rows
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
 
 
@@ -237,10 +237,11 @@ class Later:
         return within
 
     def _mostly_acting(self, effect: Effect) -> bool:
-        """Return whether an effect acts most of the time: a joint that is clipped so follows nothing."""
+        """Return whether an effect acts in most rows: a joint that is clipped so follows nothing."""
         logs, arm = self.rows.data.logs, self.dataset.arm
-        acting = [effect.columns(one.motion, arm).any(axis=(1, 2)) for one in logs]
-        return float(np.concatenate(acting).mean()) > _HALF
+        acting = [one.at_rows(effect.columns(one.motion, arm).any(axis=2)).T.ravel() for one in logs]
+        own = self.rows.data.counts & (self.rows.joint == (effect.joint or 1) - 1)
+        return float(np.concatenate(acting)[own].mean()) > _HALF
 
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.
