@@ -99,7 +99,7 @@ def _limit(
     first = shapes[0].effect
     if visible < _VISIBLE:
         reason = f"absorbed by {_hiding(later, shapes[0])}; needs other motion"
-        return NotIdentifiable(first.name, first.joint, reason, first.experiment)
+        return NotIdentifiable(first.name, first.joint, reason, first.words.experiment)
     needed = {
         one.freedom: np.sqrt(baseline.threshold(one.group, one.freedom, later.rows.count)) + _SIDE
         for one in shapes
@@ -112,7 +112,7 @@ def _limit(
     amplitudes = np.array(first.fixed_amplitudes)
     seen = [s for s in shapes if s.power(amplitudes) > needed[s.freedom] ** 2]
     if not seen:
-        return NotIdentifiable(first.name, first.joint, _TOO_MUCH, first.experiment)
+        return NotIdentifiable(first.name, first.joint, _TOO_MUCH, first.words.experiment)
     return _told(later, min(seen, key=lambda s: s.effect.strength), amplitudes, visible)
 
 
@@ -124,9 +124,9 @@ def _told(
     values = effect.values(amplitudes)
     joint = effect.joint
     turning = joint is None or later.dataset.arm.robot.revolute[joint - 1]
-    beyond = NotIdentifiable(effect.name, joint, _TOO_MUCH, effect.experiment)
+    beyond = NotIdentifiable(effect.name, joint, _TOO_MUCH, effect.words.experiment)
     if effect.fixed_amplitudes is not None:
-        q = next(q for q in effect.parameters if q.name == effect.size)
+        q = next(q for q in effect.parameters if q.name == effect.words.size)
         size = Value(values[q.name], None, q.unit_at(turning))
         less = effect.strength < 0.0
         return DetectionLimit(effect.name, joint, q.name, size, {}, "analytic", visible, less)

@@ -126,7 +126,8 @@ def _beside(more: Sequence[Finding]) -> Iterator[str]:
 def _advice(result: Result) -> tuple[str, ...]:
     """What to look at on the machine, cause by cause."""
     causes = together(result.findings)
-    return tuple(f"What to check{f' for {words}' if len(result.findings) > 1 else ''}: {as_sentence(find_effect(cause).remedy)}"
+    several = len(result.findings) > 1
+    return tuple(f"What to check{f' for {words}' if several else ''}: {as_sentence(find_effect(cause).words.remedy)}"
                  for cause, words in causes)
 
 

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -28,7 +28,6 @@ class AsymmetricFriction(Fast):
     gradual: float = 0.0  # 1: s = tanh(w v)
 
     name = "asymmetric_friction"
-    title = "Asymmetric friction"
     parameters = (
         Quantity("coulomb_difference", "N m", -LARGE, LARGE, "Coulomb friction of the positive minus the negative direction"),
         Quantity("viscous_difference", "N m s/rad", -LARGE, LARGE, "viscous friction of the positive minus the negative direction"),
@@ -36,10 +35,16 @@ class AsymmetricFriction(Fast):
         Quantity("gradual", "1", 0.0, 1.0, "1: the directions go over into each other as friction changes its sign, 0: at once",
                  shape=True, discrete=True, unsaid=0.0),
     )
-    signature = "A part of the torque that is even in speed: larger friction one way than the other."
-    explanation = "Preload, seal lips and worm or harmonic gears rub more in one direction of motion."
-    remedy = "Look at preload and seals; what stays, compensate with coefficients of its own in each direction."
-    experiment = "Hold still for two seconds in several positions, then move at several equal speeds in both directions."
+    words = Words(
+        "Asymmetric friction",
+        signature="A part of the torque that is even in speed: larger friction one way than the "
+                  "other.",
+        explanation="Preload, seal lips and worm or harmonic gears rub more in one direction of "
+                    "motion.",
+        remedy="Look at preload and seals; what stays, compensate with coefficients of its own in "
+               "each direction.",
+        experiment="Hold still for two seconds in several positions, then move at several equal "
+                   "speeds in both directions.")
     shared = ("sharpness",)
     from_motion = True
 

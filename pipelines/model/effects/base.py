@@ -22,7 +22,7 @@ What a diagnosis reads:
     shapes, promising    a grid of non-linear parameters; the event windows that a residual suggests
     full, forms          the form that is refitted, with more amplitudes than the one screened; other laws of the same cause
     free, shared         non-linear parameters that a refit may move; those that equal the friction law's at the same joint
-    fixed_amplitudes     amplitudes given by physics: screening fits them, a refit holds them; `size` then tells how much there is
+    fixed_amplitudes     amplitudes given by physics: screening fits them, a refit holds them; `words.size` then tells how much
     possible, at_end     whether values lie in their ranges, and whether a step would leave them
     per_log              parameters that belong to one log: the window of an event, the phase of encoders zeroed at each start
     moving               directions in which the effect changes base parameters beyond its columns (nuisance)
@@ -60,6 +60,7 @@ from pipelines.model.effects.terms import (
     Quantity,
     SpeedCurve,
     Values,
+    Words,
     friction_at,
     predicted,
     summed,
@@ -67,7 +68,8 @@ from pipelines.model.effects.terms import (
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LARGE", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
-           "SpeedCurve", "Values", "friction_at", "predicted"]
+           "SpeedCurve", "Values", "Words",
+           "friction_at", "predicted"]
 
 
 @dataclass(frozen=True)
@@ -77,14 +79,9 @@ class Effect(Placed, ABC):
     joint: int | None = None  # 1-based; None where scope is "arm"
 
     name: ClassVar[str]  # identifier of causes.md, and the file's name
-    title: ClassVar[str]  # plain words
+    words: ClassVar[Words]
     scope: ClassVar[Literal["joint", "arm"]] = "joint"
     parameters: ClassVar[tuple[Quantity, ...]]
-    signature: ClassVar[str]  # how it shows
-    explanation: ClassVar[str]  # what it is
-    remedy: ClassVar[str]  # what to do about it
-    experiment: ClassVar[str]  # what to record to be sure
-    size: ClassVar[str] = ""  # the number that a verdict tells beside the title, if one alone says how much of it there is
     fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
     per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
     evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
@@ -142,8 +139,8 @@ class Effect(Placed, ABC):
 
     @property
     def strength(self) -> float:
-        """How much of it there is, by `size`, where physics gives the amplitudes; negative for what grows as `size` falls."""
-        return float(getattr(self, self.size)) if self.fixed_amplitudes else 0.0
+        """How much of it there is, by `words.size`, where physics gives the amplitudes; negative for what grows as that falls."""
+        return float(getattr(self, self.words.size)) if self.fixed_amplitudes else 0.0
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Predict, Quantity, Values, friction_at
+from pipelines.model.effects.base import ArmModel, Hooks, Predict, Quantity, Values, Words, friction_at
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_by, rigid_slopes, shifted
@@ -31,18 +31,22 @@ class BaseResonance(Fast):
     damping_ratio: float = 0.05  # ζ
 
     name = "base_resonance"
-    title = "Base resonance"
     scope = "arm"
     parameters = (
         Quantity("frequency", "Hz", 1.0, 200.0, "of the base alone: the pole", shape=True),
         Quantity("damping_ratio", "1", 0.001, 1.0, "of the base", shape=True),
         Quantity("inertia", "kg m^2", 1e-3, 1e5, "of the base about the first joint's axis"),
     )
-    signature = "A pole and a zero just below it in the first joint's frequency response, at the same frequency in every posture."
-    explanation = "The table, the floor or the bolts under the arm are a spring; the arm's reaction moves them."
-    remedy = "Tighten or stiffen what the arm stands on; keep the first joint's bandwidth below it."
-    experiment = "Measure the frequency response of the first joint in two postures with different inertia."
-    size = "frequency"
+    words = Words(
+        "Base resonance", size="frequency",
+        signature="A pole and a zero just below it in the first joint's frequency response, at "
+                  "the same frequency in every posture.",
+        explanation="The table, the floor or the bolts under the arm are a spring; the arm's "
+                    "reaction moves them.",
+        remedy="Tighten or stiffen what the arm stands on; keep the first joint's bandwidth below "
+               "it.",
+        experiment="Measure the frequency response of the first joint in two postures with "
+                   "different inertia.")
     evidence = "frequency responses"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

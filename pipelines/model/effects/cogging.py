@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import NEARLY, orders_along
@@ -40,7 +40,6 @@ class Cogging(Fast):
 
     name = "cogging"
     healthy = "every shape"
-    title = "Cogging"
     parameters = (
         Quantity("order", "1/rev", 0.25, 1000.0, "waves in one turn of the joint", shape=True),
         Quantity("amplitude", "N m", 0.0, LARGE, "of the first wave"),
@@ -52,10 +51,15 @@ class Cogging(Fast):
         Quantity("amplitude_3", "N m", 0.0, LARGE, "of the third harmonic"),
         Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", period=2.0 * math.pi),
     )
-    signature = "A torque that repeats along the turn of the joint, the same at every speed and in both directions."
-    explanation = "Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: each once or many times a turn."
-    remedy = "Look for a damaged magnet, tooth or bearing where it is new; else add it to the feed-forward by the joint's angle."
-    experiment = "Turn the joint slowly through its whole range, both ways, at two speeds."
+    words = Words(
+        "Cogging",
+        signature="A torque that repeats along the turn of the joint, the same at every speed and "
+                  "in both directions.",
+        explanation="Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: "
+                    "each once or many times a turn.",
+        remedy="Look for a damaged magnet, tooth or bearing where it is new; else add it to the "
+               "feed-forward by the joint's angle.",
+        experiment="Turn the joint slowly through its whole range, both ways, at two speeds.")
     per_log = ("phase", "phase_2", "phase_3")  # where an encoder is zeroed at each start
     from_motion = True
 

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -32,17 +32,22 @@ class ConcaveFriction(Fast):
     knee: float = 0.0  # a, held where it is 0: tanh
 
     name = "concave_friction"
-    title = "Concave friction"
     parameters = (
         Quantity("amplitude", "N m", 0.0, LARGE, "torque at which it levels off"),
         Quantity("speed", "rad/s", 0.01, 20.0, "speed at which it levels off", shape=True),
         Quantity("knee", "1", 0.0, 6.0, "how abruptly it levels off; 0: as tanh does", shape=True, unsaid=0.0),
     )
-    signature = "Friction that rises with speed and then levels off, the same in both directions."
-    explanation = "Lubricant that thins as it is sheared, and churning in gears: common in geared and lubricated joints."
-    remedy = ("Harmonic drives and greased gears have it, and nothing need be broken: compensate it in the feed-forward; "
-              "a single viscous coefficient is too large at speed and too small below it.")
-    experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
+    words = Words(
+        "Concave friction",
+        signature="Friction that rises with speed and then levels off, the same in both "
+                  "directions.",
+        explanation="Lubricant that thins as it is sheared, and churning in gears: common in "
+                    "geared and lubricated joints.",
+        remedy="Harmonic drives and greased gears have it, and nothing need be broken: compensate "
+               "it in the feed-forward; a single viscous coefficient is too large at speed and "
+               "too small below it.",
+        experiment="Move the joint in both directions at seven to ten constant speeds over two "
+                   "decades.")
     friction = True
     ordinary = True
     from_motion = True

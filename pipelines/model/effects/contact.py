@@ -10,7 +10,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, Words
 from pipelines.model.rigid.altered import chain_of
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.geometry import SerialChain
@@ -34,7 +34,6 @@ class Contact(Effect):
 
     name = "contact"
     healthy = "never"
-    title = "Contact at the tip"
     scope = "arm"
     parameters = (
         Quantity("start", "s", -1e12, 1e12, "when it begins, from the start of its log", shape=True),
@@ -42,10 +41,13 @@ class Contact(Effect):
         Quantity("force", "N", 0.0, 1e5, "the largest", derived=True),
         *(Quantity(f"force_{axis}", "N", -1e5, 1e5, f"{axis} of the largest, in the base frame") for axis in "xyz"),
     )
-    signature = "All joints are disturbed at once, for a moment, as a force at the tip would do it."
-    explanation = "Somebody or something touched the arm, or it brushed against an obstacle."
-    remedy = "Leave the moment out of the fit; clear the workspace and record again."
-    experiment = "Repeat the same motion: what does not come again was a touch."
+    words = Words(
+        "Contact at the tip",
+        signature="All joints are disturbed at once, for a moment, as a force at the tip would do "
+                  "it.",
+        explanation="Somebody or something touched the arm, or it brushed against an obstacle.",
+        remedy="Leave the moment out of the fit; clear the workspace and record again.",
+        experiment="Repeat the same motion: what does not come again was a touch.")
     per_log = ("start", "duration", "force", "force_x", "force_y", "force_z")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -40,16 +40,19 @@ class Coulomb(Fast):
     roundness: float = 1.0  # r
 
     name = "coulomb"
-    title = "Coulomb friction"
     parameters = (
         Quantity("level", "N m", 0.0, LARGE, "friction torque while moving"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
         Quantity("roundness", "1", 0.4, 3.5, "how gradually it changes sign; 1: as tanh, 3: as arctan", shape=True, unsaid=1.0),
     )
-    signature = "A torque of constant size that changes sign with the direction of motion."
-    explanation = "Dry friction in bearings, seals and gears: its size does not depend on speed."
-    remedy = "If it has grown, check lubrication, preload and seals; compensate it in the feed-forward."
-    experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
+    words = Words(
+        "Coulomb friction",
+        signature="A torque of constant size that changes sign with the direction of motion.",
+        explanation="Dry friction in bearings, seals and gears: its size does not depend on speed.",
+        remedy="If it has grown, check lubrication, preload and seals; compensate it in the "
+               "feed-forward.",
+        experiment="Move the joint in both directions at seven or more constant speeds over two "
+                   "decades.")
     evidence = "none"
     friction = True
     from_motion = True

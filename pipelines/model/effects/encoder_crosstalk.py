@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import perturbed_torque, shifted
 
@@ -23,16 +23,19 @@ class EncoderCrosstalk(Effect):
     from_joint: float = 0.0  # i, 1-based
 
     name = "encoder_crosstalk"
-    title = "Encoder crosstalk"
     parameters = (
         Quantity("coefficient", "1", -0.5, 0.5, "part of the other joint's angle in this one's reading"),
         Quantity("from_joint", "1", 1.0, 64.0, "the other joint", shape=True, discrete=True, joint=True),
     )
-    signature = "An error of this joint's angle that follows the angle of another one, felt by all rows."
-    explanation = "Belts, cables or a parallel rod turn this encoder a little when another joint moves, or two channels mix."
-    remedy = "Take the part found off the reading; look at what couples the two encoders."
-    experiment = "Hold this joint still against a stop or a level and move the other over its range."
-    size = "coefficient"
+    words = Words(
+        "Encoder crosstalk", size="coefficient",
+        signature="An error of this joint's angle that follows the angle of another one, felt by "
+                  "all rows.",
+        explanation="Belts, cables or a parallel rod turn this encoder a little when another "
+                    "joint moves, or two channels mix.",
+        remedy="Take the part found off the reading; look at what couples the two encoders.",
+        experiment="Hold this joint still against a stop or a level and move the other over its "
+                   "range.")
     acts_on = "encoder"
 
     @classmethod

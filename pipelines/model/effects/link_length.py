@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, Words
 from pipelines.model.rigid.altered import carry_over, masses_beyond, with_longer_link
 from pipelines.model.rigid.body import Array, Motion
 
@@ -27,17 +27,19 @@ class LinkLength(Effect):
     link: float = 1.0  # k, 1-based: from joint k to joint k + 1
 
     name = "link_length"
-    title = "A link of another length"
     scope = "arm"
     parameters = (
         Quantity("error", "m", -1.0, 1.0, "true length minus that of the description"),
         Quantity("link", "1", 1.0, 100.0, "which link, counted from the base", shape=True, discrete=True, link=True),
     )
-    signature = "Gravity and inertia of the links beyond do not agree with each other."
-    explanation = "The drawing, the calibration or the robot description has another length than the arm."
-    remedy = "Measure the link and correct the robot description; the tip is off by as much."
-    experiment = "Hold the arm in static poses with the elbow bent and straight, and move it fast in the same poses."
-    size = "error"
+    words = Words(
+        "A link of another length", size="error",
+        signature="Gravity and inertia of the links beyond do not agree with each other.",
+        explanation="The drawing, the calibration or the robot description has another length "
+                    "than the arm.",
+        remedy="Measure the link and correct the robot description; the tip is off by as much.",
+        experiment="Hold the arm in static poses with the elbow bent and straight, and move it "
+                   "fast in the same poses.")
 
     @classmethod
     def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, PlainDrive, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, PlainDrive, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LoadFriction"]
@@ -33,17 +33,21 @@ class LoadFriction(Effect):
     input_side: float = 0.0  # i, held where it is 0
 
     name = "load_friction"
-    title = "Friction that grows with load"
     parameters = (
         Quantity("mu", "1", 0.0, 0.5, "friction per unit of transmitted torque"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
         Quantity("behind", "1", 0.0, 1.0, "share of the joint's other friction that loads it too", shape=True, unsaid=0.0),
         Quantity("input_side", "1", 0.0, 1.0, "how far it goes by what goes in, not by what comes out", shape=True, unsaid=0.0),
     )
-    signature = "Friction that grows with the torque the joint carries and changes sign with the direction of motion."
-    explanation = "Teeth and bearings are pressed together by the torque that passes them, and rub in proportion."
-    remedy = "Check the lubrication of the gear; compensate it with the predicted torque."
-    experiment = "Move the joint at one speed in both directions under three loads: three postures, or payloads."
+    words = Words(
+        "Friction that grows with load",
+        signature="Friction that grows with the torque the joint carries and changes sign with "
+                  "the direction of motion.",
+        explanation="Teeth and bearings are pressed together by the torque that passes them, and "
+                    "rub in proportion.",
+        remedy="Check the lubrication of the gear; compensate it with the predicted torque.",
+        experiment="Move the joint at one speed in both directions under three loads: three "
+                   "postures, or payloads.")
     shared = ("sharpness",)
     friction = True
 

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -36,7 +36,6 @@ class PositionFriction(Fast):
     whole: bool = False  # whether k is held as it is
 
     name = "position_friction"
-    title = "Friction that depends on position"
     parameters = (
         Quantity("amplitude", "N m", 0.0, LARGE, "by how much friction rises and falls along the turn"),
         Quantity("order", "1/rev", 0.25, 100.0, "waves in one turn of the joint", shape=True),
@@ -47,10 +46,14 @@ class PositionFriction(Fast):
         Quantity("amplitude_3", "N m", 0.0, LARGE, "of the third harmonic", unsaid=0.0),
         Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", unsaid=0.0, period=2.0 * math.pi),
     )
-    signature = "Friction whose size changes with the angle of the joint, always against the motion."
-    explanation = "A bent shaft, an uneven seal or bearing, cables that press in some postures."
-    remedy = "Look for wear, a bent shaft or cables that rub; compensate it with the angle."
-    experiment = "Turn the joint slowly through its whole range in both directions, at two speeds."
+    words = Words(
+        "Friction that depends on position",
+        signature="Friction whose size changes with the angle of the joint, always against the "
+                  "motion.",
+        explanation="A bent shaft, an uneven seal or bearing, cables that press in some postures.",
+        remedy="Look for wear, a bent shaft or cables that rub; compensate it with the angle.",
+        experiment="Turn the joint slowly through its whole range in both directions, at two "
+                   "speeds.")
     shared = ("sharpness",)
     from_motion = True
 

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Hooks, OwnMemory, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Hooks, OwnMemory, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.bristles import ONE, Breaking, Bristles, Slips, sliding_level
@@ -52,7 +52,6 @@ class Presliding(Fast):
     breakaway_speed: float = 0.1  # v_s [rad/s]
 
     name = "presliding"
-    title = "Presliding"
     parameters = (
         Quantity("amplitude", "N m", 0.0, LARGE, "friction that turns over with travel"),
         Quantity("distance", "rad", 1e-6, 0.2, "travel over which it turns over", shape=True),
@@ -64,11 +63,17 @@ class Presliding(Fast):
         Quantity("breakaway", "1", 0.0, 5.0, "how much larger friction is at standstill than at speed", shape=True, unsaid=0.0),
         Quantity("breakaway_speed", "rad/s", 1e-3, 5.0, "speed over which it falls to that", shape=True, unsaid=0.1),
     )
-    signature = "After each reversal friction turns over along a loop against position, at any speed."
-    explanation = "Contacts, seals and gears bend before they slide, and bend back after a reversal."
-    remedy = ("Every bearing has it, and nothing need be broken: simulate it where slow reversals matter; friction compensation "
-              "by the sign of speed alone pushes too early.")
-    experiment = "Reverse the joint slowly and often, with strokes from a tenth of the distance to many times it."
+    words = Words(
+        "Presliding",
+        signature="After each reversal friction turns over along a loop against position, at any "
+                  "speed.",
+        explanation="Contacts, seals and gears bend before they slide, and bend back after a "
+                    "reversal.",
+        remedy="Every bearing has it, and nothing need be broken: simulate it where slow "
+               "reversals matter; friction compensation by the sign of speed alone pushes too "
+               "early.",
+        experiment="Reverse the joint slowly and often, with strokes from a tenth of the distance "
+                   "to many times it.")
     ordinary = True
     from_motion = True
 

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import ArmModel, OwnLoad, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -38,7 +38,6 @@ class Spring(Fast):
     highest: int = _DEGREE  # of the form that a finding is refitted with
 
     name = "spring"
-    title = "Spring"
     parameters = (
         Quantity("stiffness", "N m/rad", -1e4, 1e4, "at rest"),
         Quantity("rest_angle", "rad", -20.0, 20.0, "where it does not pull"),
@@ -51,10 +50,14 @@ class Spring(Fast):
         Quantity("seen_from", "rad", -_FAR, _FAR, "below it goes straight on", shape=True, derived=True, unsaid=-_FAR),
         Quantity("seen_to", "rad", -_FAR, _FAR, "above it goes straight on", shape=True, derived=True, unsaid=_FAR),
     )
-    signature = "A torque that depends on the angle of its joint alone and pulls towards one angle."
-    explanation = "A cable bundle, a hose or a balancing spring pulls the joint."
-    remedy = "Look for a cable that is led too short or has come loose; add it to the model."
-    experiment = "Hold the joint at rest in many angles over its whole range, with another joint in two postures."
+    words = Words(
+        "Spring",
+        signature="A torque that depends on the angle of its joint alone and pulls towards one "
+                  "angle.",
+        explanation="A cable bundle, a hose or a balancing spring pulls the joint.",
+        remedy="Look for a cable that is led too short or has come loose; add it to the model.",
+        experiment="Hold the joint at rest in many angles over its whole range, with another "
+                   "joint in two postures.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

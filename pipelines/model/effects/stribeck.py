@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -34,7 +34,6 @@ class Stribeck(Fast):
     exponent: float = 2.0  # n, held where it is 2
 
     name = "stribeck"
-    title = "Stribeck friction"
     parameters = (
         Quantity("amplitude", "N m", 0.0, LARGE, "friction at standstill above that at speed"),
         Quantity("speed", "rad/s", 1e-3, 5.0, "speed over which it falls", shape=True),
@@ -43,11 +42,15 @@ class Stribeck(Fast):
                  unsaid=0.0),
         Quantity("exponent", "1", 0.0, 4.0, "how abruptly it falls at its speed", shape=True, unsaid=2.0),
     )
-    signature = "A hump of the friction curve at low speed, the same in both directions."
-    explanation = "Below a certain speed the surfaces touch; above it a film of lubricant carries them."
-    remedy = ("Most oiled gears have it, and nothing need be broken: compensate it in the feed-forward; "
-              "another lubricant moves the hump.")
-    experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
+    words = Words(
+        "Stribeck friction",
+        signature="A hump of the friction curve at low speed, the same in both directions.",
+        explanation="Below a certain speed the surfaces touch; above it a film of lubricant "
+                    "carries them.",
+        remedy="Most oiled gears have it, and nothing need be broken: compensate it in the "
+               "feed-forward; another lubricant moves the hump.",
+        experiment="Move the joint in both directions at seven to ten constant speeds over two "
+                   "decades.")
     shared = ("sharpness",)
     friction = True
     ordinary = True

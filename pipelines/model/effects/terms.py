@@ -2,6 +2,7 @@
 
     ArmModel      what an effect may ask of the arm
     Quantity      one parameter: unit, range, meaning
+    Words         what a report says of an effect
     SpeedCurve    a torque that follows from speed alone, which a simulation takes by itself
     Formula       one that follows from angle and speed, which it writes out
     Hooks         how an effect enters the forward simulation
@@ -23,7 +24,7 @@ from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
 __all__ = ["LARGE", "WRITTEN", "ArmModel", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
-           "SpeedCurve", "Values", "friction_at", "predicted", "summed"]
+           "SpeedCurve", "Values", "Words", "friction_at", "predicted", "summed"]
 
 Values = Mapping[str, float]
 
@@ -141,6 +142,18 @@ class Quantity:
         if revolute or self.period is not None:
             return self.unit
         return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m").replace("1/rev", "1/(2 pi m)")
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a report says of an effect: sentences, but for the title."""
+
+    title: str
+    signature: str  # how it shows
+    explanation: str  # what it is
+    remedy: str  # what to do about it
+    experiment: str  # what to record to be sure
+    size: str = ""  # the parameter that a verdict gives with the title, if one alone says how much of it there is
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -32,16 +32,20 @@ class ThreeSigmoid(Fast):
     w3: float = 10.0  # [s/rad]
 
     name = "three_sigmoid"
-    title = "Friction of three sigmoids"
     parameters = (
         *(Quantity(f"f{k}", "N m", -LARGE, LARGE, f"height of sigmoid {k}") for k in (1, 2, 3)),
         *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2, 3)),
         Quantity("b", "N m s/rad", 0.0, LARGE, "viscous coefficient"),
     )
-    signature = "A friction curve that jumps at zero speed, dips at low speed and rises with speed."
-    explanation = "Dry, boundary and fluid friction together: the lubricant film builds up with speed."
-    remedy = "Compensate it in the feed-forward; the dip is what makes slow motion stick."
-    experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
+    words = Words(
+        "Friction of three sigmoids",
+        signature="A friction curve that jumps at zero speed, dips at low speed and rises with "
+                  "speed.",
+        explanation="Dry, boundary and fluid friction together: the lubricant film builds up with "
+                    "speed.",
+        remedy="Compensate it in the feed-forward; the dip is what makes slow motion stick.",
+        experiment="Drive the joint alone, with reversals, from the lowest speed it holds to the "
+                   "highest it allows.")
     evidence = "none"
     plainer = (("two_sigmoid",), ("coulomb", "viscous"))
     friction = True

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueCrosstalk"]
@@ -21,16 +21,18 @@ class TorqueCrosstalk(Effect):
     from_joint: float = 0.0  # i, 1-based
 
     name = "torque_crosstalk"
-    title = "Torque of another joint"
     parameters = (
         Quantity("coefficient", "1", -1.0, 1.0, "share of the other joint's torque that this joint has to give more"),
         Quantity("from_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
     )
-    signature = "A residual in proportion to another joint's torque."
-    explanation = "Two current measurements or motor cables influence each other, or a transmission leads torque past its joint."
-    remedy = "Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission."
-    experiment = "Load one joint while the others carry nothing, each in turn."
-    size = "coefficient"
+    words = Words(
+        "Torque of another joint", size="coefficient",
+        signature="A residual in proportion to another joint's torque.",
+        explanation="Two current measurements or motor cables influence each other, or a "
+                    "transmission leads torque past its joint.",
+        remedy="Check the amplifiers' wiring and shielding; where it is mechanical, describe the "
+               "transmission.",
+        experiment="Load one joint while the others carry nothing, each in turn.")
     acts_on = "drive"
     slight = 0.002  # amplifiers that are in order lead over as much; between a turn and a slide it is one per metre
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueGain"]
@@ -23,13 +23,17 @@ class TorqueGain(Effect):
     """
 
     name = "torque_gain"
-    title = "Wrong torque scale"
     parameters = (Quantity("gain_error", "1", -0.7, 2.0, "applied torque = (1 + gain_error) logged torque"),)
-    signature = "A residual in proportion to the joint's own torque, at all speeds and in all postures."
-    explanation = "Torque constant, current measurement or gear ratio is not what the log assumes; magnets lose strength."
-    remedy = "Where it fell, look at the motor's magnets and the amplifier; correct the torque constant."
-    experiment = "Hold a known load in several postures, or repeat an experiment with a known payload."
-    size = "gain_error"
+    words = Words(
+        "Wrong torque scale", size="gain_error",
+        signature="A residual in proportion to the joint's own torque, at all speeds and in all "
+                  "postures.",
+        explanation="Torque constant, current measurement or gear ratio is not what the log "
+                    "assumes; magnets lose strength.",
+        remedy="Where it fell, look at the motor's magnets and the amplifier; correct the torque "
+               "constant.",
+        experiment="Hold a known load in several postures, or repeat an experiment with a known "
+                   "payload.")
     acts_on = "drive"
     slight = 0.0075  # a current sensor that is exact to a hundredth of its range may be off by so much
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import held_mean, lagging, rate_of_change
 
@@ -20,13 +20,16 @@ class TorqueLag(Effect):
     """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once."""
 
     name = "torque_lag"
-    title = "Torque logging delay"
     parameters = (Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one"),)
-    signature = "The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative."
-    explanation = "The recorder, or the current measurement, filters the torque before it is logged."
-    remedy = "Log the torque unfiltered, or filter position by the same low-pass; it is no fault of the arm."
-    experiment = "Repeat an experiment at two speeds: a fit at one must hold at the other."
-    size = "time_constant"
+    words = Words(
+        "Torque logging delay", size="time_constant",
+        signature="The logged torque trails the torque that the arm feels; inertia or friction "
+                  "comes out too small, or negative.",
+        explanation="The recorder, or the current measurement, filters the torque before it is "
+                    "logged.",
+        remedy="Log the torque unfiltered, or filter position by the same low-pass; it is no "
+               "fault of the arm.",
+        experiment="Repeat an experiment at two speeds: a fit at one must hold at the other.")
     acts_on = "record"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueSaturation"]
@@ -28,16 +28,18 @@ class TorqueSaturation(Effect):
 
     name = "torque_saturation"
     healthy = "never"
-    title = "Torque saturation"
     parameters = (
         Quantity("limit", "N m", 1e-3, 1e5, "largest torque that comes out", shape=True),
         Quantity("coefficient", "1", 0.0, 2.0, "share of the excess that is lost: 1 where the drive clips"),
     )
-    signature = "The log shows more torque than the arm feels, only where the torque is high."
-    explanation = "Current or voltage is limited, or the motor saturates; the command is logged all the same."
-    remedy = "Correct the limit in the controller's settings, or ask for less acceleration; look at supply and temperature limits."
-    experiment = "Repeat the experiment slower, so that the torque stays below the limit."
-    size = "limit"
+    words = Words(
+        "Torque saturation", size="limit",
+        signature="The log shows more torque than the arm feels, only where the torque is high.",
+        explanation="Current or voltage is limited, or the motor saturates; the command is logged "
+                    "all the same.",
+        remedy="Correct the limit in the controller's settings, or ask for less acceleration; "
+               "look at supply and temperature limits.",
+        experiment="Repeat the experiment slower, so that the torque stays below the limit.")
     acts_on = "drive"
     reads_torque = True
     fixed_amplitudes = (1.0,)

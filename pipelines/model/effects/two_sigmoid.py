@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -31,16 +31,20 @@ class TwoSigmoid(Fast):
     w2: float = 12.0  # [s/rad]
 
     name = "two_sigmoid"
-    title = "Friction of two sigmoids"
     parameters = (
         *(Quantity(f"f{k}", "N m", -LARGE, LARGE, f"height of sigmoid {k}") for k in (1, 2)),
         *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2)),
         Quantity("b", "N m s/rad", 0.0, LARGE, "viscous coefficient"),
     )
-    signature = "A friction curve that jumps at zero speed, and dips or rises once more before it grows with speed."
-    explanation = "Dry and fluid friction together, and one passage between them: the lubricant film builds up with speed."
-    remedy = "Compensate it in the feed-forward; a dip is what makes slow motion stick."
-    experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
+    words = Words(
+        "Friction of two sigmoids",
+        signature="A friction curve that jumps at zero speed, and dips or rises once more before "
+                  "it grows with speed.",
+        explanation="Dry and fluid friction together, and one passage between them: the lubricant "
+                    "film builds up with speed.",
+        remedy="Compensate it in the feed-forward; a dip is what makes slow motion stick.",
+        experiment="Drive the joint alone, with reversals, from the lowest speed it holds to the "
+                   "highest it allows.")
     evidence = "none"
     plainer = (("coulomb", "viscous"),)
     friction = True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -16,12 +16,15 @@ class Viscous(Fast):
     """τ = b v."""
 
     name = "viscous"
-    title = "Viscous friction"
     parameters = (Quantity("coefficient", "N m s/rad", 0.0, LARGE, "torque per unit of speed"),)
-    signature = "A torque in proportion to speed, the same in both directions."
-    explanation = "Sheared lubricant, and eddy currents in the motor."
-    remedy = "Compensate it in the feed-forward; it falls as the joint warms up, so log the temperature."
-    experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
+    words = Words(
+        "Viscous friction",
+        signature="A torque in proportion to speed, the same in both directions.",
+        explanation="Sheared lubricant, and eddy currents in the motor.",
+        remedy="Compensate it in the feed-forward; it falls as the joint warms up, so log the "
+               "temperature.",
+        experiment="Move the joint in both directions at seven or more constant speeds over two "
+                   "decades.")
     evidence = "none"
     friction = True
     from_motion = True

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ViscousDrift"]
@@ -25,15 +25,18 @@ class ViscousDrift(Effect):
 
     name = "viscous_drift"
     healthy = "never"
-    title = "Viscous friction that drifts"
     parameters = (
         Quantity("relative_change", "1", -1.0, 10.0, "of viscous friction, from the start of the log to the end of the drift"),
         Quantity("time_constant", "s", 0.2, 1000.0, "of the drift", shape=True),
     )
-    signature = "Torque per unit of speed that changes in the course of the log."
-    explanation = "Grease gets thinner as it warms up, and thickens again in a pause."
-    remedy = "Warm the arm up before it is measured or used; let the feed-forward follow the temperature."
-    experiment = "Repeat one cycle for several minutes from a cold start, and once more when the arm is warm."
+    words = Words(
+        "Viscous friction that drifts",
+        signature="Torque per unit of speed that changes in the course of the log.",
+        explanation="Grease gets thinner as it warms up, and thickens again in a pause.",
+        remedy="Warm the arm up before it is measured or used; let the feed-forward follow the "
+               "temperature.",
+        experiment="Repeat one cycle for several minutes from a cold start, and once more when "
+                   "the arm is warm.")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         start = motion.t[0] if self.since is None else self.since

@@ -27,7 +27,6 @@ class Wave(Fast):
     order: float = 1.0  # k [1/rev]
 
     name = "wave"
-    title = "Wave along the turn"
     parameters = (Quantity("order", "1/rev", 0.0, _FINEST, "waves in one turn of the joint", shape=True),
                   Quantity("sine", "N m", -np.inf, np.inf, "of the sine of the angle"),
                   Quantity("cosine", "N m", -np.inf, np.inf, "of its cosine"))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Words
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_closed_form import Fourier
 from sample_logs.make_model import synthetic_arm
@@ -18,14 +18,14 @@ from sample_logs.make_model import synthetic_arm
 Values = Mapping[str, float]
 
 
-class Words(Effect):
+class Said(Effect):
     """What a real effect says in words."""
 
-    title = signature = explanation = remedy = experiment = "For tests."
+    words = Words(*["For tests."] * 5)
 
 
 @dataclass(frozen=True)
-class LateEncoder(Words):
+class LateEncoder(Said):
     """q_measured(t) = q(t - delay): an exact extension that hands on another motion."""
 
     name = "late_encoder"
@@ -47,7 +47,7 @@ class LateEncoder(Words):
 
 
 @dataclass(frozen=True)
-class Clipped(Words):
+class Clipped(Said):
     """τ -> clip(τ, ±limit) on its own row: the limit is non-linear, the coefficient is 1 for a hard clip."""
 
     limit: float = 10.0
@@ -69,7 +69,7 @@ class Clipped(Words):
 
 
 @dataclass(frozen=True)
-class Heavier(Words):
+class Heavier(Said):
     """p -> (1 + part) p: another body, the whole arm."""
 
     name = "heavier"
@@ -87,7 +87,7 @@ class Heavier(Words):
 
 
 @dataclass(frozen=True)
-class Bristle(Words):
+class Bristle(Said):
     """dz/dt = v - |v| z/x_c, τ = amplitude z/x_c (Dahl 1968): a state of memory, in the simulation too."""
 
     distance: float = 0.01

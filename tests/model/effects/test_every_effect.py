@@ -111,9 +111,9 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 def test_words(kind: type[Effect]) -> None:
     """Title, signature, explanation, remedy and experiment are there, as sentences."""
     assert "=" in (kind.__doc__ or ""), "the equation stands above the code"
-    assert kind.title.strip()
-    assert not kind.title.endswith(".")
-    for words in (kind.signature, kind.explanation, kind.remedy, kind.experiment):
+    assert kind.words.title.strip()
+    assert not kind.words.title.endswith(".")
+    for words in (kind.words.signature, kind.words.explanation, kind.words.remedy, kind.words.experiment):
         assert words == words.strip()
         assert words.endswith(".")
         assert words[0].isupper()

@@ -155,7 +155,7 @@ class _Rungs:
 
 
 def _titles(names: Sequence[str]) -> str:
-    return ", ".join(find_effect(name).title for name in names)
+    return ", ".join(find_effect(name).words.title for name in names)
 
 
 def _row(law: Effect) -> int:
