@@ -145,7 +145,7 @@ def _proof(worth: Worth, place: int, joint: int) -> Proof | None:
         return None
     compliant = one.effect.evidence == "frequency responses"
     shown = joint + 1 if compliant else one.effect.joint
-    return proof(before, after, shown, log, bool(one.effect.per_log) and log is not None)
+    return proof(before, after, shown, log, one.effect.clock == "log" and log is not None)
 
 
 def _size(worth: Worth, place: int) -> tuple[float, int, float]:

@@ -116,8 +116,7 @@ def _extending(some: Sequence[Finding]) -> str:
 
 
 def _happens_once(one: Finding) -> bool:
-    kind = find_effect(one.cause)
-    return any(q.shape and q.name in kind.per_log for q in kind.parameters)
+    return find_effect(one.cause).clock == "log"
 
 
 def _share(one: Finding, nominal: ResidualRms, floor: str) -> str:

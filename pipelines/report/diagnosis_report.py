@@ -72,7 +72,7 @@ def diagnosis_report(result: Result) -> Report:
 def _tone(result: Result) -> Tone:
     """What machines in order have as well is no fault of this one, unless it has changed, or may be something else."""
     causes = [cause for one in result.findings for cause in (one.cause, *(alternative.cause for alternative in one.alternatives))]
-    ordinary = result.question != "what has changed" and all(find_effect(cause).ordinary for cause in causes)
+    ordinary = result.question != "what has changed" and all(find_effect(cause).parameters.healthy == math.inf for cause in causes)
     return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
 
 

@@ -14,7 +14,7 @@ from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, S
 from pipelines.log.robot import Joint, LinkParameters, RobotDescription
 from pipelines.log.robot_files import load_robot
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Predict, Quantity, Words
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Parameters, Predict, Quantity, Words
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.parameter import Parameter
@@ -39,7 +39,7 @@ class HalfTorque(Effect):
 
     name = "half_torque"
     scope = "arm"
-    parameters: ClassVar[tuple[Quantity, ...]] = (Quantity("part", "1", 0.0, 1.0, "part that is left"),)
+    parameters: ClassVar[Parameters] = Parameters(Quantity("part", "1", 0.0, 1.0, "part that is left"))
     words = Words("Half the torque", *["For tests."] * 4)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -13,7 +13,7 @@ import pytest
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Acting
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, Words
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
 from pipelines.model.effects.quadratic_drag import QuadraticDrag
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, run
@@ -30,7 +30,7 @@ class Hooked(Effect):
 
     name = "hooked"
     scope = "arm"
-    parameters: ClassVar[tuple[Quantity, ...]] = ()
+    parameters: ClassVar[Parameters] = Parameters()
     words = Words("For tests", *["none"] * 4)
     make: Callable[[ArmModel], Hooks] = lambda arm: Hooks()
 
@@ -262,7 +262,7 @@ def test_friction_that_is_no_curve_acts_all_the_same() -> None:
 @dataclass(frozen=True)
 class _Uncurved(Effect):
     name = "uncurved"
-    parameters: ClassVar[tuple[Quantity, ...]] = ()
+    parameters: ClassVar[Parameters] = Parameters()
     words = Words("For tests", *["none"] * 4)
     inner: Effect | None = None
 
