@@ -183,7 +183,7 @@ def _found_instead(diagnosed: Diagnosed) -> str:
 
 def _once(kind: type[Effect]) -> bool:
     """Return whether it happens at a moment of one log."""
-    return any(q.shape and q.name in kind.per_log for q in kind.parameters)
+    return kind.clock == "log"
 
 
 def _sources(motions: Motions) -> tuple[Source, ...]:

@@ -140,7 +140,7 @@ class CauseCommand(StageCommand):
         super().format_epilog(ctx, formatter)
         for scope, title in (("joint", "Causes at one joint"), ("arm", "Causes of the whole arm")):
             with formatter.section(title):
-                formatter.write_dl([(effect.name, effect.title) for effect in all_effects() if effect.scope == scope])
+                formatter.write_dl([(effect.name, effect.words.title) for effect in all_effects() if effect.scope == scope])
 
 
 _OUT = "Folder for everything the command leaves"

@@ -34,7 +34,7 @@ WITHIN = "pipelines.model.diagnosis"
 # Its folders, and the modules beside them, from the bottom up.
 DIAGNOSIS = ("rows", "fitted", "asked", "screened", "result", "worth", "given", "answered")
 # Of the effects, all that one of them may import.
-CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".fast", ".placed", ".terms")}
+CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".fast", ".kinds", ".placed", ".terms")}
 DOORS = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": "pipelines.log",
     "pandas": "pipelines.log", "pyarrow": "pipelines.log", "filterpy": "pipelines.signal.kalman", "mujoco": "pipelines.bench",

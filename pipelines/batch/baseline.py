@@ -21,6 +21,7 @@ from pipelines.fit.differences import difference
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredValue
 from pipelines.log.result_figures import name_in
 from pipelines.model.effects import effect_names, find_effect
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.parameter_names import quantity_of
 from pipelines.report.diagnosis_words import title_of
 from pipelines.report.figure_words import figure_in_words
@@ -209,7 +210,7 @@ def _laws_beside(part: Part, baseline: ModelFile) -> list[tuple[int, str]]:
 def _law_of(name: str) -> tuple[str, str, int] | None:
     """(the stage before it, friction law, joint) of a figure of one, however results spell it."""
     found = _LAW.search(name)
-    if found is None or found["law"] not in effect_names() or not find_effect(found["law"]).friction:
+    if found is None or found["law"] not in effect_names() or not issubclass(find_effect(found["law"]), FrictionLaw):
         return None
     return name[:found.start()], found["law"], int(found["at"] or found["joint"])
 

@@ -157,7 +157,7 @@ def _others(first: Finding, found: Found) -> list[str]:
     own = [one for one in found.look.selection.rounds if one.cause is not None]
     same = [one for one in own if one.cause and one.cause.key == (first.cause, first.joint)]
     return [
-        f"{within(effect.effect.title)}{how_much(like)}{where(like)}"
+        f"{within(effect.effect.words.title)}{how_much(like)}{where(like)}"
         for one in same[:1]
         for candidate in one.tried
         if candidate.key in keys

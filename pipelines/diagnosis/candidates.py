@@ -13,8 +13,8 @@ every cause, the cause is not known.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -30,6 +30,7 @@ from pipelines.model.diagnosis.screened.candidates import (
     whole_motion,
 )
 from pipelines.model.effects import all_effects
+from pipelines.model.effects.base import everywhere
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["FORM", "Dictionary", "Group", "Key", "Kind"]
@@ -117,12 +118,13 @@ def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
     for family in families(dataset.model.columns.laws, motion, dataset.arm, exclude):
         shapes = family.shapes
         if dataset.session_start is not None:
-            shapes = tuple(shape.in_session(dataset.session_start) for shape in shapes)
+            session: dict[str, Any] = {"since": dataset.session_start}
+            shapes = tuple(replace(s, **session) if s.clock == "session" else s for s in shapes)
         found[family.cause, family.joint] = Family(family.cause, family.joint, shapes)
     changeable = () if dataset.reference is None else all_effects()
     for kind in changeable:  # what base parameters absorb without a reference
         if kind.evidence == "base parameters" and kind.name not in exclude:
-            for effect in kind.everywhere(dataset.arm.robot.revolute):
+            for effect in everywhere(kind, dataset.arm.robot.revolute):
                 shapes = tuple(effect.shapes(dataset.later.data.logs[0].motion, dataset.arm))
                 found[kind.name, effect.joint] = Family(kind.name, effect.joint, shapes)
     return found
@@ -147,7 +149,8 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
                     width,
                     _standing(family, number),
                     kind,
-                    family.shapes[0].reads_torque and rows.data.logs[0].motion.tau is not None,
+                    family.shapes[0].parameters.reads_torque
+                    and rows.data.logs[0].motion.tau is not None,
                 )
             )
             seen += width
@@ -155,8 +158,8 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
 
 def _standing(family: Family, number: int) -> bool:
     """Return whether healthy machines have shape `number` of a family in small."""
-    healthy = family.shapes[0].healthy
-    return healthy == "every shape" or (healthy == "first shape" and number == 0)
+    parameters = family.shapes[0].parameters
+    return any(q.several for q in parameters) or (parameters.healthy != 0.0 and number == 0)
 
 
 Make = Callable[[Motion], Array]  # (samples, k) on one joint

@@ -30,6 +30,7 @@ from pipelines.model.diagnosis.fitted.slopes import further_slopes
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.kept import Kept
 from pipelines.model.diagnosis.rows.whitening import Whitening
+from pipelines.model.effects.fast import mixing
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 
@@ -117,7 +118,7 @@ class Rows:
 
     def mixed(self, model: Exact) -> Table | None:
         """Return the nominal columns as drives pass them on; None where no drive mixes or scales."""
-        every = [one.effect.mixing(one.values, self.n_joints) for one in model.effects]
+        every = [mixing(one.effect, one.values, self.n_joints) for one in model.effects]
         found = [one for one in every if one is not None]
         if not found:
             return None
@@ -267,7 +268,7 @@ def _columns(prepared: Prepared) -> Columns:
     own = prepared.columns
     if prepared.reference is not None or any(speed > 0.0 for speed in prepared.recipe.min_speed):
         return own
-    laws = (next(iter(law.forms()), law) if law.evidence == "none" else law for law in own.laws)
+    laws = (law.forms()[-1] if law.evidence == "none" else law for law in own.laws)
     return replace(own, laws=tuple(laws))
 
 

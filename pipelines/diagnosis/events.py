@@ -17,6 +17,7 @@ from pipelines.diagnosis.score import chi2_bound, upper_point
 from pipelines.diagnosis.table import Array, Indices, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.kinds import Event
 
 __all__ = ["Window", "standing_out"]
 
@@ -86,7 +87,8 @@ def best_window(
     rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], log: int
 ) -> Window | None:
     """Return the best window of a log."""
-    if dictionary.event is None:
+    event = None if dictionary.event is None else dictionary.event.shapes[0]
+    if not isinstance(event, Event):
         return None
     data, one = rows.data, rows.data.logs[log]
     first = sum(other.rows for other in data.logs[:log])
@@ -94,7 +96,7 @@ def best_window(
     own, here = (np.stack([v[first : first + one.rows] for v in p]) for p in (residual, weight))
     full = np.stack([np.interp(one.motion.t, one.t, v) for v in own / here], axis=1)
     found = list[Window]()
-    for shape in dictionary.event.shapes[0].promising(one.motion, arm, full):
+    for shape in event.promising(one.motion, arm, full):
         columns = one.lay(shape.columns(one.motion, arm)) * here
         x = columns.reshape(len(columns), -1)
         amplitudes = np.asarray(np.linalg.lstsq(x.T, own.ravel(), rcond=1e-6)[0], np.float64)

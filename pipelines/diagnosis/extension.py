@@ -111,7 +111,7 @@ def _tried(
         return refit(later, state, key, effect, effect.amplitudes(known.values), config)
     best = best_of(later.screened(state))[key]
     start: dict[str, Any] = dict(one.start)
-    effect = later.dictionary.families[key].shapes[best.group.shape].full()
+    effect = later.dictionary.families[key].shapes[best.group.shape].forms()[0]
     return refit(later, state, key, replace(effect, **start), best.amplitudes, config)
 
 

@@ -109,12 +109,12 @@ def findings_of(
             Finding(
                 effect.name,
                 effect.joint,
-                effect.title,
+                effect.words.title,
                 parameters(every, place),
                 _explained(worth, place),
                 _visibility(later, end, place),
                 others,
-                effect.experiment if others else None,
+                effect.words.experiment if others else None,
                 worth.gain(place, place + 1),
                 _ORIGINS.get(effect.evidence, "residual"),
                 size,
@@ -145,7 +145,7 @@ def _proof(worth: Worth, place: int, joint: int) -> Proof | None:
         return None
     compliant = one.effect.evidence == "frequency responses"
     shown = joint + 1 if compliant else one.effect.joint
-    return proof(before, after, shown, log, bool(one.effect.per_log) and log is not None)
+    return proof(before, after, shown, log, one.effect.clock == "log" and log is not None)
 
 
 def _size(worth: Worth, place: int) -> tuple[float, int, float]:

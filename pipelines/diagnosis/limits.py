@@ -99,21 +99,23 @@ def _limit(
     first = shapes[0].effect
     if visible < _VISIBLE:
         reason = f"absorbed by {_hiding(later, shapes[0])}; needs other motion"
-        return NotIdentifiable(first.name, first.joint, reason, first.experiment)
+        return NotIdentifiable(first.name, first.joint, reason, first.words.experiment)
     needed = {
         one.freedom: np.sqrt(baseline.threshold(one.group, one.freedom, later.rows.count)) + _SIDE
         for one in shapes
     }
-    if first.fixed_amplitudes is None:
+    if first.parameters.fixed is None:
         reach = [np.sqrt(max(s.hidden[0, 0], 0.0)) / needed[s.freedom] for s in shapes]
         one = shapes[int(np.argsort(reach)[int(_QUARTER * (len(reach) - 1))])]
         least = needed[one.freedom] / np.sqrt(max(one.hidden[0, 0], 1e-300))
         return _told(later, one, least * np.eye(one.freedom)[0], visible)
-    amplitudes = np.array(first.fixed_amplitudes)
+    amplitudes = np.array(first.parameters.fixed)
     seen = [s for s in shapes if s.power(amplitudes) > needed[s.freedom] ** 2]
     if not seen:
-        return NotIdentifiable(first.name, first.joint, _TOO_MUCH, first.experiment)
-    return _told(later, min(seen, key=lambda s: s.effect.strength), amplitudes, visible)
+        return NotIdentifiable(first.name, first.joint, _TOO_MUCH, first.words.experiment)
+    size, way = first.words.size, -1.0 if first.words.falling else 1.0
+    best = min(seen, key=lambda s: way * float(getattr(s.effect, size)))
+    return _told(later, best, amplitudes, visible)
 
 
 def _told(
@@ -124,11 +126,11 @@ def _told(
     values = effect.values(amplitudes)
     joint = effect.joint
     turning = joint is None or later.dataset.arm.robot.revolute[joint - 1]
-    beyond = NotIdentifiable(effect.name, joint, _TOO_MUCH, effect.experiment)
-    if effect.fixed_amplitudes is not None:
-        q = next(q for q in effect.parameters if q.name == effect.size)
+    beyond = NotIdentifiable(effect.name, joint, _TOO_MUCH, effect.words.experiment)
+    if effect.parameters.fixed is not None:
+        q = next(q for q in effect.parameters if q.name == effect.words.size)
         size = Value(values[q.name], None, q.unit_at(turning))
-        less = effect.strength < 0.0
+        less = effect.words.falling
         return DetectionLimit(effect.name, joint, q.name, size, {}, "analytic", visible, less)
     main = _main(effect, values)
     if main is None:

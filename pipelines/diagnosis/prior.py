@@ -24,6 +24,7 @@ from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.diagnosis.variance import Components, components
 from pipelines.model.effects import find_effect
+from pipelines.model.effects.kinds import FrictionLaw
 
 __all__ = ["Prior", "prior_of"]
 
@@ -156,7 +157,7 @@ def _drift(
 def _rubs(group: Group) -> bool:
     """Return whether a cause is a friction law or changes sign with the one at its joint."""
     effect = find_effect(group.key[0])
-    return effect.friction or "sharpness" in effect.shared
+    return issubclass(effect, FrictionLaw) or any(q.shared for q in effect.parameters)
 
 
 def _parts(dataset: Dataset) -> tuple[tuple[np.ndarray, ...], ...]:

@@ -23,6 +23,7 @@ from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.effects.base import Effect
+from pipelines.model.rigid.orders import NEARLY
 
 __all__ = ["Later", "State"]
 
@@ -195,7 +196,9 @@ class Later:
         Such a row is not predicted: it is told by a number of its own, of the size x [noise].
         """
         asked = self.rows.data.logs[0].motion.tau is not None
-        effects = tuple(one for one in model.effects if not (asked and one.effect.reads_torque))
+        effects = tuple(
+            one for one in model.effects if not (asked and one.effect.parameters.reads_torque)
+        )
         if len(effects) == len(model.effects):
             return 0.0
         both = (self.rows.torque(one) for one in (model, replace(model, effects=effects)))
@@ -219,7 +222,7 @@ class Later:
         deviations = np.sqrt(max(config.deviations**2, config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within = last.possible
-        if last.effect.reads_torque and self._mostly_acting(last.effect):
+        if last.effect.parameters.reads_torque and self._mostly_acting(last.effect):
             return False
         for (of_effect, which, name), by, reach in zip(names, step, deviations * std, strict=True):
             if not of_effect or which != place:
@@ -228,7 +231,7 @@ class Later:
                 if abs(by) > reach and last.effect.at_end(name, float(by)):
                     return False
                 continue
-            if abs(last.amplitudes[int(name)]) + reach < last.effect.slight:
+            if abs(last.amplitudes[int(name)]) + reach < last.effect.parameters.slight:
                 return False
             for way in np.outer((-reach, reach), _TRIED).ravel():
                 amplitudes = np.array(last.amplitudes)
@@ -299,7 +302,9 @@ class Later:
     def again(self, key: Key) -> bool:
         """Return whether a cause may act more than once at its place."""
         family, motion = self.dictionary.families.get(key), self.rows.data.logs[0].motion
-        return family is not None and family.shapes[0].again(motion)
+        if family is None or not any(q.several for q in family.shapes[0].parameters):
+            return False
+        return family.shapes[0].goes_round(motion, NEARLY)
 
     @cached_property
     def shares(self) -> Array:
@@ -346,7 +351,7 @@ class Later:
 
     def freed(self, belief: Belief, effect: Effect) -> Belief:
         """Return the belief free along base parameters that the effect moves by unknown numbers."""
-        directions = effect.moving(self.dataset.arm)
+        directions = effect.nuisance(self.dataset.arm)
         if directions is None or not directions.shape[1]:
             return belief
         kept = list(self.dataset.model.columns.kept)

@@ -267,7 +267,7 @@ def _refitted(
         )
     top = max([one.gain for one in named], default=0.0)
     for one in named:
-        effect = later.dictionary.families[one.group.key].shapes[one.group.shape].full()
+        effect = later.dictionary.families[one.group.key].shapes[one.group.shape].forms()[0]
         out.append(
             _candidate(later, state, one.group.key, one.gain, effect, one.amplitudes, config)
         )
@@ -363,7 +363,7 @@ def _other_form(
     best, one = chosen, chosen.state.model.effects[-1]
     if one.log is not None:
         return best
-    for form in one.effect.forms():
+    for form in one.effect.forms()[1:]:
         other = _candidate(
             later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes), config
         )

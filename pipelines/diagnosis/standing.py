@@ -27,6 +27,7 @@ from pipelines.model.diagnosis.fitted.refit import refine
 from pipelines.model.diagnosis.result import Standing as Told
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.worth.numbers import acting, told
+from pipelines.model.effects.base import adds
 
 __all__ = ["standing_of"]
 
@@ -74,7 +75,7 @@ def _reference(later: Later, config: DiagnosisConfig) -> Later:
         or (
             group.kind == "named"
             and (shape := dictionary.families[group.key].shapes[group.shape]).evidence == "residual"
-            and shape.adds
+            and adds(shape)
         )
     )
     assert dictionary.reference is not None
@@ -113,12 +114,13 @@ def _tried(
     known, motions = ([one.motion for one in rows.data.logs] for rows in (own.rows, later))
     tried = []
     for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
-        effect = own.dictionary.families[one.group.key].shapes[one.group.shape].full()
+        effect = own.dictionary.families[one.group.key].shapes[one.group.shape].forms()[0]
         done = refit(own, state, one.group.key, effect, one.amplitudes, config)
         if done is None or not done.possible:
             continue
         without = state.mean_squares / done.state.mean_squares
-        beyond = done.state.model.effects[-1].effect.beyond(motions, known)
+        effect = done.state.model.effects[-1].effect
+        beyond = any(q.seen for q in effect.parameters) and effect.goes_beyond(motions, known)
         if without.max() > config.excess and not beyond:
             tried.append(done)
     return tried

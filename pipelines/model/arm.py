@@ -18,7 +18,7 @@ from pipelines.errors import InputRejected, UsageError, did_you_mean
 from pipelines.log.model_file import ModelFile, Source, StoredEffect, StoredParameter, StoredValue, Validity
 from pipelines.log.robot import RobotDescription, format_robot, parse_robot
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve
+from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve, joints_of
 from pipelines.model.effects.fast import speed_curve
 from pipelines.model.parameter import Origin, Parameter, Uncertainty
 from pipelines.model.rigid.body import Array, Motion, RigidBody
@@ -43,7 +43,7 @@ class Acting:
     def of(cls, effect: Effect, values: Mapping[str, float], std: Mapping[str, float] | None = None,
            origin: Origin = "fitted", revolute: bool = True) -> Acting:
         """`effect` with `values` of its parameters, units and bounds its own; `revolute` tells its joint's kind."""
-        known = effect.complete(values)
+        known = effect.parameters.complete(values)
         return cls(effect.at(known), tuple(
             Parameter(q.name, known[q.name], (std or {}).get(q.name), q.unit_at(revolute), (q.low, q.high), origin)
             for q in effect.parameters))
@@ -239,8 +239,8 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
                             f"{did_you_mean(stored.effect, effect_names())}", where=where,
                             remedy="update rrrid, or correct the name")
     effect = find_effect(stored.effect)
-    if stored.joint not in (effect.joints(revolute) if effect.scope == "joint" else (None,)):
-        turning = " that turns" if effect.scope == "joint" and not effect.joints((False,)) else ""
+    if stored.joint not in (joints_of(effect, revolute) if effect.scope == "joint" else (None,)):
+        turning = " that turns" if effect.scope == "joint" and not joints_of(effect, (False,)) else ""
         raise InputRejected("S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where,
                             remedy=f"it belongs to one {effect.scope}{turning}, and the arm has {len(revolute)} joints")
     kind_of_joint = stored.joint is None or revolute[stored.joint - 1]

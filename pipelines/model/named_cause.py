@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pipelines.errors import UsageError, did_you_mean
 from pipelines.model.arm import Acting
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.effects.base import Effect, Quantity
+from pipelines.model.effects.base import Effect, Quantity, joints_of
 
 __all__ = ["acting_cause", "refuse_unknown", "wanted_cause"]
 
@@ -90,7 +90,7 @@ def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bo
         return None, numbers
     if not (rest[0].isascii() and rest[0].isdigit()) or not 1 <= int(rest[0][:6]) <= len(revolute):
         raise UsageError("C02", f"'{rest[0]}' is no joint of this arm", where=where, remedy=f"give one of 1 to {len(revolute)}")
-    joint, able = int(rest[0]), kind.joints(revolute)
+    joint, able = int(rest[0]), joints_of(kind, revolute)
     if joint not in able:
         raise UsageError("C02", f"'{text}': joint {joint} slides, and only one that turns can have it", where=where,
                          remedy=f"give one of {', '.join(map(str, able))}" if able else "name another cause")
@@ -99,7 +99,7 @@ def _place(text: str, kind: type[Effect], rest: list[str], revolute: Sequence[bo
 
 def _values(text: str, kind: type[Effect], effect: Effect, numbers: str, where: str) -> dict[str, float]:
     known = {quantity.name: quantity for quantity in kind.parameters}
-    fixed = {} if kind.fixed_amplitudes is None else effect.values(kind.fixed_amplitudes)
+    fixed = {} if kind.parameters.fixed is None else effect.values(kind.parameters.fixed)
     values = {q.name: float(getattr(effect, q.name)) if q.shape else fixed.get(q.name, 0.0) for q in kind.parameters}
     ranges = ", ".join(map(_range, kind.parameters))
     given = [part.partition("=") for part in numbers.split(",") if part.strip()]

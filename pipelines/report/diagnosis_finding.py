@@ -49,7 +49,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         left: held-out torque error of each joint with all findings.
     """
     kind = find_effect(one.cause)
-    text = [f"{kind.explanation}", f"What to check: {kind.remedy}", f"How it shows: {kind.signature}",
+    text = [f"{kind.words.explanation}", f"What to check: {kind.words.remedy}", f"How it shows: {kind.words.signature}",
             f"{_share(one, nominal, floor)}; {format_number(100.0 * (1.0 - one.identifiability), 2)} % of it is confounded with "
             f"model parameters.{tip_worth(one.gain)}"]
     if of_any_size(one):
@@ -68,7 +68,7 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
         text.append(_offer(one, [other for other in beside if not other.doubt and not _happens_once(other)]))
     if one.alternatives:
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.alternatives)
-        text.append(f"It could also be {names}. To tell: {one.experiment or kind.experiment}")
+        text.append(f"It could also be {names}. To tell: {one.experiment or kind.words.experiment}")
         pair = " ".join(cause_at(some.cause, some.joint) for some in (one, one.alternatives[0]))
         text.append(f"Or let \"rrrid design-excitation LOG --discriminate {pair}\" design the motion")
     return Section(f"{number}. {one.title}{where(one)}", tuple(as_sentence(t) for t in text),
@@ -116,8 +116,7 @@ def _extending(some: Sequence[Finding]) -> str:
 
 
 def _happens_once(one: Finding) -> bool:
-    kind = find_effect(one.cause)
-    return any(q.shape and q.name in kind.per_log for q in kind.parameters)
+    return find_effect(one.cause).clock == "log"
 
 
 def _share(one: Finding, nominal: ResidualRms, floor: str) -> str:

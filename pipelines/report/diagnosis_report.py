@@ -72,7 +72,7 @@ def diagnosis_report(result: Result) -> Report:
 def _tone(result: Result) -> Tone:
     """What machines in order have as well is no fault of this one, unless it has changed, or may be something else."""
     causes = [cause for one in result.findings for cause in (one.cause, *(alternative.cause for alternative in one.alternatives))]
-    ordinary = result.question != "what has changed" and all(find_effect(cause).ordinary for cause in causes)
+    ordinary = result.question != "what has changed" and all(find_effect(cause).parameters.healthy == math.inf for cause in causes)
     return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
 
 
@@ -126,7 +126,8 @@ def _beside(more: Sequence[Finding]) -> Iterator[str]:
 def _advice(result: Result) -> tuple[str, ...]:
     """What to look at on the machine, cause by cause."""
     causes = together(result.findings)
-    return tuple(f"What to check{f' for {words}' if len(result.findings) > 1 else ''}: {as_sentence(find_effect(cause).remedy)}"
+    several = len(result.findings) > 1
+    return tuple(f"What to check{f' for {words}' if several else ''}: {as_sentence(find_effect(cause).words.remedy)}"
                  for cause, words in causes)
 
 

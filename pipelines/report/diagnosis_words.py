@@ -32,7 +32,7 @@ def is_cause(name: str) -> bool:
 
 def title_of(cause: str) -> str:
     """Plain words for a cause."""
-    return find_effect(cause).title if cause in effect_names() else cause
+    return find_effect(cause).words.title if cause in effect_names() else cause
 
 
 def named(cause: str, joint: int | None) -> str:

@@ -119,7 +119,7 @@ def _plain(law: str) -> str:
 def _called(name: str) -> str:
     """"Coulomb friction, level" for "coulomb.level"; the paper's own letters stay."""
     effect, dot, quantity = name.partition(".")
-    return f"{find_effect(effect).title}, {spoken(quantity)}" if dot else name
+    return f"{find_effect(effect).words.title}, {spoken(quantity)}" if dot else name
 
 
 def _meaning(joint: JointResult, name: str) -> str:

@@ -42,8 +42,8 @@ def fewer_words(fewer: Sequence[FewerTerms]) -> tuple[str, ...]:
     found = []
     for law, taken in dict.fromkeys((one.law, one.taken) for one in fewer):
         places = [f"joint {one.joint} ({one.reason})" for one in fewer if (one.law, one.taken) == (law, taken)]
-        instead = ", ".join(find_effect(name).title for name in taken)
-        found.append(f"The terms of \"{find_effect(law).title}\" are not distinguishable at {', '.join(places)}; "
+        instead = ", ".join(find_effect(name).words.title for name in taken)
+        found.append(f"The terms of \"{find_effect(law).words.title}\" are not distinguishable at {', '.join(places)}; "
                      f"fitted there instead: {instead}.")
     return tuple(found)
 

@@ -248,7 +248,7 @@ def test_help_says_how_long_a_slow_command_takes(command: str, tmp_path: Path) -
 def test_help_names_every_cause(command: str, tmp_path: Path) -> None:
     """Where a cause is asked for, all of them can be read, each with its title."""
     lines = {" ".join(line.split()) for line in rrrid(command, "--help", cwd=tmp_path).stdout.splitlines()}
-    assert {f"{effect.name} {effect.title}" for effect in all_effects()} <= lines
+    assert {f"{effect.name} {effect.words.title}" for effect in all_effects()} <= lines
 
 
 def test_a_pattern_that_the_shell_left_is_expanded(logs: Path) -> None:

@@ -14,7 +14,7 @@ from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, S
 from pipelines.log.robot import Joint, LinkParameters, RobotDescription
 from pipelines.log.robot_files import load_robot
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Predict, Quantity
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Parameters, Predict, Quantity, Words
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.parameter import Parameter
@@ -38,10 +38,9 @@ class HalfTorque(Effect):
     """τ = τ_before / 2: not a sum, so the order of effects shows."""
 
     name = "half_torque"
-    title = "Half the torque"
     scope = "arm"
-    parameters: ClassVar[tuple[Quantity, ...]] = (Quantity("part", "1", 0.0, 1.0, "part that is left"),)
-    signature = explanation = remedy = experiment = "For tests."
+    parameters: ClassVar[Parameters] = Parameters(Quantity("part", "1", 0.0, 1.0, "part that is left"))
+    words = Words("Half the torque", *["For tests."] * 4)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return arm.torque(motion)[..., None]

@@ -12,6 +12,7 @@ from pipelines.log.model_file import parse_model
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.effects.rotor_inertia import RotorInertia
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.online import OnlineModel
@@ -26,7 +27,7 @@ from tests.model.rigid.serial_arms import ARMS, physical_links
 from tests.model.rigid.serial_arms import Arm as Judge
 
 # every effect as an accepted one, and every law of friction as friction too
-PLACES = [(kind, False) for kind in all_effects()] + [(kind, True) for kind in all_effects() if kind.friction]
+PLACES = [(kind, False) for kind in all_effects()] + [(kind, True) for kind in all_effects() if issubclass(kind, FrictionLaw)]
 
 
 def arm_with(judge: Judge, phi: Array) -> Arm:

@@ -24,7 +24,8 @@ def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[st
     """Of three joints, the last of which is much the smallest; it takes all that is wrong off that one."""
     before, after = np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.005])
     gain = Gain(TorqueGain(before, after, np.zeros((3, 2))), None, "closed-loop", None)
-    return Finding(cause, joint, find_effect(cause).title, {name: Value(x, None, "1") for name, x in (other or {}).items()}, 5e-4,
+    return Finding(cause, joint, find_effect(cause).words.title,
+                   {name: Value(x, None, "1") for name, x in (other or {}).items()}, 5e-4,
                    0.9, (), None, gain, "residual", 0.03, float("nan"), None)
 
 

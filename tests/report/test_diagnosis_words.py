@@ -49,7 +49,7 @@ def found(cause: str) -> Finding:
     gain = Gain(TorqueGain(three, 0.5 * three, np.zeros((3, 2))), None, "none", None)
     parameters = {q.name: Value(1.0, 0.1, q.unit) for q in find_effect(cause).parameters}
     alternatives = (Alternative("torque_offset", 1, 0.9, 0.4),)
-    return Finding(cause, 2, find_effect(cause).title, parameters, 0.9, 0.8, alternatives, "record more", gain,
+    return Finding(cause, 2, find_effect(cause).words.title, parameters, 0.9, 0.8, alternatives, "record more", gain,
                    "residual", 0.2, 0.01, None)
 
 

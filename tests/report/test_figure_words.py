@@ -41,7 +41,7 @@ def test_no_key_of_any_effect_is_left(effect: str) -> None:
         for name in (f"estimate-bps {effect}:{at and at + ':'}{q.name}",
                      f"extend model {effect}{at and ' joint ' + at} {q.name.replace('_', ' ')}"):
             said = figure_in_words(name)
-            assert kind.title.lower() in said.lower()
+            assert kind.words.title.lower() in said.lower()
             assert not re.search(r"\w[_:]\w", said), said
 
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["all_effects", "effect_names", "find_effect"]
 
-_CONTRACT = ("base", "fast", "placed", "terms")  # what every effect is written in
+_CONTRACT = ("base", "fast", "kinds", "placed", "terms")  # what every effect is written in
 
 
 @lru_cache(maxsize=1)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, SHARPNESSES, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -28,19 +27,19 @@ class AsymmetricFriction(Fast):
     gradual: float = 0.0  # 1: s = tanh(w v)
 
     name = "asymmetric_friction"
-    title = "Asymmetric friction"
-    parameters = (
+    parameters = Parameters(
         Quantity("coulomb_difference", "N m", -LARGE, LARGE, "Coulomb friction of the positive minus the negative direction"),
         Quantity("viscous_difference", "N m s/rad", -LARGE, LARGE, "viscous friction of the positive minus the negative direction"),
-        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
+        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True,
+                 shared=True, grid=SHARPNESSES),
         Quantity("gradual", "1", 0.0, 1.0, "1: the directions go over into each other as friction changes its sign, 0: at once",
                  shape=True, discrete=True, unsaid=0.0),
     )
-    signature = "A part of the torque that is even in speed: larger friction one way than the other."
-    explanation = "Preload, seal lips and worm or harmonic gears rub more in one direction of motion."
-    remedy = "Look at preload and seals; what stays, compensate with coefficients of its own in each direction."
-    experiment = "Hold still for two seconds in several positions, then move at several equal speeds in both directions."
-    shared = ("sharpness",)
+    words = Words("Asymmetric friction",
+        signature="A part of the torque that is even in speed: larger friction one way than the other.",
+        explanation="Preload, seal lips and worm or harmonic gears rub more in one direction of motion.",
+        remedy="Look at preload and seals; what stays, compensate with coefficients of its own in each direction.",
+        experiment="Hold still for two seconds in several positions, then move at several equal speeds in both directions.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -49,12 +48,8 @@ class AsymmetricFriction(Fast):
         half = 0.5 * (turned if self.gradual else np.sign(v))
         return self.on_own_row(arm, half * turned, half * v)
 
-    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
-            yield replace(self, sharpness=sharpness)
-
     def forms(self) -> tuple[Self, ...]:
-        return (replace(self, gradual=1.0),)
+        return self, replace(self, gradual=1.0)
 
     def own_load(self, values: Values) -> OwnLoad:
         (coulomb, viscous), sharpness = map(float, 0.5 * self.amplitudes(values)), values["sharpness"]

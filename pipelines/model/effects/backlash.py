@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Quantity, Values, friction_at
+from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Quantity, Values, Words, friction_at
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart
@@ -45,20 +45,19 @@ class Backlash(Fast):
     motor_inertia: float = 1e-3  # J_m [kg m^2]
 
     name = "backlash"
-    title = "Backlash"
-    parameters = (
+    parameters = Parameters(
         Quantity("gap", "rad", 0.0, 0.1, "free play, from flank to flank", shape=True),
         Quantity("film", "N m s/rad", 0.0, _THICKEST, "drag of the lubricant in the open gap", shape=True),
         Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
-        Quantity("coefficient", "1", 0.0, 2.0, "share of its torque: 1 where the model of the gap is right"),
+        Quantity("coefficient", "1", 0.0, 2.0, "share of its torque: 1 where the model of the gap is right", fixed=1.0),
     )
-    signature = "A burst of torque each time the torque changes sign, at any speed, and a jump of the link by the gap."
-    explanation = "Worn teeth, keys or couplings leave free play: motor and link part when the torque turns round, and meet again."
-    remedy = "Adjust or replace the gear; a preload, by gravity or a spring, keeps one flank closed."
-    experiment = "Move the joint to and fro over small angles, once where gravity loads it and once where it does not."
-    size = "gap"
+    words = Words("Backlash", size="gap",
+        signature="A burst of torque each time the torque changes sign, at any speed, and a jump of the link by the gap.",
+        explanation="Worn teeth, keys or couplings leave free play: motor and link part when the "
+                    "torque turns round, and meet again.",
+        remedy="Adjust or replace the gear; a preload, by gravity or a spring, keeps one flank closed.",
+        experiment="Move the joint to and fro over small angles, once where gravity loads it and once where it does not.")
     evidence = "reversals"
-    fixed_amplitudes = (1.0,)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.several([self], motion, arm)[0]

@@ -1,41 +1,28 @@
 """The contract of an effect: a physical cause is data plus one function.
 
-An effect is written by giving its words, its parameters and `columns`; all else has a default in `Effect`.
+An effect is written by giving its words, its parameters and `columns`; the rest has a default.
 
     Coulomb friction     columns = tanh(w v) on its own row; nothing else
-    Cogging              columns = sin kq, cos kq; `shapes` runs over k; `values` gives amplitude and phase
+    Cogging              columns = sin kq, cos kq; `shapes` runs over k; `values` gives amplitude, phase
     A clipped drive      columns to screen with; `apply` = clip(predict(motion, arm))
     An encoder fault     columns to screen with; `apply` = predict(corrected motion, arm)
     Tilted gravity       columns to screen with; `apply` = predict(motion, arm.with_body(tilted body, p))
 
-An object is the effect in one place and one shape: `joint` and the *non-linear* parameters (speeds, orders, delays) are
-its fields. The *linear* parameters, its amplitudes, are not: a fit solves for them.
+An object is the effect in one place and one shape: `joint` and the *non-linear* parameters (speeds,
+orders, delays) are its fields. The *linear* parameters, its amplitudes, are not: a fit solves for them.
 
     torque = columns(motion, arm) @ amplitudes      to first order; exactly for most
 
-Torque is a load: measured torque = torque of the model + torques of the effects. Columns are computed from the motion and the
-*predicted* torque, never from measured torque, whose noise would bias them. One exception: the torque that a drive keeps back
-above its limit follows from the commanded torque alone, which is `Motion.tau`.
+Torque is a load: measured torque = torque of the model + torques of the effects. Columns are computed
+from the motion and the *predicted* torque, never from measured torque, whose noise would bias them. One
+exception: the torque that a drive keeps back above its limit follows from the commanded torque alone,
+which is `Motion.tau`. Columns need not be independent, nor all visible, on every arm: solve with a rank
+threshold. Each motion is one log from its first sample (time in a log counts from motion.t[0]).
 
-What a diagnosis reads:
-
-    shapes, promising    a grid of non-linear parameters; the event windows that a residual suggests
-    full, forms          the form that is refitted, with more amplitudes than the one screened; other laws of the same cause
-    free, shared         non-linear parameters that a refit may move; those that equal the friction law's at the same joint
-    fixed_amplitudes     amplitudes given by physics: screening fits them, a refit holds them; `size` then tells how much there is
-    possible, at_end     whether values lie in their ranges, and whether a step would leave them
-    per_log              parameters that belong to one log: the window of an event, the phase of encoders zeroed at each start
-    moving               directions in which the effect changes base parameters beyond its columns (nuisance)
-    beyond               whether logs contain motion that the fit of the effect says nothing of
-    again                whether one place may have it more than once: cogging of several orders
-    reads_torque         whether its columns hold the logged torque
-    healthy, slight      what healthy machines have in small
-    acts_on              load, encoder, drive or record: effects compose in this order, the record outermost
-    passed, mixing       torque after the record's filter; the matrix by which drives mix the torques of one instant
-    reported             the parameters as causes.md names them
-
-Speed-ups are in `fast`. Columns need not be independent, nor all visible, on every arm: solve with a rank threshold. Each motion
-is one log from its first sample (time in a log counts from motion.t[0]), complete but for gaps.
+    terms.py     Quantity: what a parameter may be; Numbered: values by name and amplitudes; the hooks
+    placed.py    the row of its own joint
+    kinds.py     what friction laws and events have besides
+    fast.py      speed-ups, which change no answer
 """
 
 from __future__ import annotations
@@ -43,31 +30,38 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, Self
+from itertools import product
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
 from pipelines.model.effects.placed import Placed
 from pipelines.model.effects.terms import (
     LARGE,
+    SHARPNESSES,
     ArmModel,
     Formula,
     Hooks,
     OwnLoad,
     OwnMemory,
+    Parameters,
     PlainDrive,
     Predict,
     Quantity,
     SpeedCurve,
     Values,
+    Words,
     friction_at,
     predicted,
     summed,
 )
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["LARGE", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
-           "SpeedCurve", "Values", "friction_at", "predicted"]
+__all__ = ["LARGE", "SHARPNESSES", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory",
+           "Parameters", "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "adds", "everywhere",
+           "friction_at", "joints_of", "predicted"]
+
+E = TypeVar("E", bound="Effect")
 
 
 @dataclass(frozen=True)
@@ -77,159 +71,74 @@ class Effect(Placed, ABC):
     joint: int | None = None  # 1-based; None where scope is "arm"
 
     name: ClassVar[str]  # identifier of causes.md, and the file's name
-    title: ClassVar[str]  # plain words
+    words: ClassVar[Words]
     scope: ClassVar[Literal["joint", "arm"]] = "joint"
-    parameters: ClassVar[tuple[Quantity, ...]]
-    signature: ClassVar[str]  # how it shows
-    explanation: ClassVar[str]  # what it is
-    remedy: ClassVar[str]  # what to do about it
-    experiment: ClassVar[str]  # what to record to be sure
-    size: ClassVar[str] = ""  # the number that a verdict tells beside the title, if one alone says how much of it there is
-    fixed_amplitudes: ClassVar[tuple[float, ...] | None] = None  # what physics gives; None: all are fitted
-    per_log: ClassVar[tuple[str, ...]] = ()  # parameters that belong to one log and not to the arm
-    evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters", "none"]] = "residual"
-    # what a diagnosis may name it by; "none": it is a law that a nominal model has, no cause
-    shared: ClassVar[tuple[str, ...]] = ()  # shapes that are one number with that of the friction law at its joint, where it has it
-    acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"  # also the order in which effects compose
-    plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()  # the same law with fewer terms, from most of them to fewest, each by the
-    # names of what it consists of: taken in its place where logs do not tell its terms apart
-    reads_torque: ClassVar[bool] = False  # its columns hold the logged torque itself, where that is a held command
-    friction: ClassVar[bool] = False  # every column takes power out of its joint, and is a law of friction
-    slight: ClassVar[float] = 0.0  # of its only amplitude: what surely is less, arms in order have as well
-    healthy: ClassVar[Literal["first shape", "every shape", "never"]] = "first shape"  # that healthy machines have in small
-    ordinary: ClassVar[bool] = False  # machines in order have it: a model lacks it, and nothing need be broken
+    parameters: ClassVar[Parameters]
+    acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"  # the order in which
+    # effects compose; the record, outermost, is a first-order low-pass, its amplitude the time constant [s]
+    clock: ClassVar[Literal["none", "session", "log"]] = "none"  # "session": its field `since` [s] is
+    # when the session began; "log": it happens once, and its shapes belong to that log
+    evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters",
+                               "none"]] = "residual"  # what a diagnosis may name it by; "none": a
+    # law that a nominal model has, and no cause
 
     def __post_init__(self) -> None:
         if (self.scope == "joint") != (self.joint is not None and self.joint >= 1):
             where = "one joint, counted from 1" if self.scope == "joint" else "the whole arm"
             raise ValueError(f"{self.name} belongs to {where}, not to joint {self.joint}")
+        for q in self.parameters:  # another joint: the one before, if none is given
+            if q.joint and self.joint is not None and not getattr(self, q.name):
+                object.__setattr__(self, q.name, float(self.joint - 1 or 2))
 
     @abstractmethod
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        """Its torque per unit of each amplitude, to first order, (samples, joints, amplitudes)."""
+        """Return the torque per unit of each amplitude, to first order: (samples, joints, amplitudes)."""
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Itself with every combination of non-linear numbers worth trying on this motion."""
-        yield self
-
-    def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
-        """Those of its shapes that may explain `residual` (samples, joints) [N m] over `motion`, at most a few tens."""
-        yield from self.shapes(motion, arm)
-
-    def in_session(self, start: float) -> Self:
-        """Itself with the clock of a session that began at `start` [s]; most effects know no time."""
-        return self
-
-    def full(self) -> Self:
-        """The form that a finding is refitted with, where screening uses one with fewer amplitudes."""
-        return self
+        """Return the effect in every shape worth trying on this motion: on the grids of its parameters."""
+        places = {q.name: q.grid or q.among(self.joint, arm.n_joints) for q in self.parameters}
+        grids = {name: values for name, values in places.items() if values is not None}
+        for numbers in product(*grids.values()):
+            shape: dict[str, Any] = dict(zip(grids, map(float, numbers), strict=True))
+            yield replace(self, **shape)
 
     def forms(self) -> tuple[Self, ...]:
-        """Other laws of the same cause, each to be tried in place of this one, which is the most likely."""
-        return ()
+        """Return the form that a finding is refitted with, then other laws of the same cause."""
+        return (self,)
 
-    def again(self, motion: Motion) -> bool:
-        """Return whether it may act more than once at its place, in different shapes that this motion tells apart."""
-        return False
-
-    def moving(self, arm: ArmModel) -> Array | None:
-        """(base parameters, k): directions in which it moves them beyond its columns, each by a number that nobody knows."""
+    def nuisance(self, arm: ArmModel) -> Array | None:
+        """Return directions (base parameters, k) in which it moves them beyond its columns, unknown how far."""
         return None
 
-    def beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
-        """Return whether `motions` go where those it was fitted to, `known`, say nothing of it."""
-        return False
-
-    @property
-    def strength(self) -> float:
-        """How much of it there is, by `size`, where physics gives the amplitudes; negative for what grows as `size` falls."""
-        return float(getattr(self, self.size)) if self.fixed_amplitudes else 0.0
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        """Names of the non-linear numbers that may be moved continuously."""
-        return tuple(q.name for q in self.parameters if q.shape and not q.discrete and not q.derived)
-
-    def at_end(self, name: str, by: float) -> bool:
-        """Return whether a number of the shape is at the end of its range, and `by` points out of it."""
-        quantity = next(q for q in self.parameters if q.name == name)
-        here = float(getattr(self, name))
-        return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
-
-    def possible(self, values: Values) -> bool:
-        """Return whether every parameter lies in its range."""
-        return all(q.low <= values[q.name] <= q.high for q in self.parameters)
-
-    def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
-        """The parameters of a finding, named as in causes.md; whole numbers are integers."""
-        return {q.name: int(values[q.name]) if q.discrete else values[q.name] for q in self.parameters}
-
-    def passed(self, amplitude: float, x: Array, t: Array, start: Array | float | None = None, since: int = 0) -> Array:
-        """Return any torque `x` (…, samples) of its joint as it is recorded, of an effect that acts on the record.
-
-        Args:
-            start: the output up to sample `since`; None: as if `x` had been constant before.
-        """
-        return x
-
-    @classmethod
-    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
-        """One at every joint that can have it, of joints that turn (`revolute`) or slide; or the one of the whole arm."""
-        return tuple(cls(joint=k) for k in cls.joints(revolute)) if cls.scope == "joint" else (cls(),)
-
-    @classmethod
-    def joints(cls, revolute: Sequence[bool]) -> tuple[int, ...]:
-        """Those that can have it, 1-based."""
-        return tuple(range(1, len(revolute) + 1))
-
-    @property
-    def adds(self) -> bool:
-        """Return whether all it does is to add its columns to the torque, so that nothing else has to be worked out with it."""
-        return type(self).apply is Effect.apply and type(self).torque is Effect.torque
-
-    def at(self, values: Values) -> Self:
-        """Itself with the non-linear numbers out of `values`."""
-        known = self.complete(values)
-        shape: dict[str, Any] = {q.name: known[q.name] for q in self.parameters if q.shape}
-        return replace(self, **shape)
-
-    def complete(self, values: Values) -> dict[str, float]:
-        """`values`, and what holds of a number that they do not say, where the law was known before the number was."""
-        return {q.name: q.unsaid for q in self.parameters if q.unsaid is not None} | dict(values)
-
-    def amplitudes(self, values: Values) -> Array:
-        """The amplitudes that belong to `values`, in the order of the columns."""
-        return np.array([values[q.name] for q in self.parameters if not q.shape])
-
-    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
-        """Every parameter by name; the inverse of `at` and `amplitudes`."""
-        linear = iter(amplitudes)
-        return {q.name: float(getattr(self, q.name) if q.shape else next(linear)) for q in self.parameters}
-
-    def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
-        """Its torque (samples, joints) [N m]."""
-        return summed(self.at(values).columns(motion, arm), self.amplitudes(values))
-
-    def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
-        """Its torque (samples,) [N m] on its own joint against speed alone, at rest otherwise: the friction curve."""
-        still = np.zeros((len(dq), arm.n_joints))
-        motion = Motion(np.zeros(len(dq)), still, self.on_own_row(arm, dq)[..., 0], still)
-        return self.own(self.torque(motion, arm, values))
-
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
-        """The torque (samples, joints) that a log of `motion` shows on an arm that has this effect, exactly.
+        """Return the torque (samples, joints) that a log of `motion` shows on an arm with this effect, exactly.
 
-        `predict` says what it would show without; effects are thus put one around the other. To warp a signal, hand
-        another motion to `predict`; to change geometry or gravity, another arm; to clip, treat what it returns.
+        `predict` says what it would show without; effects are thus put one around the other. To warp a
+        signal, hand another motion to `predict`; to change geometry or gravity, another arm; to clip,
+        treat what it returns.
         """
         without = predict(motion, arm) if predict is not None else arm.torque(motion)
         return np.asarray(without + self.torque(motion, arm, values))
 
-    def mixing(self, values: Values, n_joints: int) -> Array | None:
-        """(joints, joints) M, where `apply` gives M times the torque of the moment without it, whatever the motion."""
-        return None
-
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        """How it enters the forward simulation; by default as a load."""
+        """Return how it enters the forward simulation; by default as a load."""
         shaped, amplitudes = self.at(values), self.amplitudes(values)
         return Hooks(load=lambda motion, _: summed(shaped.columns(motion, arm), amplitudes))
+
+
+def adds(effect: Effect) -> bool:
+    """Return whether it only adds its columns to the torque, whatever else acts."""
+    return type(effect).apply is Effect.apply and type(effect).torque is Effect.torque
+
+
+def joints_of(kind: type[Effect] | Effect, revolute: Sequence[bool]) -> tuple[int, ...]:
+    """Return the joints (1-based) that can have it, of joints that turn (`revolute`) or slide."""
+    turning = any(q.revolute for q in kind.parameters)
+    return tuple(k for k, turns in enumerate(revolute, 1) if turns or not turning)
+
+
+def everywhere(kind: type[E], revolute: Sequence[bool]) -> tuple[E, ...]:
+    """Return one at every joint where it is looked for; or the one of the whole arm."""
+    places = joints_of(kind, revolute) if kind.scope == "joint" else (None,)
+    n = len(revolute)
+    return tuple(kind(joint=k) for k in places if all(q.found_at(k, n) for q in kind.parameters))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Predict, Quantity, Values, friction_at
+from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Predict, Quantity, Values, Words, friction_at
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_by, rigid_slopes, shifted
@@ -31,18 +31,19 @@ class BaseResonance(Fast):
     damping_ratio: float = 0.05  # ζ
 
     name = "base_resonance"
-    title = "Base resonance"
     scope = "arm"
-    parameters = (
-        Quantity("frequency", "Hz", 1.0, 200.0, "of the base alone: the pole", shape=True),
+    parameters = Parameters(
+        Quantity("frequency", "Hz", 1.0, 200.0, "of the base alone: the pole", shape=True,
+                 grid=(8.0, 12.0, 17.0, 24.0, 28.0, 34.0, 48.0)),
         Quantity("damping_ratio", "1", 0.001, 1.0, "of the base", shape=True),
         Quantity("inertia", "kg m^2", 1e-3, 1e5, "of the base about the first joint's axis"),
     )
-    signature = "A pole and a zero just below it in the first joint's frequency response, at the same frequency in every posture."
-    explanation = "The table, the floor or the bolts under the arm are a spring; the arm's reaction moves them."
-    remedy = "Tighten or stiffen what the arm stands on; keep the first joint's bandwidth below it."
-    experiment = "Measure the frequency response of the first joint in two postures with different inertia."
-    size = "frequency"
+    words = Words("Base resonance", size="frequency",
+        signature="A pole and a zero just below it in the first joint's frequency response, at "
+                  "the same frequency in every posture.",
+        explanation="The table, the floor or the bolts under the arm are a spring; the arm's reaction moves them.",
+        remedy="Tighten or stiffen what the arm stands on; keep the first joint's bandwidth below it.",
+        experiment="Measure the frequency response of the first joint in two postures with different inertia.")
     evidence = "frequency responses"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -57,10 +58,6 @@ class BaseResonance(Fast):
             x = oscillation(motion.t, one, 2.0 * shape.damping_ratio * w * one, w * w * one, force)
             found.append(perturbed_by(slopes, *x)[..., None])
         return found
-
-    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        for frequency in (8.0, 12.0, 17.0, 24.0, 28.0, 34.0, 48.0):
-            yield replace(self, frequency=frequency)
 
     def amplitudes(self, values: Values) -> Array:
         return np.array([1.0 / values["inertia"]])

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import NEARLY, orders_along
@@ -39,10 +39,8 @@ class Cogging(Fast):
     fewest: float = 0.0  # k at least: with fewer waves in the travel it could be any curve
 
     name = "cogging"
-    healthy = "every shape"
-    title = "Cogging"
-    parameters = (
-        Quantity("order", "1/rev", 0.25, 1000.0, "waves in one turn of the joint", shape=True),
+    parameters = Parameters(
+        Quantity("order", "1/rev", 0.25, 1000.0, "waves in one turn of the joint", shape=True, several=True),
         Quantity("amplitude", "N m", 0.0, LARGE, "of the first wave"),
         Quantity("phase", "rad", -math.pi, math.pi, "angle of the first wave at the joint's zero", period=2.0 * math.pi),
         Quantity("order_2", "1/rev", 0.5, 2000.0, "twice the order", derived=True),
@@ -52,11 +50,11 @@ class Cogging(Fast):
         Quantity("amplitude_3", "N m", 0.0, LARGE, "of the third harmonic"),
         Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", period=2.0 * math.pi),
     )
-    signature = "A torque that repeats along the turn of the joint, the same at every speed and in both directions."
-    explanation = "Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: each once or many times a turn."
-    remedy = "Look for a damaged magnet, tooth or bearing where it is new; else add it to the feed-forward by the joint's angle."
-    experiment = "Turn the joint slowly through its whole range, both ways, at two speeds."
-    per_log = ("phase", "phase_2", "phase_3")  # where an encoder is zeroed at each start
+    words = Words("Cogging",
+        signature="A torque that repeats along the turn of the joint, the same at every speed and in both directions.",
+        explanation="Magnets pull towards iron teeth, gear teeth mesh, a ball bearing has a dent: each once or many times a turn.",
+        remedy="Look for a damaged magnet, tooth or bearing where it is new; else add it to the feed-forward by the joint's angle.",
+        experiment="Turn the joint slowly through its whole range, both ways, at two speeds.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -92,20 +90,14 @@ class Cogging(Fast):
             yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel if whole else 0.0,
                           fewest=0.0 if around else _FEWEST * 2.0 * math.pi / max(travel, _STILL))
 
-    def again(self, motion: Motion) -> bool:
-        """Magnets, teeth and poles each have their own order, which a turn shows; on much less any curve is a few waves."""
-        return self.goes_round(motion, NEARLY)
-
     @property
     def free(self) -> tuple[str, ...]:
         return () if self.whole else super().free
 
-    def full(self) -> Self:
-        return replace(self, harmonics=3)
-
     def forms(self) -> tuple[Self, ...]:
         """Behind a gear; of an order close to a whole one as well."""
-        return (replace(self, whole=False), replace(self, whole=False, apart=0.0)) if self.whole else ()
+        full = replace(self, harmonics=3)
+        return (full, replace(full, whole=False), replace(full, whole=False, apart=0.0)) if self.whole else (full,)
 
     def possible(self, values: Values) -> bool:
         apart = self.whole or abs(self.order - round(self.order)) >= self.apart

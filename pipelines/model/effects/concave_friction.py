@@ -8,8 +8,9 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ConcaveFriction"]
@@ -20,7 +21,7 @@ _BLUNTEST = 0.3  # below it levels off over many decades: no recorded speeds tel
 
 
 @dataclass(frozen=True)
-class ConcaveFriction(Fast):
+class ConcaveFriction(FrictionLaw, Fast):
     """τ = A tanh(v/v_0), or A x (1 + |x|^a)^(-1/a), x = v/v_0, beside Coulomb and viscous friction.
 
     The second is the shear of a lubricant whose viscosity falls as 1/|v| far above v_0: Yasuda, Armstrong & Cohen 1981, with the
@@ -32,19 +33,18 @@ class ConcaveFriction(Fast):
     knee: float = 0.0  # a, held where it is 0: tanh
 
     name = "concave_friction"
-    title = "Concave friction"
-    parameters = (
-        Quantity("amplitude", "N m", 0.0, LARGE, "torque at which it levels off"),
+    parameters = Parameters(
+        Quantity("amplitude", "N m", 0.0, LARGE, "torque at which it levels off", healthy=np.inf),
         Quantity("speed", "rad/s", 0.01, 20.0, "speed at which it levels off", shape=True),
-        Quantity("knee", "1", 0.0, 6.0, "how abruptly it levels off; 0: as tanh does", shape=True, unsaid=0.0),
+        Quantity("knee", "1", 0.0, 6.0, "how abruptly it levels off; 0: as tanh does", shape=True, unsaid=0.0, held=0.0),
     )
-    signature = "Friction that rises with speed and then levels off, the same in both directions."
-    explanation = "Lubricant that thins as it is sheared, and churning in gears: common in geared and lubricated joints."
-    remedy = ("Harmonic drives and greased gears have it, and nothing need be broken: compensate it in the feed-forward; "
-              "a single viscous coefficient is too large at speed and too small below it.")
-    experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
-    friction = True
-    ordinary = True
+    words = Words("Concave friction",
+        signature="Friction that rises with speed and then levels off, the same in both directions.",
+        explanation="Lubricant that thins as it is sheared, and churning in gears: common in geared and lubricated joints.",
+        remedy="Harmonic drives and greased gears have it, and nothing need be broken: compensate "
+               "it in the feed-forward; a single viscous coefficient is too large at speed and "
+               "too small below it.",
+        experiment="Move the joint in both directions at seven to ten constant speeds over two decades.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -57,15 +57,11 @@ class ConcaveFriction(Fast):
         for speed in np.geomspace(fast / 30.0, fast, 8).tolist():
             yield replace(self, speed=float(np.clip(speed, 0.01, 20.0)))
 
-    @property
-    def free(self) -> tuple[str, ...]:
-        return tuple(name for name in super().free if name != "knee" or self.knee >= _NONE)
-
     def possible(self, values: Values) -> bool:
         return super().possible(values) and not _NONE <= values["knee"] < _BLUNTEST
 
     def forms(self) -> tuple[Self, ...]:
-        return (replace(self, knee=_ROUND),)
+        return self, replace(self, knee=_ROUND)
 
     def own_load(self, values: Values) -> OwnLoad | None:
         amplitude, slow, knee = self.amplitudes(values).item(), 1.0 / values["speed"], values["knee"]

@@ -10,7 +10,8 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Quantity, Values, Words
+from pipelines.model.effects.kinds import Event
 from pipelines.model.rigid.altered import chain_of
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.geometry import SerialChain
@@ -22,7 +23,7 @@ _PLACES = 8
 
 
 @dataclass(frozen=True)
-class Contact(Effect):
+class Contact(Event):
     """τ = -Jᵀ F sin(π (t - t0)/D) while 0 < t - t0 < D: a push F on the tip, in the base frame, that grows and fades.
 
     t is the time since the start of the log: what comes again wherever the same motion is repeated comes at the same t, whatever
@@ -33,20 +34,19 @@ class Contact(Effect):
     duration: float = 0.2  # D [s]
 
     name = "contact"
-    healthy = "never"
-    title = "Contact at the tip"
     scope = "arm"
-    parameters = (
+    parameters = Parameters(
         Quantity("start", "s", -1e12, 1e12, "when it begins, from the start of its log", shape=True),
         Quantity("duration", "s", 0.02, 10.0, "how long it lasts", shape=True),
         Quantity("force", "N", 0.0, 1e5, "the largest", derived=True),
-        *(Quantity(f"force_{axis}", "N", -1e5, 1e5, f"{axis} of the largest, in the base frame") for axis in "xyz"),
+        *(Quantity(f"force_{axis}", "N", -1e5, 1e5, f"{axis} of the largest, in the base frame", healthy=0.0)
+          for axis in "xyz"),
     )
-    signature = "All joints are disturbed at once, for a moment, as a force at the tip would do it."
-    explanation = "Somebody or something touched the arm, or it brushed against an obstacle."
-    remedy = "Leave the moment out of the fit; clear the workspace and record again."
-    experiment = "Repeat the same motion: what does not come again was a touch."
-    per_log = ("start", "duration", "force", "force_x", "force_y", "force_z")
+    words = Words("Contact at the tip",
+        signature="All joints are disturbed at once, for a moment, as a force at the tip would do it.",
+        explanation="Somebody or something touched the arm, or it brushed against an obstacle.",
+        remedy="Leave the moment out of the fit; clear the workspace and record again.",
+        experiment="Repeat the same motion: what does not come again was a touch.")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self._columns(motion.q, motion.t - motion.t[0], chain_of(arm.body))

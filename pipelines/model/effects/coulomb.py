@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, SHARPNESSES, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Coulomb"]
@@ -20,7 +20,7 @@ _BETWEEN = 1.5  # tanh and the root: a roundness that is fitted begins there
 
 
 @dataclass(frozen=True)
-class Coulomb(Fast):
+class Coulomb(FrictionLaw, Fast):
     """τ = Fc ((2 - r) tanh(x) + (r - 1) x/√(1 + x²)), x = w v; from r = 2 on Fc ((3 - r) x/√(1 + x²) + (r - 2) (2/π) arctan x).
 
     tanh(w v) stands for sign(v) in fits and in simulation alike. In a fit, a reconstructed speed passes zero a little
@@ -40,18 +40,19 @@ class Coulomb(Fast):
     roundness: float = 1.0  # r
 
     name = "coulomb"
-    title = "Coulomb friction"
-    parameters = (
+    parameters = Parameters(
         Quantity("level", "N m", 0.0, LARGE, "friction torque while moving"),
-        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
-        Quantity("roundness", "1", 0.4, 3.5, "how gradually it changes sign; 1: as tanh, 3: as arctan", shape=True, unsaid=1.0),
+        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True,
+                 grid=SHARPNESSES),
+        Quantity("roundness", "1", 0.4, 3.5, "how gradually it changes sign; 1: as tanh, 3: as arctan", shape=True, unsaid=1.0,
+                 held=1.0),
     )
-    signature = "A torque of constant size that changes sign with the direction of motion."
-    explanation = "Dry friction in bearings, seals and gears: its size does not depend on speed."
-    remedy = "If it has grown, check lubrication, preload and seals; compensate it in the feed-forward."
-    experiment = "Move the joint in both directions at seven or more constant speeds over two decades."
+    words = Words("Coulomb friction",
+        signature="A torque of constant size that changes sign with the direction of motion.",
+        explanation="Dry friction in bearings, seals and gears: its size does not depend on speed.",
+        remedy="If it has grown, check lubrication, preload and seals; compensate it in the feed-forward.",
+        experiment="Move the joint in both directions at seven or more constant speeds over two decades.")
     evidence = "none"
-    friction = True
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -68,17 +69,9 @@ class Coulomb(Fast):
                                         for _, height in curve),
                           sharpnesses=tuple(w * part for part, _ in (*sharper, *rounder)))
 
-    @property
-    def free(self) -> tuple[str, ...]:
-        return tuple(name for name in super().free if name != "roundness" or self.roundness != 1.0)
-
     def forms(self) -> tuple[Self, ...]:
-        return (replace(self, roundness=_BETWEEN),)
+        return self, replace(self, roundness=_BETWEEN)
 
     def plain(self) -> Self:
         """Return the law by tanh, whose roundness is not fitted."""
         return replace(self, roundness=1.0)
-
-    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
-            yield replace(self, sharpness=sharpness)

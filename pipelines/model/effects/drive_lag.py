@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import rate_of_change
 
@@ -18,13 +18,12 @@ class DriveLag(Effect):
     """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt: earlier than the arm feels it."""
 
     name = "drive_lag"
-    title = "Drive lag"
-    parameters = (Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command"),)
-    signature = "The logged torque leads the torque that the arm feels, on one joint; more so the faster the torque changes."
-    explanation = "The current loop is slow, or the amplifier filters its command."
-    remedy = "Tune the current loop; lead the feed-forward by the time constant."
-    experiment = "Repeat an experiment at two speeds, or record the joint's frequency response."
-    size = "time_constant"
+    parameters = Parameters(Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command"))
+    words = Words("Drive lag", size="time_constant",
+        signature="The logged torque leads the torque that the arm feels, on one joint; more so the faster the torque changes.",
+        explanation="The current loop is slow, or the amplifier filters its command.",
+        remedy="Tune the current loop; lead the feed-forward by the time constant.",
+        experiment="Repeat an experiment at two speeds, or record the joint's frequency response.")
     acts_on = "drive"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

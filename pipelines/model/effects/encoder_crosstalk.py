@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import perturbed_torque, shifted
 
@@ -23,34 +21,19 @@ class EncoderCrosstalk(Effect):
     from_joint: float = 0.0  # i, 1-based
 
     name = "encoder_crosstalk"
-    title = "Encoder crosstalk"
-    parameters = (
+    parameters = Parameters(
         Quantity("coefficient", "1", -0.5, 0.5, "part of the other joint's angle in this one's reading"),
         Quantity("from_joint", "1", 1.0, 64.0, "the other joint", shape=True, discrete=True, joint=True),
     )
-    signature = "An error of this joint's angle that follows the angle of another one, felt by all rows."
-    explanation = "Belts, cables or a parallel rod turn this encoder a little when another joint moves, or two channels mix."
-    remedy = "Take the part found off the reading; look at what couples the two encoders."
-    experiment = "Hold this joint still against a stop or a level and move the other over its range."
-    size = "coefficient"
+    words = Words("Encoder crosstalk", size="coefficient",
+        signature="An error of this joint's angle that follows the angle of another one, felt by all rows.",
+        explanation="Belts, cables or a parallel rod turn this encoder a little when another joint moves, or two channels mix.",
+        remedy="Take the part found off the reading; look at what couples the two encoders.",
+        experiment="Hold this joint still against a stop or a level and move the other over its range.")
     acts_on = "encoder"
-
-    @classmethod
-    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
-        return super().everywhere(revolute) if len(revolute) > 1 else ()
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.from_joint and self.joint is not None:
-            object.__setattr__(self, "from_joint", float(self.joint - 1 or 2))
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return perturbed_torque(arm.torque, motion, self._index, *self._error(motion))[..., None]
-
-    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        for other in range(1, arm.n_joints + 1):
-            if other != self.joint:
-                yield replace(self, from_joint=float(other))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         true = self._corrected(motion, values) if values["coefficient"] else motion

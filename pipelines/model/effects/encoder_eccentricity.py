@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import perturbed_torque, shifted
 
@@ -24,22 +24,16 @@ class EncoderEccentricity(Effect):
     """
 
     name = "encoder_eccentricity"
-    title = "Eccentric encoder"
-    parameters = (
-        Quantity("amplitude", "rad", 0.0, 0.1, "largest error of the angle"),
+    parameters = Parameters(
+        Quantity("amplitude", "rad", 0.0, 0.1, "largest error of the angle", revolute=True),
         Quantity("phase", "rad", -np.pi, np.pi, "of the error at zero angle", period=2.0 * np.pi),
     )
-    signature = "An error once a turn of the joint, with a part that grows with the square of speed, felt by all rows."
-    explanation = "The disc's centre is beside the axis: the head reads the angle seen from there."
-    remedy = "Correct the reading by the sine found, or centre the disc; two opposite heads cancel it."
-    experiment = "Turn the joint over a full turn at three constant speeds."
-    size = "amplitude"
+    words = Words("Eccentric encoder", size="amplitude",
+        signature="An error once a turn of the joint, with a part that grows with the square of speed, felt by all rows.",
+        explanation="The disc's centre is beside the axis: the head reads the angle seen from there.",
+        remedy="Correct the reading by the sine found, or centre the disc; two opposite heads cancel it.",
+        experiment="Turn the joint over a full turn at three constant speeds.")
     acts_on = "encoder"
-
-    @classmethod
-    def joints(cls, revolute: Sequence[bool]) -> tuple[int, ...]:
-        """Return those that turn."""
-        return tuple(k for k, turns in enumerate(revolute, 1) if turns)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         q, v, u = (self.own(x) for x in (motion.q, motion.dq, motion.ddq))

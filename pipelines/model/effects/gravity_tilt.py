@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.altered import carry_over, chain_of, gravity_torque, standard_of, with_gravity
 from pipelines.model.rigid.body import Array, Motion
 
@@ -27,20 +27,19 @@ class GravityTilt(Effect):
     """
 
     name = "gravity_tilt"
-    title = "A base that is not level"
     scope = "arm"
-    parameters = (
+    parameters = Parameters(
         Quantity("angle", "rad", 0.0, 1.5, "between true and nominal gravity"),
         Quantity("direction", "rad", -math.pi, math.pi, "of the horizontal part of true gravity, from the base's x axis",
                  period=2.0 * math.pi),
         Quantity("waist_sine", "N m", -1e4, 1e4, "S: weight of what joint 1 carries, as far as a level arm does not tell"),
         Quantity("waist_cosine", "N m", -1e4, 1e4, "C: the same, a quarter of a turn on"),
     )
-    signature = "Joint 1 feels gravity, and the other joints' gravity changes as joint 1 turns."
-    explanation = "The floor, the table or the mounting plate is not level, or gravity was described in other axes."
-    remedy = "Level the base, or correct gravity in the robot description."
-    experiment = "Hold the arm still, stretched out, in eight angles of joint 1, and with the elbow bent in the same eight."
-    size = "angle"
+    words = Words("A base that is not level", size="angle",
+        signature="Joint 1 feels gravity, and the other joints' gravity changes as joint 1 turns.",
+        explanation="The floor, the table or the mounting plate is not level, or gravity was described in other axes.",
+        remedy="Level the base, or correct gravity in the robot description.",
+        experiment="Hold the arm still, stretched out, in eight angles of joint 1, and with the elbow bent in the same eight.")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         size, _, first, second = _axes(arm)

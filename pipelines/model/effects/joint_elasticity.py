@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Predict, Quantity, Values, friction_at
+from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Predict, Quantity, Values, Words, friction_at
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart
@@ -32,19 +32,18 @@ class JointElasticity(Fast):
     link_inertia: float = field(default=1.0, compare=False)  # J [kg m^2]; what the frequency follows from
 
     name = "joint_elasticity"
-    title = "Elastic joint"
-    parameters = (
+    parameters = Parameters(
         Quantity("stiffness", "N m/rad", 1.0, 1e7, "of the spring between motor and link"),
         Quantity("damping", "N m s/rad", 0.0, 1e3, "beside the spring", shape=True),
         Quantity("frequency", "Hz", 0.1, 1e4, "of the link on its spring, the motor locked", derived=True),
         Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
     )
-    signature = ("A residual that grows with the fourth power of frequency; antiresonance and resonance that move with posture, "
-                 "and above them the motor's inertia alone.")
-    explanation = "Gear, belt or shaft are elastic: the link is not where the motor's encoder says."
-    remedy = "Check belt, clamps and gear; keep the bandwidth below the antiresonance, compensate the deflection by the torque."
-    experiment = "Measure the frequency response of this joint in two postures with different inertia."
-    size = "frequency"
+    words = Words("Elastic joint", size="frequency",
+        signature="A residual that grows with the fourth power of frequency; antiresonance and "
+                  "resonance that move with posture, and above them the motor's inertia alone.",
+        explanation="Gear, belt or shaft are elastic: the link is not where the motor's encoder says.",
+        remedy="Check belt, clamps and gear; keep the bandwidth below the antiresonance, compensate the deflection by the torque.",
+        experiment="Measure the frequency response of this joint in two postures with different inertia.")
     evidence = "frequency responses"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.altered import carry_over, masses_beyond, with_longer_link
 from pipelines.model.rigid.body import Array, Motion
 
@@ -27,33 +25,23 @@ class LinkLength(Effect):
     link: float = 1.0  # k, 1-based: from joint k to joint k + 1
 
     name = "link_length"
-    title = "A link of another length"
     scope = "arm"
-    parameters = (
+    parameters = Parameters(
         Quantity("error", "m", -1.0, 1.0, "true length minus that of the description"),
         Quantity("link", "1", 1.0, 100.0, "which link, counted from the base", shape=True, discrete=True, link=True),
     )
-    signature = "Gravity and inertia of the links beyond do not agree with each other."
-    explanation = "The drawing, the calibration or the robot description has another length than the arm."
-    remedy = "Measure the link and correct the robot description; the tip is off by as much."
-    experiment = "Hold the arm in static poses with the elbow bent and straight, and move it fast in the same poses."
-    size = "error"
-
-    @classmethod
-    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
-        return (cls(),) if len(revolute) > 1 else ()
+    words = Words("A link of another length", size="error",
+        signature="Gravity and inertia of the links beyond do not agree with each other.",
+        explanation="The drawing, the calibration or the robot description has another length than the arm.",
+        remedy="Measure the link and correct the robot description; the tip is off by as much.",
+        experiment="Hold the arm in static poses with the elbow bent and straight, and move it fast in the same poses.")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         either = [self._altered(arm, by) for by in (_STEP, -_STEP)]
         longer, shorter = (one.body.torque(motion.q, motion.dq, motion.ddq, one.p) for one in either)
         return np.asarray(longer - shorter)[..., None] / (2.0 * _STEP)
 
-    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Every link but the last, whose length no torque tells."""
-        for link in range(1, arm.n_joints):
-            yield replace(self, link=float(link))
-
-    def moving(self, arm: ArmModel) -> Array:
+    def nuisance(self, arm: ArmModel) -> Array:
         """Masses beyond the link turn on a longer lever, and how heavy each is base parameters do not say."""
         return masses_beyond(arm.body, int(self.link))
 

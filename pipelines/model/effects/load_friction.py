@@ -3,13 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, PlainDrive, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import (
+    SHARPNESSES,
+    ArmModel,
+    Hooks,
+    Parameters,
+    PlainDrive,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+    predicted,
+)
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LoadFriction"]
@@ -18,7 +29,7 @@ _HALF = 0.5  # from which the share of what rubs behind it is refitted
 
 
 @dataclass(frozen=True)
-class LoadFriction(Effect):
+class LoadFriction(FrictionLaw):
     """τ = µ |τ_l| tanh(w v), τ_l what the joint transmits: its torque without friction. Coulomb friction is Fc + µ |τ_l| then.
 
     What rubs behind a gear is part of its load: τ_l has the share s of the joint's other friction too. Lifting a weight then rubs
@@ -33,36 +44,28 @@ class LoadFriction(Effect):
     input_side: float = 0.0  # i, held where it is 0
 
     name = "load_friction"
-    title = "Friction that grows with load"
-    parameters = (
+    parameters = Parameters(
         Quantity("mu", "1", 0.0, 0.5, "friction per unit of transmitted torque"),
-        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
-        Quantity("behind", "1", 0.0, 1.0, "share of the joint's other friction that loads it too", shape=True, unsaid=0.0),
-        Quantity("input_side", "1", 0.0, 1.0, "how far it goes by what goes in, not by what comes out", shape=True, unsaid=0.0),
+        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True,
+                 shared=True, grid=SHARPNESSES),
+        Quantity("behind", "1", 0.0, 1.0, "share of the joint's other friction that loads it too", shape=True, unsaid=0.0,
+                 held=0.0),
+        Quantity("input_side", "1", 0.0, 1.0, "how far it goes by what goes in, not by what comes out", shape=True, unsaid=0.0,
+                 held=0.0),
     )
-    signature = "Friction that grows with the torque the joint carries and changes sign with the direction of motion."
-    explanation = "Teeth and bearings are pressed together by the torque that passes them, and rub in proportion."
-    remedy = "Check the lubrication of the gear; compensate it with the predicted torque."
-    experiment = "Move the joint at one speed in both directions under three loads: three postures, or payloads."
-    shared = ("sharpness",)
-    friction = True
+    words = Words("Friction that grows with load",
+        signature="Friction that grows with the torque the joint carries and changes sign with the direction of motion.",
+        explanation="Teeth and bearings are pressed together by the torque that passes them, and rub in proportion.",
+        remedy="Check the lubrication of the gear; compensate it with the predicted torque.",
+        experiment="Move the joint at one speed in both directions under three loads: three postures, or payloads.")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         load = self.own(predicted(arm, motion)) - (1.0 - self.behind) * self.own(arm.friction_torque(motion))
         return self.on_own_row(arm, np.abs(load) * np.tanh(self.sharpness * self.own(motion.dq)))
 
-    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        for sharpness in (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0):
-            yield replace(self, sharpness=sharpness)
-
-    @property
-    def free(self) -> tuple[str, ...]:
-        held = [name for name in ("behind", "input_side") if getattr(self, name) == 0.0]
-        return tuple(name for name in super().free if name not in held)
-
     def forms(self) -> tuple[Self, ...]:
         behind = replace(self, behind=_HALF)
-        return behind, replace(behind, input_side=_HALF)
+        return self, behind, replace(behind, input_side=_HALF)
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """Under the load that the joint carries at rest, and what rubs behind it."""

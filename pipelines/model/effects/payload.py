@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.altered import tip_parameters
 from pipelines.model.rigid.body import Array, Motion
 
@@ -28,20 +28,18 @@ class Payload(Effect):
     extended: bool = True  # with its six moments of inertia
 
     name = "payload"
-    healthy = "never"
-    title = "Payload at the tip"
     scope = "arm"
-    parameters = (
-        Quantity("mass", "kg", -1e3, 1e3, "that hangs at the tip; negative where it was taken off"),
+    parameters = Parameters(
+        Quantity("mass", "kg", -1e3, 1e3, "that hangs at the tip; negative where it was taken off", healthy=0.0),
         *(Quantity(f"first_moment_{axis}", "kg m", -1e3, 1e3, f"mass times {axis} of its centre, from the tip") for axis in "xyz"),
         *(Quantity(f"inertia_{axes}", "kg m^2", -1e3, 1e3, f"its I{axes} about the tip") for axes in _MOMENTS),
     )
-    signature = "Base parameters of the last link that moved since the reference, together, as a body at the tip moves them."
-    explanation = "A tool or a workpiece hangs at the tip that was not there before, or is no longer there."
-    remedy = "Take it off, or add it to the model."
-    experiment = "Repeat the same experiment without the load."
+    words = Words("Payload at the tip", size="mass",
+        signature="Base parameters of the last link that moved since the reference, together, as a body at the tip moves them.",
+        explanation="A tool or a workpiece hangs at the tip that was not there before, or is no longer there.",
+        remedy="Take it off, or add it to the model.",
+        experiment="Repeat the same experiment without the load.")
     evidence = "base parameters"
-    size = "mass"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         regressor = arm.body.regressor(motion.q, motion.dq, motion.ddq)
@@ -50,8 +48,8 @@ class Payload(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         yield replace(self, extended=False)
 
-    def full(self) -> Self:
-        return replace(self, extended=True)
+    def forms(self) -> tuple[Self, ...]:
+        return (replace(self, extended=True),)
 
     def amplitudes(self, values: Values) -> Array:
         return super().amplitudes(values)[:10 if self.extended else 4]

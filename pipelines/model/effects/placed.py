@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from pipelines.model.effects.terms import ArmModel
+from pipelines.model.effects.terms import ArmModel, Numbered, Values
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Placed"]
 
+_BEYOND = 0.1  # of the range in which it was seen: behind that nobody knows how it goes on
 
-class Placed:
+
+class Placed(Numbered):
     """Part of an effect."""
 
     joint: int | None
@@ -37,6 +40,17 @@ class Placed:
         """Whether its own joint travels all of a circle but for a fiftieth, or such a part of it: what it does there comes back to
         where it began."""
         return float(np.ptp(self.own(motion.q))) > (1.0 - but) * 2.0 * np.pi
+
+    def goes_beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
+        """Return whether its joint leaves the range of its angles in `known` by more than a tenth."""
+        now, then = (np.concatenate([self.own(motion.q) for motion in some]) for some in (motions, known))
+        return bool(max(now.max() - then.max(), then.min() - now.min()) > _BEYOND * np.ptp(then))
+
+    def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
+        """Return its torque (samples,) [N m] on its own joint against speed alone, at rest otherwise."""
+        still = np.zeros((len(dq), arm.n_joints))
+        motion = Motion(np.zeros(len(dq)), still, self.on_own_row(arm, dq)[..., 0], still)
+        return self.own(self.torque(motion, arm, values))
 
     def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
         """`columns`, each (samples,), as (samples, joints, columns): they act on its own joint only. Samples lie side by side."""

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -36,22 +36,22 @@ class PositionFriction(Fast):
     whole: bool = False  # whether k is held as it is
 
     name = "position_friction"
-    title = "Friction that depends on position"
-    parameters = (
+    parameters = Parameters(
         Quantity("amplitude", "N m", 0.0, LARGE, "by how much friction rises and falls along the turn"),
         Quantity("order", "1/rev", 0.25, 100.0, "waves in one turn of the joint", shape=True),
         Quantity("phase", "rad", -math.pi, math.pi, "angle of the wave at the joint's zero", period=2.0 * math.pi),
-        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
+        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True,
+                 shared=True),
         Quantity("amplitude_2", "N m", 0.0, LARGE, "of the second harmonic", unsaid=0.0),
         Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", unsaid=0.0, period=2.0 * math.pi),
         Quantity("amplitude_3", "N m", 0.0, LARGE, "of the third harmonic", unsaid=0.0),
         Quantity("phase_3", "rad", -math.pi, math.pi, "of the third harmonic", unsaid=0.0, period=2.0 * math.pi),
     )
-    signature = "Friction whose size changes with the angle of the joint, always against the motion."
-    explanation = "A bent shaft, an uneven seal or bearing, cables that press in some postures."
-    remedy = "Look for wear, a bent shaft or cables that rub; compensate it with the angle."
-    experiment = "Turn the joint slowly through its whole range in both directions, at two speeds."
-    shared = ("sharpness",)
+    words = Words("Friction that depends on position",
+        signature="Friction whose size changes with the angle of the joint, always against the motion.",
+        explanation="A bent shaft, an uneven seal or bearing, cables that press in some postures.",
+        remedy="Look for wear, a bent shaft or cables that rub; compensate it with the angle.",
+        experiment="Turn the joint slowly through its whole range in both directions, at two speeds.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -81,13 +81,11 @@ class PositionFriction(Fast):
     def free(self) -> tuple[str, ...]:
         return tuple(name for name in super().free if not (self.whole and name == "order"))
 
-    def full(self) -> Self:
-        return replace(self, harmonics=self.most)
-
     def forms(self) -> tuple[Self, ...]:
         """With more harmonics than half waves were travelled, as held-out motion bears them out; behind a gear."""
+        full = replace(self, harmonics=self.most)
         finer = tuple(replace(self, harmonics=m, most=m) for m in range(self.most + 1, len(_TAILS) + 1))
-        return (*finer, replace(self, whole=False)) if self.whole else finer
+        return (full, *finer, replace(full, whole=False)) if self.whole else (full, *finer)
 
     def own_load(self, values: Values) -> OwnLoad:
         shaped, sharpness = self.at(values), values["sharpness"]

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Hooks, OwnMemory, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Hooks, OwnMemory, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.bristles import ONE, Breaking, Bristles, Slips, sliding_level
@@ -52,24 +52,24 @@ class Presliding(Fast):
     breakaway_speed: float = 0.1  # v_s [rad/s]
 
     name = "presliding"
-    title = "Presliding"
-    parameters = (
-        Quantity("amplitude", "N m", 0.0, LARGE, "friction that turns over with travel"),
+    parameters = Parameters(
+        Quantity("amplitude", "N m", 0.0, LARGE, "friction that turns over with travel", healthy=math.inf),
         Quantity("distance", "rad", 1e-6, 0.2, "travel over which it turns over", shape=True),
         Quantity("elastic", "1", -1.0, 0.9, "share of the largest bending up to which nothing slides", shape=True, unsaid=-1.0),
         Quantity("damping_time", "s", 0.0, 0.1, "damping of the bristles over their stiffness", shape=True),
-        Quantity("exponent", "1", 0.0, 3.0, "how gradually it begins to slide", shape=True, unsaid=1.0),
+        Quantity("exponent", "1", 0.0, 3.0, "how gradually it begins to slide", shape=True, unsaid=1.0, held=1.0),
         Quantity("inner_loops", "1", 0.0, 1.0, "1 where a small loop inside a large one closes", shape=True, discrete=True,
                  unsaid=0.0),
         Quantity("breakaway", "1", 0.0, 5.0, "how much larger friction is at standstill than at speed", shape=True, unsaid=0.0),
         Quantity("breakaway_speed", "rad/s", 1e-3, 5.0, "speed over which it falls to that", shape=True, unsaid=0.1),
     )
-    signature = "After each reversal friction turns over along a loop against position, at any speed."
-    explanation = "Contacts, seals and gears bend before they slide, and bend back after a reversal."
-    remedy = ("Every bearing has it, and nothing need be broken: simulate it where slow reversals matter; friction compensation "
-              "by the sign of speed alone pushes too early.")
-    experiment = "Reverse the joint slowly and often, with strokes from a tenth of the distance to many times it."
-    ordinary = True
+    words = Words("Presliding",
+        signature="After each reversal friction turns over along a loop against position, at any speed.",
+        explanation="Contacts, seals and gears bend before they slide, and bend back after a reversal.",
+        remedy="Every bearing has it, and nothing need be broken: simulate it where slow "
+               "reversals matter; friction compensation by the sign of speed alone pushes too "
+               "early.",
+        experiment="Reverse the joint slowly and often, with strokes from a tenth of the distance to many times it.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -88,18 +88,14 @@ class Presliding(Fast):
         for distance in np.geomspace(1e-3 * travel, 0.1 * travel, 9).tolist():
             yield replace(self, distance=float(np.clip(distance, 1e-6, 0.2)), breakaway_speed=slow)
 
-    def full(self) -> Self:
-        return replace(self, elastic=_HALFWAY)
-
     def forms(self) -> tuple[Self, ...]:
-        return (replace(self, exponent=_OTHER), replace(self, exponent=_OTHER, inner_loops=1.0),
+        return (replace(self, elastic=_HALFWAY), replace(self, exponent=_OTHER),
+                replace(self, exponent=_OTHER, inner_loops=1.0),
                 replace(self, elastic=-1.0, breakaway=_BREAKAWAY))
 
     @property
     def free(self) -> tuple[str, ...]:
         held = {"elastic", "exponent"} if self.breakaway else {"breakaway", "breakaway_speed"}
-        if self.exponent == 1.0:
-            held.add("exponent")
         return tuple(name for name in super().free if name not in held)
 
     def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:

@@ -6,25 +6,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["QuadraticDrag"]
 
 
 @dataclass(frozen=True)
-class QuadraticDrag(Fast):
+class QuadraticDrag(FrictionLaw, Fast):
     """τ = c v |v|."""
 
     name = "quadratic_drag"
-    title = "Quadratic drag"
-    parameters = (Quantity("coefficient", "N m s^2/rad^2", 0.0, LARGE, "torque at unit speed"),)
-    signature = "A torque that grows with the square of speed, against the motion."
-    explanation = "Windage, and oil that is churned by gears or fills a bearing."
-    remedy = "Check the oil level; compensate it in the feed-forward."
-    experiment = "Move the joint in both directions at seven to ten constant speeds up to the highest it allows."
-    friction = True
+    parameters = Parameters(Quantity("coefficient", "N m s^2/rad^2", 0.0, LARGE, "torque at unit speed"))
+    words = Words("Quadratic drag",
+        signature="A torque that grows with the square of speed, against the motion.",
+        explanation="Windage, and oil that is churned by gears or fills a bearing.",
+        remedy="Check the oil level; compensate it in the feed-forward.",
+        experiment="Move the joint in both directions at seven to ten constant speeds up to the highest it allows.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

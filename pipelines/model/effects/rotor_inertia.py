@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import LARGE, ArmModel, Hooks, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Hooks, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -19,13 +19,12 @@ class RotorInertia(Fast):
     """
 
     name = "rotor_inertia"
-    title = "Rotor inertia"
-    parameters = (Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "inertia at joint side"),)
-    signature = "A torque in proportion to the joint's own acceleration, the same in every posture."
-    explanation = "The rotor and the gear's fast shaft turn with the motor; the gear ratio enters squared."
-    remedy = "Add it to the model; it is a property of the machine, not a fault."
-    experiment = "Accelerate the joint in two postures with different load inertia."
-    size = "inertia"
+    parameters = Parameters(Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "inertia at joint side"))
+    words = Words("Rotor inertia", size="inertia",
+        signature="A torque in proportion to the joint's own acceleration, the same in every posture.",
+        explanation="The rotor and the gear's fast shaft turn with the motor; the gear ratio enters squared.",
+        remedy="Add it to the model; it is a property of the machine, not a fault.",
+        experiment="Accelerate the joint in two postures with different load inertia.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -9,14 +9,13 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import ArmModel, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Spring"]
 
 _DEGREE, _MORE = 5, 7  # of the law that is tried first; of another, for what hardens or gives way far out
-_BEYOND = 0.1  # of the range in which it was seen: behind that nobody knows how it goes on
 _FAR = 1e3  # [rad] where nobody says how far it was seen
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")  # of x, x², …
 
@@ -38,8 +37,7 @@ class Spring(Fast):
     highest: int = _DEGREE  # of the form that a finding is refitted with
 
     name = "spring"
-    title = "Spring"
-    parameters = (
+    parameters = Parameters(
         Quantity("stiffness", "N m/rad", -1e4, 1e4, "at rest"),
         Quantity("rest_angle", "rad", -20.0, 20.0, "where it does not pull"),
         Quantity("curvature", "N m/rad^2", -1e4, 1e4, "b: how much stiffer it is on one side"),
@@ -48,13 +46,14 @@ class Spring(Fast):
         Quantity("fifth", "N m/rad^5", -1e4, 1e4, "e"),
         Quantity("sixth", "N m/rad^6", -1e2, 1e2, "f", unsaid=0.0),
         Quantity("seventh", "N m/rad^7", -1e2, 1e2, "g", unsaid=0.0),
-        Quantity("seen_from", "rad", -_FAR, _FAR, "below it goes straight on", shape=True, derived=True, unsaid=-_FAR),
-        Quantity("seen_to", "rad", -_FAR, _FAR, "above it goes straight on", shape=True, derived=True, unsaid=_FAR),
+        Quantity("seen_from", "rad", -_FAR, _FAR, "below it goes straight on", shape=True, derived=True, unsaid=-_FAR, seen=True),
+        Quantity("seen_to", "rad", -_FAR, _FAR, "above it goes straight on", shape=True, derived=True, unsaid=_FAR, seen=True),
     )
-    signature = "A torque that depends on the angle of its joint alone and pulls towards one angle."
-    explanation = "A cable bundle, a hose or a balancing spring pulls the joint."
-    remedy = "Look for a cable that is led too short or has come loose; add it to the model."
-    experiment = "Hold the joint at rest in many angles over its whole range, with another joint in two postures."
+    words = Words("Spring",
+        signature="A torque that depends on the angle of its joint alone and pulls towards one angle.",
+        explanation="A cable bundle, a hose or a balancing spring pulls the joint.",
+        remedy="Look for a cable that is led too short or has come loose; add it to the model.",
+        experiment="Hold the joint at rest in many angles over its whole range, with another joint in two postures.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -74,20 +73,13 @@ class Spring(Fast):
         q = self.own(motion.q)
         yield replace(self, degree=1, highest=1 if closed else self.highest, seen_from=float(q.min()), seen_to=float(q.max()))
 
-    def beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
-        """By more than a tenth of the range in which it was seen."""
-        now, then = (np.concatenate([self.own(motion.q) for motion in some]) for some in (motions, known))
-        return bool(max(now.max() - then.max(), then.min() - now.min()) > _BEYOND * np.ptp(then))
-
-    def full(self) -> Self:
-        return replace(self, degree=self.highest)
-
     def forms(self) -> tuple[Self, ...]:
-        return (replace(self, degree=_MORE, highest=_MORE),) if self.highest == _DEGREE else ()
+        full = replace(self, degree=self.highest)
+        return (full, replace(self, degree=_MORE, highest=_MORE)) if self.highest == _DEGREE else (full,)
 
     def own_load(self, values: Values) -> OwnLoad:
         slope, constant, *rest = self.amplitudes(values).tolist()
-        known, falling = self.complete(values), (*rest[::-1], slope, constant)
+        known, falling = self.parameters.complete(values), (*rest[::-1], slope, constant)
         low, high = known["seen_from"], known["seen_to"]
 
         def load(angle: float, speed: float) -> float:

@@ -9,19 +9,20 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Stribeck"]
 
-_HELD = {"tail": 0.0, "exponent": 2.0}
+_GAUSSIAN = 2.0  # exponent
 _NONE = 1e-6  # of a tail
 _OVER = 2.0  # times the speed over which friction changes its sign: by then it has
 
 
 @dataclass(frozen=True)
-class Stribeck(Fast):
+class Stribeck(FrictionLaw, Fast):
     """τ = A (1 + (e^p - 1) |v/v_s|^n)^(-1/p) tanh(w v), beside Coulomb and viscous friction; 1/e of it is left at v_s.
 
     As p goes to 0 it is A exp(-|v/v_s|^n) tanh(w v): Armstrong-Hélouvry, Dupont & Canudas de Wit 1994, eq. (7); n = 1 is
@@ -34,23 +35,22 @@ class Stribeck(Fast):
     exponent: float = 2.0  # n, held where it is 2
 
     name = "stribeck"
-    title = "Stribeck friction"
-    parameters = (
-        Quantity("amplitude", "N m", 0.0, LARGE, "friction at standstill above that at speed"),
+    parameters = Parameters(
+        Quantity("amplitude", "N m", 0.0, LARGE, "friction at standstill above that at speed",
+                 healthy=math.inf),
         Quantity("speed", "rad/s", 1e-3, 5.0, "speed over which it falls", shape=True),
-        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True),
+        Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True,
+                 shared=True),
         Quantity("tail", "1", 0.0, 3.0, "how long it lasts beyond its speed: not at all, or as a power of speed", shape=True,
-                 unsaid=0.0),
-        Quantity("exponent", "1", 0.0, 4.0, "how abruptly it falls at its speed", shape=True, unsaid=2.0),
+                 unsaid=0.0, held=0.0),
+        Quantity("exponent", "1", 0.0, 4.0, "how abruptly it falls at its speed", shape=True, unsaid=2.0, held=_GAUSSIAN),
     )
-    signature = "A hump of the friction curve at low speed, the same in both directions."
-    explanation = "Below a certain speed the surfaces touch; above it a film of lubricant carries them."
-    remedy = ("Most oiled gears have it, and nothing need be broken: compensate it in the feed-forward; "
-              "another lubricant moves the hump.")
-    experiment = "Move the joint in both directions at seven to ten constant speeds over two decades."
-    shared = ("sharpness",)
-    friction = True
-    ordinary = True
+    words = Words("Stribeck friction",
+        signature="A hump of the friction curve at low speed, the same in both directions.",
+        explanation="Below a certain speed the surfaces touch; above it a film of lubricant carries them.",
+        remedy="Most oiled gears have it, and nothing need be broken: compensate it in the "
+               "feed-forward; another lubricant moves the hump.",
+        experiment="Move the joint in both directions at seven to ten constant speeds over two decades.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -69,18 +69,14 @@ class Stribeck(Fast):
         """A hump that is over before friction has changed its sign is the shape of that change, which no lubricant makes."""
         return super().possible(values) and values["speed"] * values["sharpness"] >= _OVER - _NONE
 
-    @property
-    def free(self) -> tuple[str, ...]:
-        return tuple(name for name in super().free if getattr(self, name) != _HELD.get(name))
-
     def forms(self) -> tuple[Self, ...]:
-        return replace(self, tail=0.5), replace(self, exponent=1.5)
+        return self, replace(self, tail=0.5), replace(self, exponent=1.5)
 
     def own_load(self, values: Values) -> OwnLoad:
         amplitude, sharpness, slow = self.amplitudes(values).item(), values["sharpness"], 1.0 / values["speed"]
         p, n = values["tail"], values["exponent"]
         turned = f"tanh({sharpness!r} * {{v}})"
-        if p < _NONE and n == _HELD["exponent"]:  # four times a step: a power costs as much as all else
+        if p < _NONE and n == _GAUSSIAN:  # four times a step: a power costs as much as all else
             return Formula(f"({amplitude!r}) * exp(-({slow!r} * {{v}}) * ({slow!r} * {{v}})) * {turned}")
         if p < _NONE:
             return Formula(f"({amplitude!r}) * exp(-abs({slow!r} * {{v}}) ** {n!r}) * {turned}")

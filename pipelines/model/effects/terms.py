@@ -2,6 +2,9 @@
 
     ArmModel      what an effect may ask of the arm
     Quantity      one parameter: unit, range, meaning
+    Parameters    those of an effect
+    Numbered      their values by name and amplitudes, one from the other
+    Words         what a report says of an effect
     SpeedCurve    a torque that follows from speed alone, which a simulation takes by itself
     Formula       one that follows from angle and speed, which it writes out
     Hooks         how an effect enters the forward simulation
@@ -15,21 +18,22 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["LARGE", "WRITTEN", "ArmModel", "Formula", "Hooks", "OwnLoad", "OwnMemory", "PlainDrive", "Predict", "Quantity",
-           "SpeedCurve", "Values", "friction_at", "predicted", "summed"]
+__all__ = ["LARGE", "SHARPNESSES", "WRITTEN", "ArmModel", "Formula", "Hooks", "Numbered", "OwnLoad", "OwnMemory", "Parameters",
+           "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "friction_at", "predicted", "summed"]
 
 Values = Mapping[str, float]
 
 # Of torques, forces and inertias: more than any machine has. How much of them a cause makes no table says before the logs do, for
 # the slide of a gantry rubs with more newtons than a small arm's motor can give.
 LARGE = 1e5
+SHARPNESSES = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # [s/rad] at which friction may change its sign
 _MANY = 256  # samples
 _KEPT: list[tuple[ArmModel, Motion, Array]] = []  # the last few, newest first; compared by identity, for a motion is its arrays
 _KEEP = 6
@@ -119,6 +123,16 @@ class Quantity:
     joint: bool = False  # the number of another joint of the arm, 1-based
     link: bool = False  # the number of a link with a joint beyond it, counted from the base
     unsaid: float | None = None  # what holds where a model file does not say: the law from before the number was known
+    grid: tuple[float, ...] = ()  # a shape: where a search looks, on any motion
+    held: float | None = None  # a shape that a refit does not move from here, where the law is a simpler one
+    shared: bool = False  # a shape that is one number with that of the friction law at its joint, where that has it
+    several: bool = False  # a shape: one joint may have the effect with several values of it, where the motion goes round
+    seen: bool = False  # a shape: end of the angles that it was fitted to, beyond which the fit says nothing
+    reads_torque: bool = False  # the columns compare it with the logged torque itself, where that is a held command
+    revolute: bool = False  # only a joint that turns has it
+    earlier: bool = False  # of `joint`: the effect is the same with the two joints exchanged, and looked for at the later one
+    fixed: float | None = None  # an amplitude that physics gives: screening fits it, a refit holds it
+    healthy: float | None = None  # an amplitude that healthy machines have: 0 none, inf any, a number up to it; None: in small
     period: float | None = None  # of an angle on a circle, rad whether its joint turns or slides: so much more is the same again
 
     def among(self, own: int | None, n_joints: int) -> tuple[int, ...] | None:
@@ -126,6 +140,11 @@ class Quantity:
         if self.joint:
             return tuple(k for k in range(1, n_joints + 1) if k != own)
         return tuple(range(1, n_joints)) if self.link else None
+
+    def found_at(self, own: int | None, n_joints: int) -> bool:
+        """Return whether an effect at joint `own` of `n_joints` has a joint or link for it, if it is one."""
+        among = self.among(own, n_joints)
+        return among is None or any(not self.earlier or own is None or k < own for k in among)
 
     def unfit(self, value: float, own: int | None, n_joints: int) -> str:
         """Why no arm of `n_joints` joints can have this value of an effect at joint `own`; empty where it can."""
@@ -141,6 +160,101 @@ class Quantity:
         if revolute or self.period is not None:
             return self.unit
         return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m").replace("1/rev", "1/(2 pi m)")
+
+
+class Parameters(tuple[Quantity, ...]):
+    """The parameters of an effect, in the order in which models and reports list them."""
+
+    def __new__(cls, *quantities: Quantity) -> Self:
+        return super().__new__(cls, quantities)
+
+    def complete(self, values: Values) -> dict[str, float]:
+        """Return `values`, and the default of each number that is younger than the law and is not among them."""
+        return {q.name: q.unsaid for q in self if q.unsaid is not None} | dict(values)
+
+    @property
+    def fixed(self) -> tuple[float, ...] | None:
+        """Amplitudes that physics gives; None where all are fitted."""
+        return tuple(q.fixed for q in self if q.fixed is not None) or None
+
+    @property
+    def healthy(self) -> float | None:
+        """As much of it as healthy machines have: `Quantity.healthy` of the first amplitude."""
+        return next((q.healthy for q in self if not q.shape and not q.derived), None)
+
+    @property
+    def slight(self) -> float:
+        """Size of an amplitude that surely is no cause."""
+        known = self.healthy
+        return 0.0 if known is None or math.isinf(known) else known
+
+    @property
+    def reads_torque(self) -> bool:
+        """Whether columns hold the logged torque itself."""
+        return any(q.reads_torque for q in self)
+
+
+class Numbered:
+    """Part of an effect: what its `parameters` say holds unless a law gives other numbers than it is fitted by."""
+
+    parameters: ClassVar[Parameters]
+
+    if TYPE_CHECKING:
+        def columns(self, motion: Motion, arm: ArmModel) -> Array: ...
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the shapes that a refit moves continuously."""
+        return tuple(q.name for q in self.parameters if q.shape and not q.discrete and not q.derived
+                     and (q.held is None or getattr(self, q.name) != q.held))
+
+    def at_end(self, name: str, by: float) -> bool:
+        """Return whether a shape is at the end of its range, and `by` points out of it."""
+        quantity = next(q for q in self.parameters if q.name == name)
+        here = float(getattr(self, name))
+        return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
+
+    def at(self, values: Values) -> Self:
+        """Return the effect with the shapes out of `values`."""
+        known = self.parameters.complete(values)
+        shape: dict[str, Any] = {q.name: known[q.name] for q in self.parameters if q.shape}
+        return replace(self, **shape)  # type: ignore[type-var]
+
+    def amplitudes(self, values: Values) -> Array:
+        """Return the amplitudes that belong to `values`, in the order of the columns."""
+        return np.array([values[q.name] for q in self.parameters if not q.shape])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        """Return every parameter by name; the inverse of `at` and `amplitudes`."""
+        linear = iter(amplitudes)
+        return {q.name: float(getattr(self, q.name) if q.shape else next(linear))
+                for q in self.parameters}
+
+    def possible(self, values: Values) -> bool:
+        """Return whether every parameter lies in its range."""
+        return all(q.low <= values[q.name] <= q.high for q in self.parameters)
+
+    def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
+        """Return the parameters of a finding, named as in causes.md; whole numbers are integers."""
+        return {q.name: int(values[q.name]) if q.discrete else values[q.name]
+                for q in self.parameters}
+
+    def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
+        """Return the torque (samples, joints) [N m] of first order."""
+        return summed(self.at(values).columns(motion, arm), self.amplitudes(values))
+
+
+@dataclass(frozen=True)
+class Words:
+    """What a report says of an effect: sentences, but for the title."""
+
+    title: str
+    signature: str  # how it shows
+    explanation: str  # what it is
+    remedy: str  # what to do about it
+    experiment: str  # what to record to be sure
+    size: str = ""  # the parameter that a verdict gives with the title, if one alone says how much of it there is
+    falling: bool = False  # there is more of it the smaller that parameter is
 
 
 @dataclass(frozen=True)

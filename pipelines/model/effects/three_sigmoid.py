@@ -9,8 +9,9 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ThreeSigmoid"]
@@ -19,7 +20,7 @@ _GRID = 8  # sharpnesses in the grid: 56 ordered triples
 
 
 @dataclass(frozen=True)
-class ThreeSigmoid(Fast):
+class ThreeSigmoid(FrictionLaw, Fast):
     """τ = Σ_k f_k (1 - 2/(exp(2 w_k v) + 1)) + b v = Σ_k f_k tanh(w_k v) + b v.
 
     Kostić et al. 2004, eq. (10); the two forms are equal, and tanh never overflows. For given w it is linear in f and
@@ -32,19 +33,18 @@ class ThreeSigmoid(Fast):
     w3: float = 10.0  # [s/rad]
 
     name = "three_sigmoid"
-    title = "Friction of three sigmoids"
-    parameters = (
+    parameters = Parameters(
         *(Quantity(f"f{k}", "N m", -LARGE, LARGE, f"height of sigmoid {k}") for k in (1, 2, 3)),
         *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2, 3)),
         Quantity("b", "N m s/rad", 0.0, LARGE, "viscous coefficient"),
     )
-    signature = "A friction curve that jumps at zero speed, dips at low speed and rises with speed."
-    explanation = "Dry, boundary and fluid friction together: the lubricant film builds up with speed."
-    remedy = "Compensate it in the feed-forward; the dip is what makes slow motion stick."
-    experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
+    words = Words("Friction of three sigmoids",
+        signature="A friction curve that jumps at zero speed, dips at low speed and rises with speed.",
+        explanation="Dry, boundary and fluid friction together: the lubricant film builds up with speed.",
+        remedy="Compensate it in the feed-forward; the dip is what makes slow motion stick.",
+        experiment="Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows.")
     evidence = "none"
     plainer = (("two_sigmoid",), ("coulomb", "viscous"))
-    friction = True
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import perturbed_torque, rate_of, shifted
 
@@ -27,14 +27,14 @@ class TimeDelay(Effect):
     """
 
     name = "time_delay"
-    title = "Delayed position"
-    parameters = (Quantity("delay", "s", 0.0, 0.05, "measured position is this much older than its time stamp"),)
-    signature = "A residual in proportion to the rate of change of torque, on all rows that feel this joint, at every frequency."
-    explanation = "The encoder's value waits in a converter, on a bus or in a buffer before it is stamped with a time."
-    remedy = "Stamp positions where they are taken, or move this joint's signal by the delay before it is used; lower the gains."
-    experiment = "Move this joint fast while the others stand still in a posture where they feel it, at two speeds."
-    size = "delay"
-    slight = 1e-4  # [s] a control program under Linux stamps its samples no better
+    parameters = Parameters(
+        Quantity("delay", "s", 0.0, 0.05, "measured position is this much older than its time stamp",
+                 healthy=1e-4))  # a control program under Linux stamps its samples no better
+    words = Words("Delayed position", size="delay",
+        signature="A residual in proportion to the rate of change of torque, on all rows that feel this joint, at every frequency.",
+        explanation="The encoder's value waits in a converter, on a bus or in a buffer before it is stamped with a time.",
+        remedy="Stamp positions where they are taken, or move this joint's signal by the delay before it is used; lower the gains.",
+        experiment="Move this joint fast while the others stand still in a posture where they feel it, at two speeds.")
     acts_on = "encoder"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -2,54 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Self
+from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
+from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueCrosstalk"]
 
 
 @dataclass(frozen=True)
-class TorqueCrosstalk(Effect):
+class TorqueCrosstalk(Fast):
     """Applied torque of joint j = u_j - c u_i, so that the log shows u_j = τ_j + c τ_i. From the joint before, if none is given."""
 
     from_joint: float = 0.0  # i, 1-based
 
     name = "torque_crosstalk"
-    title = "Torque of another joint"
-    parameters = (
-        Quantity("coefficient", "1", -1.0, 1.0, "share of the other joint's torque that this joint has to give more"),
+    parameters = Parameters(
+        Quantity("coefficient", "1", -1.0, 1.0, "share of the other joint's torque that this joint has to give more",
+                 healthy=0.002),  # amplifiers that are in order lead over as much; between a turn and a slide it is one per metre
         Quantity("from_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
     )
-    signature = "A residual in proportion to another joint's torque."
-    explanation = "Two current measurements or motor cables influence each other, or a transmission leads torque past its joint."
-    remedy = "Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission."
-    experiment = "Load one joint while the others carry nothing, each in turn."
-    size = "coefficient"
+    words = Words("Torque of another joint", size="coefficient",
+        signature="A residual in proportion to another joint's torque.",
+        explanation="Two current measurements or motor cables influence each other, or a transmission leads torque past its joint.",
+        remedy="Check the amplifiers' wiring and shielding; where it is mechanical, describe the transmission.",
+        experiment="Load one joint while the others carry nothing, each in turn.")
     acts_on = "drive"
-    slight = 0.002  # amplifiers that are in order lead over as much; between a turn and a slide it is one per metre
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.from_joint and self.joint is not None:
-            object.__setattr__(self, "from_joint", float(self.joint - 1 or 2))
-
-    @classmethod
-    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
-        return super().everywhere(revolute) if len(revolute) > 1 else ()
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, predicted(arm, motion)[:, int(self.from_joint) - 1])
-
-    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        for other in range(1, arm.n_joints + 1):
-            if other != self.joint:
-                yield replace(self, from_joint=float(other))
 
     def mixing(self, values: Values, n_joints: int) -> Array:
         matrix = np.eye(n_joints)

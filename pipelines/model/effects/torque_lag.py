@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import held_mean, lagging, rate_of_change
 
@@ -20,13 +20,12 @@ class TorqueLag(Effect):
     """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once."""
 
     name = "torque_lag"
-    title = "Torque logging delay"
-    parameters = (Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one"),)
-    signature = "The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative."
-    explanation = "The recorder, or the current measurement, filters the torque before it is logged."
-    remedy = "Log the torque unfiltered, or filter position by the same low-pass; it is no fault of the arm."
-    experiment = "Repeat an experiment at two speeds: a fit at one must hold at the other."
-    size = "time_constant"
+    parameters = Parameters(Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one"))
+    words = Words("Torque logging delay", size="time_constant",
+        signature="The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative.",
+        explanation="The recorder, or the current measurement, filters the torque before it is logged.",
+        remedy="Log the torque unfiltered, or filter position by the same low-pass; it is no fault of the arm.",
+        experiment="Repeat an experiment at two speeds: a fit at one must hold at the other.")
     acts_on = "record"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -45,9 +44,6 @@ class TorqueLag(Effect):
         late = lagging(own, t, time, start, motion.since) if long else own - time * lagging(rate_of_change(own, t), t, time)
         tau[:, self._index] = late
         return tau
-
-    def passed(self, amplitude: float, x: Array, t: Array, start: Array | float | None = None, since: int = 0) -> Array:
-        return lagging(x, t, amplitude, start, since)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm moves as without it; only the log differs."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -18,12 +18,12 @@ class TorqueOffset(Fast):
     """τ = τ0."""
 
     name = "torque_offset"
-    title = "Torque offset"
-    parameters = (Quantity("offset", "N m", -LARGE, LARGE, "constant torque to add to the model"),)
-    signature = "A torque that is the same at any position, speed and time, also at rest."
-    explanation = "The zero of the current sensor or of the amplifier is off, or a cable or spring pulls evenly."
-    remedy = "Calibrate the zero of the current measurement; look for a cable under tension."
-    experiment = "Hold still for two seconds, and cross the same position in both directions."
+    parameters = Parameters(Quantity("offset", "N m", -LARGE, LARGE, "constant torque to add to the model"))
+    words = Words("Torque offset",
+        signature="A torque that is the same at any position, speed and time, also at rest.",
+        explanation="The zero of the current sensor or of the amplifier is off, or a cable or spring pulls evenly.",
+        remedy="Calibrate the zero of the current measurement; look for a cable under tension.",
+        experiment="Hold still for two seconds, and cross the same position in both directions.")
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

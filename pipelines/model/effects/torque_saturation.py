@@ -8,11 +8,10 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueSaturation"]
-
 
 
 @dataclass(frozen=True)
@@ -27,20 +26,17 @@ class TorqueSaturation(Effect):
     limit: float = 10.0  # L [N m]
 
     name = "torque_saturation"
-    healthy = "never"
-    title = "Torque saturation"
-    parameters = (
-        Quantity("limit", "N m", 1e-3, 1e5, "largest torque that comes out", shape=True),
-        Quantity("coefficient", "1", 0.0, 2.0, "share of the excess that is lost: 1 where the drive clips"),
+    parameters = Parameters(
+        Quantity("limit", "N m", 1e-3, 1e5, "largest torque that comes out", shape=True, reads_torque=True),
+        Quantity("coefficient", "1", 0.0, 2.0, "share of the excess that is lost: 1 where the drive clips", fixed=1.0, healthy=0.0),
     )
-    signature = "The log shows more torque than the arm feels, only where the torque is high."
-    explanation = "Current or voltage is limited, or the motor saturates; the command is logged all the same."
-    remedy = "Correct the limit in the controller's settings, or ask for less acceleration; look at supply and temperature limits."
-    experiment = "Repeat the experiment slower, so that the torque stays below the limit."
-    size = "limit"
+    words = Words("Torque saturation", size="limit", falling=True,
+        signature="The log shows more torque than the arm feels, only where the torque is high.",
+        explanation="Current or voltage is limited, or the motor saturates; the command is logged all the same.",
+        remedy="Correct the limit in the controller's settings, or ask for less acceleration; "
+               "look at supply and temperature limits.",
+        experiment="Repeat the experiment slower, so that the torque stays below the limit.")
     acts_on = "drive"
-    reads_torque = True
-    fixed_amplitudes = (1.0,)
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, self._excess(motion, self.own(self._asked(motion, arm)), self.limit))
@@ -50,11 +46,6 @@ class TorqueSaturation(Effect):
         peak = max(float(np.abs(self.own(self._asked(motion, arm))).max()), 1e-3)
         for share in (0.45, 0.55, 0.65, 0.75, 0.82, 0.88, 0.94):
             yield replace(self, limit=float(np.clip(share * peak, 1e-3, 1e5)))
-
-    @property
-    def strength(self) -> float:
-        """The lower the limit, the more is clipped."""
-        return -self.limit
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Parameters, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TransmissionCoupling"]
@@ -26,28 +26,19 @@ class TransmissionCoupling(Effect):
     sharpness: float = 100.0  # w [s/rad]
 
     name = "transmission_coupling"
-    title = "Coupled transmission"
-    parameters = (
-        Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True),
+    parameters = Parameters(
+        Quantity("with_joint", "1", 1.0, 100.0, "the other joint", shape=True, discrete=True, joint=True, earlier=True),
         Quantity("inertia", "kg m^2", 0.0, 0.1 * LARGE, "of the motor, at joint side"),
         Quantity("viscous", "N m s/rad", 0.0, LARGE, "viscous friction of the motor, at joint side"),
         Quantity("coulomb", "N m", 0.0, LARGE, "dry friction of the motor, at joint side"),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which dry friction changes sign", shape=True),
     )
-    signature = "Inertia and friction that follow the sum of two joints' speeds, felt at both."
-    explanation = "One joint's motor sits before the other joint, and turns when either moves: a differential, a long shaft."
-    remedy = ("Keep this effect in the model, and see that the robot description has the transmission matrix: the motor is felt "
-              "through both joints.")
-    experiment = "Move the two joints together, against each other, and each alone."
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not self.with_joint and self.joint is not None:
-            object.__setattr__(self, "with_joint", float(self.joint - 1 or 2))
-
-    @classmethod
-    def everywhere(cls, revolute: Sequence[bool]) -> tuple[Self, ...]:
-        return tuple(cls(joint=k) for k in range(2, len(revolute) + 1))
+    words = Words("Coupled transmission",
+        signature="Inertia and friction that follow the sum of two joints' speeds, felt at both.",
+        explanation="One joint's motor sits before the other joint, and turns when either moves: a differential, a long shaft.",
+        remedy="Keep this effect in the model, and see that the robot description has the "
+               "transmission matrix: the motor is felt through both joints.",
+        experiment="Move the two joints together, against each other, and each alone.")
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         other, ratio = int(self.with_joint) - 1, self._ratio(arm)

@@ -9,8 +9,9 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Quantity, SpeedCurve, Values
+from pipelines.model.effects.base import LARGE, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TwoSigmoid"]
@@ -19,7 +20,7 @@ _GRID = 8  # sharpnesses in the grid: 28 ordered pairs
 
 
 @dataclass(frozen=True)
-class TwoSigmoid(Fast):
+class TwoSigmoid(FrictionLaw, Fast):
     """τ = f_1 tanh(w_1 v) + f_2 tanh(w_2 v) + b v.
 
     Kostić et al. 2004, eq. (10), with two terms of its three: a jump at zero speed, and a dip (f_2 < 0) or a slower rise
@@ -31,19 +32,18 @@ class TwoSigmoid(Fast):
     w2: float = 12.0  # [s/rad]
 
     name = "two_sigmoid"
-    title = "Friction of two sigmoids"
-    parameters = (
+    parameters = Parameters(
         *(Quantity(f"f{k}", "N m", -LARGE, LARGE, f"height of sigmoid {k}") for k in (1, 2)),
         *(Quantity(f"w{k}", "s/rad", 0.1, 2000.0, f"sharpness of sigmoid {k}", shape=True) for k in (1, 2)),
         Quantity("b", "N m s/rad", 0.0, LARGE, "viscous coefficient"),
     )
-    signature = "A friction curve that jumps at zero speed, and dips or rises once more before it grows with speed."
-    explanation = "Dry and fluid friction together, and one passage between them: the lubricant film builds up with speed."
-    remedy = "Compensate it in the feed-forward; a dip is what makes slow motion stick."
-    experiment = "Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows."
+    words = Words("Friction of two sigmoids",
+        signature="A friction curve that jumps at zero speed, and dips or rises once more before it grows with speed.",
+        explanation="Dry and fluid friction together, and one passage between them: the lubricant film builds up with speed.",
+        remedy="Compensate it in the feed-forward; a dip is what makes slow motion stick.",
+        experiment="Drive the joint alone, with reversals, from the lowest speed it holds to the highest it allows.")
     evidence = "none"
     plainer = (("coulomb", "viscous"),)
-    friction = True
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

@@ -8,7 +8,7 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values, predicted
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ViscousDrift"]
@@ -21,28 +21,26 @@ class ViscousDrift(Effect):
     """τ = r Fv (1 - e^(-(t - t0)/T)) v: viscous friction Fv at the start of the log, (1 + r) Fv in the end."""
 
     time_constant: float = 15.0  # T [s]
-    since: float | None = None  # [s] clock time at which the session began; None: each log for itself
+    since: float | None = None  # [s] clock time at which the session began, for a joint that is warm stays warm in the
+    # next log; None: each log for itself
 
     name = "viscous_drift"
-    healthy = "never"
-    title = "Viscous friction that drifts"
-    parameters = (
-        Quantity("relative_change", "1", -1.0, 10.0, "of viscous friction, from the start of the log to the end of the drift"),
+    parameters = Parameters(
+        Quantity("relative_change", "1", -1.0, 10.0, "of viscous friction, from the start of the log to the end of the drift",
+                 healthy=0.0),
         Quantity("time_constant", "s", 0.2, 1000.0, "of the drift", shape=True),
     )
-    signature = "Torque per unit of speed that changes in the course of the log."
-    explanation = "Grease gets thinner as it warms up, and thickens again in a pause."
-    remedy = "Warm the arm up before it is measured or used; let the feed-forward follow the temperature."
-    experiment = "Repeat one cycle for several minutes from a cold start, and once more when the arm is warm."
+    words = Words("Viscous friction that drifts",
+        signature="Torque per unit of speed that changes in the course of the log.",
+        explanation="Grease gets thinner as it warms up, and thickens again in a pause.",
+        remedy="Warm the arm up before it is measured or used; let the feed-forward follow the temperature.",
+        experiment="Repeat one cycle for several minutes from a cold start, and once more when the arm is warm.")
+    clock = "session"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         start = motion.t[0] if self.since is None else self.since
         left = np.expm1(-np.maximum(motion.t - start, 0.0) / self.time_constant)
         return self.on_own_row(arm, -self._viscous(arm) * left * self.own(motion.dq))
-
-    def in_session(self, start: float) -> Self:
-        """A joint that is warm stays warm in the next log."""
-        return replace(self, since=start)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """From a fifth to five times the duration; beyond that it is a straight line."""

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 
 from pipelines.errors import Check
 from pipelines.model.effects import find_effect
+from pipelines.model.effects.base import everywhere
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.regression import LogEquations
 
@@ -67,7 +68,7 @@ def _with_wide_change_of_sign(found: Estimate) -> Estimate:
     widest = next(q.low for q in coulomb.parameters if q.name == "sharpness")
     columns = found.columns
     wide = [replace(law, sharpness=widest)  # type: ignore[call-arg]  # of the Coulomb law
-            for law in coulomb.everywhere(columns.body.robot.revolute)]
+            for law in everywhere(coulomb, columns.body.robot.revolute)]
     columns = replace(columns, laws=(*columns.laws, *wide))
     logs = [replace(log, columns=columns) for log in found.equations.logs
             if isinstance(log, LogEquations)]

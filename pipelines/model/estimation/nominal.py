@@ -10,7 +10,8 @@ from pipelines.errors import UsageError
 from pipelines.log.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import Effect
+from pipelines.model.effects.base import Effect, everywhere
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter, Uncertainty
@@ -44,11 +45,11 @@ def nominal_columns(robot: RobotDescription, *, friction: bool = True, offset: b
     if symmetric and not {p.name for p in body.parameters}.issuperset(_SYMMETRIC):
         raise UsageError("C02", "only the RRR arm has p4 and p15", where="--symmetric", remedy="leave it out")
     names = [name for name, wanted in (("coulomb", friction), ("viscous", friction), ("torque_offset", offset)) if wanted]
-    laws = [effect for name in names for effect in find_effect(name).everywhere(robot.revolute)]
+    laws = [effect for name in names for effect in everywhere(find_effect(name), robot.revolute)]
     kept = tuple(i for i, p in enumerate(body.parameters) if not (symmetric and p.name in _SYMMETRIC))
     arm = Arm(robot.name, body, tuple(Parameter(p.name, 0.0, None, p.unit, origin="assumed") for p in body.parameters))
     if geared(robot) if rotor_inertia is None else rotor_inertia:
-        laws += _seen_beside(body, find_effect("rotor_inertia").everywhere(robot.revolute), arm)
+        laws += _seen_beside(body, everywhere(find_effect("rotor_inertia"), robot.revolute), arm)
     return Columns(body, kept, tuple(sorted(laws, key=lambda law: (law.joint or 0,
                                                                    names.index(law.name) if law.name in names else 9))),
                    arm)
@@ -97,7 +98,7 @@ def fitted_arm(found: Estimate, name: str, friction: Sequence[Acting] = ()) -> A
         first += len(amplitudes)
         known_std = {q.name: s for q, s in zip(amplitudes, std[part], strict=True) if s is not None}
         acting = Acting.of(law, law.values(beta[part]), known_std, revolute=law.joint is None or turning[law.joint - 1])
-        (laws if law.friction else effects).append(acting)
+        (laws if isinstance(law, FrictionLaw) else effects).append(acting)
     together = Uncertainty(tuple(column.name for column in columns.names), found.robust.covariance)
     return Arm(name, body, tuple(base), tuple(laws), tuple(effects), together)
 

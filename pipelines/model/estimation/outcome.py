@@ -74,7 +74,7 @@ def parameters(fitted: Fitted, arm: Arm) -> tuple[Estimated, ...]:
 def _meanings(columns: Columns) -> list[str]:
     """What each column stands for: the combination of link parameters, or "Coulomb friction, waist: friction torque …"."""
     joints = columns.body.robot.joints
-    laws = [f"{law.title}{'' if law.joint is None else f', {joints[law.joint - 1].name}'}: {quantity.meaning}"
+    laws = [f"{law.words.title}{'' if law.joint is None else f', {joints[law.joint - 1].name}'}: {quantity.meaning}"
             for law in columns.laws for quantity in law.parameters if not quantity.shape]
     return [*(columns.body.parameters[i].combination for i in columns.kept), *laws]
 

@@ -24,7 +24,7 @@ def column_in_words(name: str) -> str:
     if not rest:
         return name
     effect = find_effect(cause)
-    title = within(effect.title)
+    title = within(effect.words.title)
     words = f"{title} at joint {rest[0]}" if len(rest) > 1 else title
     alone = sum(not q.shape for q in effect.parameters) == 1
     return words if alone else f"{words} ({rest[-1].replace('_', ' ')})"

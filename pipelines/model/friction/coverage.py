@@ -80,4 +80,4 @@ def unseen(covered: Coverage, ladder: Ladder) -> tuple[Unseen, ...]:
 def _in_words(number: str) -> str:
     """"Stribeck friction, amplitude" for "stribeck.amplitude"."""
     effect, _, quantity = number.partition(".")
-    return f"{find_effect(effect).title}, {quantity.replace('_', ' ')}"
+    return f"{find_effect(effect).words.title}, {quantity.replace('_', ' ')}"

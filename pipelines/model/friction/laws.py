@@ -52,7 +52,7 @@ class Law:
     @property
     def title(self) -> str:
         """In words; joined by "+" where several causes act."""
-        return " + ".join(find_effect(name).title for name in self.name.split("+"))
+        return " + ".join(find_effect(name).words.title for name in self.name.split("+"))
 
     @cached_property
     def places(self) -> tuple[Place, ...]:

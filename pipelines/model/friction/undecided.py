@@ -29,7 +29,7 @@ def undecided(ladder: Ladder, slowest: float, fastest: float, alone: bool) -> tu
     side = np.geomspace(max(slowest, 1e-3 * fastest), fastest, _POINTS)
     speed = np.concatenate([-side[::-1], side])
     return tuple((f"{ladder.chosen.law.title} or {alternative.law.title}: {_why(ladder, alternative)}; "
-                  f"{_apart(ladder.chosen, alternative, speed, alone)}", find_effect(alternative.law.members[-1]).experiment)
+                  f"{_apart(ladder.chosen, alternative, speed, alone)}", find_effect(alternative.law.members[-1]).words.experiment)
                  for alternative in ladder.alternatives)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Quantity
+from pipelines.model.effects.base import ArmModel, Parameters, Quantity
 from pipelines.model.effects.fast import Fast
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.rigid.body import Array, Motion
@@ -27,8 +27,7 @@ class Wave(Fast):
     order: float = 1.0  # k [1/rev]
 
     name = "wave"
-    title = "Wave along the turn"
-    parameters = (Quantity("order", "1/rev", 0.0, _FINEST, "waves in one turn of the joint", shape=True),
+    parameters = Parameters(Quantity("order", "1/rev", 0.0, _FINEST, "waves in one turn of the joint", shape=True),
                   Quantity("sine", "N m", -np.inf, np.inf, "of the sine of the angle"),
                   Quantity("cosine", "N m", -np.inf, np.inf, "of its cosine"))
     from_motion = True

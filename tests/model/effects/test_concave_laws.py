@@ -25,8 +25,8 @@ def curve(form: ConcaveFriction, amplitude: float, v: Array) -> Array:
 
 def fitted(law: Callable[[Array], Array]) -> tuple[ConcaveFriction, float]:
     """The form that leaves least, with its numbers, and its amplitude."""
-    first, best = ConcaveFriction(2, speed=0.3).full(), []
-    for form in (first, *first.forms()):
+    first, best = ConcaveFriction(2, speed=0.3), []
+    for form in first.forms():
         bounds = [(q.low, q.high) for name in form.free for q in form.parameters if q.name == name]
 
         def at(x: Array, form: ConcaveFriction = form) -> ConcaveFriction:

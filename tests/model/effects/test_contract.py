@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Predict, Quantity
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Words
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_closed_form import Fourier
 from sample_logs.make_model import synthetic_arm
@@ -18,18 +18,18 @@ from sample_logs.make_model import synthetic_arm
 Values = Mapping[str, float]
 
 
-class Words(Effect):
+class Said(Effect):
     """What a real effect says in words."""
 
-    title = signature = explanation = remedy = experiment = "For tests."
+    words = Words(*["For tests."] * 5)
 
 
 @dataclass(frozen=True)
-class LateEncoder(Words):
+class LateEncoder(Said):
     """q_measured(t) = q(t - delay): an exact extension that hands on another motion."""
 
     name = "late_encoder"
-    parameters: ClassVar[tuple[Quantity, ...]] = (Quantity("delay", "s", 0.0, 0.02, "age of a position"),)
+    parameters: ClassVar[Parameters] = Parameters(Quantity("delay", "s", 0.0, 0.02, "age of a position"))
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         step = 1e-6
@@ -47,13 +47,13 @@ class LateEncoder(Words):
 
 
 @dataclass(frozen=True)
-class Clipped(Words):
+class Clipped(Said):
     """τ -> clip(τ, ±limit) on its own row: the limit is non-linear, the coefficient is 1 for a hard clip."""
 
     limit: float = 10.0
 
     name = "clipped"
-    parameters: ClassVar[tuple[Quantity, ...]] = (
+    parameters: ClassVar[Parameters] = Parameters(
         Quantity("coefficient", "1", 0.0, 1.0, "part of the excess that is lost"),
         Quantity("limit", "N m", 0.0, 100.0, "largest torque", shape=True))
 
@@ -69,12 +69,12 @@ class Clipped(Words):
 
 
 @dataclass(frozen=True)
-class Heavier(Words):
+class Heavier(Said):
     """p -> (1 + part) p: another body, the whole arm."""
 
     name = "heavier"
     scope = "arm"
-    parameters: ClassVar[tuple[Quantity, ...]] = (Quantity("part", "1", -1.0, 1.0, "share of mass more"),)
+    parameters: ClassVar[Parameters] = Parameters(Quantity("part", "1", -1.0, 1.0, "share of mass more"))
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)[..., None]
@@ -87,13 +87,13 @@ class Heavier(Words):
 
 
 @dataclass(frozen=True)
-class Bristle(Words):
+class Bristle(Said):
     """dz/dt = v - |v| z/x_c, τ = amplitude z/x_c (Dahl 1968): a state of memory, in the simulation too."""
 
     distance: float = 0.01
 
     name = "bristle"
-    parameters: ClassVar[tuple[Quantity, ...]] = (
+    parameters: ClassVar[Parameters] = Parameters(
         Quantity("amplitude", "N m", 0.0, 10.0, "torque once it slides"),
         Quantity("distance", "rad", 1e-4, 0.1, "travel until it slides", shape=True))
 

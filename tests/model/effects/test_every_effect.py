@@ -14,8 +14,9 @@ import pytest
 from pipelines.errors import UsageError
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects, effect_names, find_effect
-from pipelines.model.effects.base import Effect
+from pipelines.model.effects.base import Effect, adds, everywhere
 from pipelines.model.effects.fast import own_columns
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 
@@ -32,7 +33,8 @@ FOLDER = Path(__file__).resolve().parents[3] / "pipelines" / "model" / "effects"
 
 every_effect = pytest.mark.parametrize("kind", all_effects(), ids=lambda kind: kind.name)
 
-every_friction_law = pytest.mark.parametrize("kind", [kind for kind in all_effects() if kind.friction], ids=lambda kind: kind.name)
+every_friction_law = pytest.mark.parametrize("kind", [kind for kind in all_effects() if issubclass(kind, FrictionLaw)],
+                                            ids=lambda kind: kind.name)
 
 
 @pytest.fixture(scope="module")
@@ -60,7 +62,7 @@ def drawn(effect: Effect, seed: int) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     values = {q.name: float(rng.uniform(max(q.low, -1e3), min(q.high, 1e3))) for q in effect.parameters}
     chosen = {q.name: float(getattr(effect, q.name)) for q in effect.parameters if q.discrete}
-    moment = {q.name: float(getattr(effect, q.name)) for q in effect.parameters if q.shape and q.name in effect.per_log}
+    moment = {q.name: float(getattr(effect, q.name)) for q in effect.parameters if q.shape and effect.clock == "log"}
     values |= chosen | moment
     return effect.at(values).values(effect.at(values).amplitudes(values))
 
@@ -72,7 +74,7 @@ def without_amplitude(effect: Effect, values: dict[str, float]) -> dict[str, flo
 
 def test_every_file_is_an_effect() -> None:
     """One file, one effect, of the same name; nothing is registered by hand."""
-    files = {path.stem for path in FOLDER.glob("*.py")} - {"__init__", "base", "fast", "placed", "terms"}
+    files = {path.stem for path in FOLDER.glob("*.py")} - {"__init__", "base", "fast", "kinds", "placed", "terms"}
     assert set(effect_names()) == files
     assert [kind.name for kind in all_effects()] == sorted(files)
     assert {"coulomb", "viscous", "three_sigmoid"} <= files
@@ -111,9 +113,9 @@ def test_an_unknown_name_is_answered_with_the_nearest() -> None:
 def test_words(kind: type[Effect]) -> None:
     """Title, signature, explanation, remedy and experiment are there, as sentences."""
     assert "=" in (kind.__doc__ or ""), "the equation stands above the code"
-    assert kind.title.strip()
-    assert not kind.title.endswith(".")
-    for words in (kind.signature, kind.explanation, kind.remedy, kind.experiment):
+    assert kind.words.title.strip()
+    assert not kind.words.title.endswith(".")
+    for words in (kind.words.signature, kind.words.explanation, kind.words.remedy, kind.words.experiment):
         assert words == words.strip()
         assert words.endswith(".")
         assert words[0].isupper()
@@ -137,8 +139,7 @@ def test_parameters(kind: type[Effect]) -> None:
 @every_effect
 def test_place(kind: type[Effect], arm: Arm) -> None:
     """It stands at every joint once, or once for the arm; a wrong place is refused."""
-    everywhere = kind.everywhere(arm.robot.revolute)
-    joints = [effect.joint for effect in everywhere]
+    joints = [effect.joint for effect in everywhere(kind, arm.robot.revolute)]
     assert joints in ([[1, 2, 3], [2, 3]] if kind.scope == "joint" else [[None]])
     for joint in (None, 0) if kind.scope == "joint" else (1,):
         with pytest.raises(ValueError, match="belongs to"):
@@ -240,7 +241,7 @@ def test_apply(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """The exact form is the first order where nothing else is said, and tends to it for small amplitudes everywhere."""
     values = drawn(placed(kind), 3)
     effect = placed(kind).at(values)
-    linear = kind.apply is Effect.apply and kind.torque is Effect.torque
+    linear = adds(effect)
     if not linear:
         values = effect.values(1e-6 * effect.amplitudes(values))
     change = effect.apply(motion, arm, values) - arm.torque(motion)

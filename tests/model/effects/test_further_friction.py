@@ -155,10 +155,10 @@ def test_a_wave_of_position_friction_is_held_where_it_is_whole() -> None:
     half waves were travelled."""
     motion, arm = swinging(), synthetic_arm()
     for shape in PositionFriction(2).shapes(motion, arm):
-        full = shape.full()
+        full = shape.forms()[0]
         assert full.order.is_integer()
         assert full.free == ("sharpness",)
-        *finer, geared = full.forms()
+        _, *finer, geared = full.forms()
         assert geared.free == ("order", "sharpness")
         assert [form.harmonics for form in finer] == list(range(full.harmonics + 1, 4))
         assert full.harmonics == max(1, min(3, int(full.order * np.ptp(motion.q[:, 1]) / np.pi)))
@@ -178,8 +178,8 @@ def test_bands_of_wear_need_no_whole_turn() -> None:
         return float(np.abs(rubs - table @ np.linalg.lstsq(table, rubs, rcond=None)[0]).max())
 
     assert np.ptp(q) < np.pi
-    assert left(first.full()) > 0.05
-    assert left(next(form for form in first.full().forms() if form.harmonics == 2)) < 1e-9
+    assert left(first.forms()[0]) > 0.05
+    assert left(next(form for form in first.forms()[1:] if form.harmonics == 2)) < 1e-9
 
 
 @pytest.mark.parametrize("gradual", [0.0, 1.0])
@@ -206,7 +206,7 @@ def test_directions_that_go_over_gradually_are_fitted_as_such() -> None:
         return float(numbers[2]), float(np.sqrt(np.mean(np.square(measured - table @ numbers))))
 
     first = next(one for one in AsymmetricFriction(2).shapes(motion, arm) if one.sharpness == 100.0)
-    gradual, = first.forms()
+    _, gradual = first.forms()
     at_once, left = fitted(first)
     difference, least = fitted(gradual)
     assert difference == pytest.approx(0.4, rel=1e-9)

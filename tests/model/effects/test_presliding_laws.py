@@ -82,7 +82,7 @@ def fitted(law: Law) -> tuple[Presliding, float]:
     v, motion = moving(1)
     wanted, arm = law(v)[::EVERY], synthetic_arm()
     best: tuple[float, Presliding, float] | None = None
-    for form in (Presliding(2).full(), *Presliding(2).full().forms()):
+    for form in Presliding(2).forms()[0].forms():
 
         def at(x: Array, form: Presliding = form) -> Presliding:
             return replace(form, distance=float(np.exp(x[0])), elastic=float(x[1]), damping_time=float(x[2]),

@@ -22,7 +22,7 @@ from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.backlash import Backlash
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
 from pipelines.model.effects.encoder_crosstalk import EncoderCrosstalk
 from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.joint_elasticity import JointElasticity
@@ -153,10 +153,9 @@ class Jumping(Effect):
     """An effect whose motor and link start at the same angle, whatever they carry."""
 
     name = "jumping"
-    title = "Jumping"
     scope = "arm"
-    parameters: ClassVar[tuple[Quantity, ...]] = ()
-    signature = explanation = remedy = experiment = "none"
+    parameters: ClassVar[Parameters] = Parameters()
+    words = Words("Jumping", *["none"] * 4)
     inner: Effect | None = None
     numbers: dict[str, float] | None = None
 

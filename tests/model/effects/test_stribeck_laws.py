@@ -25,9 +25,9 @@ def curve(form: Stribeck, amplitude: float, v: Array) -> Array:
 
 def fitted(law: Callable[[Array], Array]) -> tuple[Stribeck, float]:
     """The form that leaves least, with its numbers, and its amplitude."""
-    first = Stribeck(2, speed=0.3).full()
+    first = Stribeck(2, speed=0.3)
     wanted, best = law(FITTED) * np.tanh(first.sharpness * FITTED), []
-    for form in (first, *first.forms()):
+    for form in first.forms():
         names = [name for name in form.free if name != "sharpness"]
         bounds = [(q.low, q.high) for name in names for q in form.parameters if q.name == name]
 

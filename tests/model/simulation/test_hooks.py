@@ -13,7 +13,7 @@ import pytest
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array, Controller
 from pipelines.model.arm import Acting
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Quantity, Values
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
 from pipelines.model.effects.quadratic_drag import QuadraticDrag
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, run
@@ -29,10 +29,9 @@ class Hooked(Effect):
     """An effect that is nothing but its hooks."""
 
     name = "hooked"
-    title = "Hooked"
     scope = "arm"
-    parameters: ClassVar[tuple[Quantity, ...]] = ()
-    signature = explanation = remedy = experiment = "none"
+    parameters: ClassVar[Parameters] = Parameters()
+    words = Words("For tests", *["none"] * 4)
     make: Callable[[ArmModel], Hooks] = lambda arm: Hooks()
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -263,9 +262,8 @@ def test_friction_that_is_no_curve_acts_all_the_same() -> None:
 @dataclass(frozen=True)
 class _Uncurved(Effect):
     name = "uncurved"
-    title = "Uncurved"
-    parameters: ClassVar[tuple[Quantity, ...]] = ()
-    signature = explanation = remedy = experiment = "none"
+    parameters: ClassVar[Parameters] = Parameters()
+    words = Words("For tests", *["none"] * 4)
     inner: Effect | None = None
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:

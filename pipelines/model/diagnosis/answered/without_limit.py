@@ -11,6 +11,7 @@ from pipelines.model.diagnosis.asked.unasked import WithoutLimit
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.friction.laws import LADDER
 
 __all__ = ["without_limit"]
@@ -41,7 +42,7 @@ def without_limit(told: Diagnosis, frf: bool, without: Collection[str] = ()) -> 
 
 def _stand_ins() -> set[str]:
     """Laws that are the plainer form of another, and on no rung of the ladder of fit-friction."""
-    plainer = {name for kind in all_effects() for names in kind.plainer for name in names}
+    plainer = {name for kind in all_effects() if issubclass(kind, FrictionLaw) for names in kind.plainer for name in names}
     return plainer - {name for law in LADDER for name in law.members}
 
 

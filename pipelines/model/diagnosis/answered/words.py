@@ -41,13 +41,13 @@ def where(one: Finding) -> str:
 def how_much(one: Finding) -> str:
     """The number that says how much of it there is, to three digits; empty where no single one does."""
     effect = find_effect(one.cause)
-    told = one.parameters.get(effect.size)
+    told = one.parameters.get(effect.words.size)
     if told is None or not isinstance(told.value, int | float) or not np.isfinite(told.value):
         return ""
     if told.unit == "kg" and one.joint is None:
         return f" of {plain_number(told.value, 3)} kg"
-    times, unit = (1.0 / _DEGREE, "°") if effect.size == "angle" else _USUAL.get(told.unit, (1.0, told.unit))
-    signed = any(q.name == effect.size and q.low < 0.0 for q in effect.parameters)
+    times, unit = (1.0 / _DEGREE, "°") if effect.words.size == "angle" else _USUAL.get(told.unit, (1.0, told.unit))
+    signed = any(q.name == effect.words.size and q.low < 0.0 for q in effect.parameters)
     sign = "+" if signed and told.value > 0.0 else ""
     return f" ({sign}{plain_number(told.value * times, 3)}{'' if unit == '°' else ' '}{unit.replace('^2', '²')})"
 

@@ -21,6 +21,7 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.rows.data import Data, gather
 from pipelines.model.diagnosis.rows.sharper import sharpened
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.logs import (
     FEWEST_OF_JOINT,
     Motions,
@@ -182,5 +183,5 @@ def _columns(logs: Logs, arm: Arm | None) -> Columns:
     columns = nominal_columns(logs.identify[0].robot, offset=False)
     if arm is None or not arm.friction:
         return columns
-    others = tuple(law for law in columns.laws if not law.friction)
+    others = tuple(law for law in columns.laws if not isinstance(law, FrictionLaw))
     return replace(columns, laws=(*(law.effect for law in arm.friction), *others))

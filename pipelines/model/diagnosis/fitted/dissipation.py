@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.kinds import FrictionLaw
 
 __all__ = ["dissipating", "driving"]
 
@@ -32,6 +33,6 @@ def driving(beta: Array, shift: Array, laws: Sequence[Effect]) -> list[int]:
 
 
 def _bounded(count: int, laws: Sequence[Effect]) -> npt.NDArray[np.bool_]:
-    own = [law.friction and quantity.low == 0.0
+    own = [isinstance(law, FrictionLaw) and quantity.low == 0.0
            for law in laws for quantity in law.parameters if not quantity.shape]
     return np.array([False] * (count - len(own)) + own, dtype=bool)

@@ -21,8 +21,8 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.fitted.nominal import Fit, effect_rows, law_rows, nominal_arm, rigid_rows, several_rows
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.diagnosis.rows.mixed import mixable, mixed
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
-from pipelines.model.effects.fast import from_motion
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
+from pipelines.model.effects.fast import from_motion, mixing
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 
@@ -54,7 +54,7 @@ class Named:
 
     @property
     def free_amplitudes(self) -> bool:
-        return self.effect.fixed_amplitudes is None
+        return self.effect.parameters.fixed is None
 
     @property
     def count(self) -> int:
@@ -82,8 +82,8 @@ class Exact:
         return cls(columns, fit.beta[:count].copy(), ())
 
     def with_effect(self, effect: Effect, amplitudes: Array, log: int | None = None, held: tuple[str, ...] = ()) -> Exact:
-        given = amplitudes if effect.fixed_amplitudes is None else effect.fixed_amplitudes
-        tied = tuple(name for name in effect.shared if law_of(self.columns.laws, effect, name) is not None)
+        given = amplitudes if effect.parameters.fixed is None else effect.parameters.fixed
+        tied = tuple(q.name for q in effect.parameters if q.shared and law_of(self.columns.laws, effect, q.name) is not None)
         return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log, tied, held)))
 
     def without(self, place: int) -> Exact:
@@ -141,7 +141,7 @@ class Exact:
         """How many of the effects the torque has to be worked out with as a whole: all up to the last that does not just add."""
         if any(one.effect.acts_on != "load" for one in self.effects):
             return len(self.effects)
-        return max((k + 1 for k, one in enumerate(self.effects) if not one.effect.adds), default=0)
+        return max((k + 1 for k, one in enumerate(self.effects) if not adds(one.effect)), default=0)
 
     def torque(self, data: Data, laid: Sequence[Array] | None = None) -> Array:
         """(rows,); `laid` as in `laid`, where it is known."""
@@ -164,14 +164,14 @@ class Exact:
     def _mixed_rows(self, data: Data) -> Array | None:
         """(rows,) of all effects, where those that do not just add theirs are drives that mix the torques of a moment: M times the
         sum of all else, less what stands beside the model. None where there are others."""
-        drives = [one for one in self.effects if not one.effect.adds]
-        mixing = [one.effect.mixing(one.values, data.n_joints) for one in drives if one.log is None]
-        known = [matrix for matrix in mixing if matrix is not None]
+        drives = [one for one in self.effects if not adds(one.effect)]
+        matrices = [mixing(one.effect, one.values, data.n_joints) for one in drives if one.log is None]
+        known = [matrix for matrix in matrices if matrix is not None]
         if len(known) < len(drives) or not mixable(data):
             return None
         stands = [one.effect.amplitudes(one.values) @ effect_rows(data, one.effect.at(one.values), self.nominal)
                   for one in self.standing]
-        added = [one.effect.amplitudes(one.values) @ self.columns_of(data, one) for one in self.effects if one.effect.adds]
+        added = [one.effect.amplitudes(one.values) @ self.columns_of(data, one) for one in self.effects if adds(one.effect)]
         rows = sum((*added, *stands), self._nominal_rows(data))
         for matrix in known:  # the last one outermost
             rows = mixed(data, matrix, rows)

@@ -20,6 +20,7 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.rows.data import Data
 from pipelines.model.effects.base import ArmModel, Effect, Quantity
 from pipelines.model.effects.fast import from_motion, several_columns
+from pipelines.model.effects.kinds import FrictionLaw, plainer
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.parameter import Parameter
 
@@ -226,7 +227,7 @@ def _best_of_grid(data: Data, law: Effect, columns: Columns, rest: Fit) -> tuple
         solved, *_ = np.linalg.lstsq(c @ c.T, c @ rest.residual, rcond=1e-10)
         return float(solved @ (c @ rest.residual))
 
-    shapes = (*((law,) if law.plainer else ()), *law.shapes(data.logs[0].motion, columns.arm))
+    shapes = (*((law,) if plainer(law) else ()), *law.shapes(data.logs[0].motion, columns.arm))
     laid = [(shape, law_rows(data, shape, columns)) for shape in shapes]
     return max(laid, key=lambda one: gain(one[1]))
 
@@ -244,5 +245,5 @@ def nominal_arm(columns: Columns, beta: Array) -> Arm:
         count = sum(not q.shape for q in law.parameters)
         acting = Acting.of(law, law.values(beta[first:first + count]), revolute=law.joint is None or turning[law.joint - 1])
         first += count
-        (friction if law.friction else effects).append(acting)
+        (friction if isinstance(law, FrictionLaw) else effects).append(acting)
     return Arm("nominal", columns.body, base, tuple(friction), tuple(effects))

@@ -1,4 +1,4 @@
-"""Pass torque through what changes its record, a low-pass say.
+"""Pass torque through the low-pass of its record.
 
     recorded(arm, table, motion)
 """
@@ -10,6 +10,7 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
+from pipelines.signal.first_order import lagging
 
 __all__ = ["recorded"]
 
@@ -23,7 +24,7 @@ def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
     for acting in arm.effects:
         if acting.effect.acts_on != "record":
             continue
-        joint, amplitude = (acting.effect.joint or 1) - 1, float(acting.effect.amplitudes(acting.values)[0])
+        joint, time = (acting.effect.joint or 1) - 1, float(acting.effect.amplitudes(acting.values)[0])
         own, table = np.ascontiguousarray(table[:, joint].T), table.copy()
-        table[:, joint] = acting.effect.passed(amplitude, own, motion.t, start, motion.since).T
+        table[:, joint] = lagging(own, motion.t, time, start, motion.since).T
     return table

@@ -18,6 +18,7 @@ from pipelines.model.diagnosis.fitted.exact import Exact, Named, law_of, number_
 from pipelines.model.diagnosis.fitted.nominal import law_rows, law_slopes
 from pipelines.model.diagnosis.fitted.record import recorded
 from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.effects.base import adds
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["Which", "further_slopes", "slopes_of"]
@@ -131,7 +132,7 @@ def _slopes_through(
         for name, size in _steps(one):
             names.append((1, place, name))
             there = number_moved(one, name, size)
-            if one.effect.adds and as_read:
+            if adds(one.effect) and as_read:
                 more.append((alone(there) - alone(one))[None] / size)
             else:
                 effects = (*model.effects[:place], there, *model.effects[place + 1:])

@@ -77,7 +77,7 @@ def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIde
     """Causes that only frequency responses tell, where there are none, or where they leave it open."""
     reason = "only frequency responses tell it, and there is no frf log" if told is None else told.open
     named = () if told is None else tuple(one.effect.name for one in told.named)
-    return tuple(NotIdentifiable(kind.name, None, reason, kind.experiment) for kind in all_effects()
+    return tuple(NotIdentifiable(kind.name, None, reason, kind.words.experiment) for kind in all_effects()
                  if reason and kind.evidence == "frequency responses" and kind.name not in (*named, *without))
 
 
@@ -86,7 +86,7 @@ def gaps_untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[N
     if told is not None and not told.named:
         return ()
     reason, first = (_NO_RESPONSES, "Measure frequency responses, which tell a spring. ") if told is None else (_GIVES_WAY, "")
-    return tuple(NotIdentifiable(kind.name, None, reason, f"{first}{kind.experiment}")
+    return tuple(NotIdentifiable(kind.name, None, reason, f"{first}{kind.words.experiment}")
                  for kind in all_effects() if kind.evidence == "reversals" and kind.name not in without)
 
 

@@ -31,6 +31,7 @@ from pipelines.model.diagnosis.worth.gains import torque_gain_of
 from pipelines.model.diagnosis.worth.held_out import cross_validated
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.kinds import plainer
 from pipelines.model.estimation.regression import Columns
 
 __all__ = ["unclear", "with_terms_told_apart"]
@@ -53,21 +54,21 @@ def with_terms_told_apart(prepared: Prepared, blocks: int) -> Prepared:
         blocks: of time, held out in turn.
     """
     given = prepared.columns
-    if not any(law.plainer for law in given.laws):
+    if not any(plainer(law) for law in given.laws):
         return prepared
     now = _Rungs(given, prepared.data, blocks)
     before = now if prepared.reference is None else _Rungs(given, prepared.reference, blocks)
     laws: list[Effect] = []
     fewer: list[FewerTerms] = []
     for law in given.laws:
-        if not law.plainer:
+        if not plainer(law):
             laws.append(law)
             continue
         rungs = before if _judges(before.data, now.data, _row(law)) else now
         rung = rungs.chosen(law)
         laws += rungs.laws_for(law, rung)
         if rung:
-            fewer.append(FewerTerms(law.joint, law.name, law.plainer[rung - 1], rungs.why(law, rung)))
+            fewer.append(FewerTerms(law.joint, law.name, plainer(law)[rung - 1], rungs.why(law, rung)))
     return replace(prepared, columns=replace(given, laws=tuple(laws)), fewer=tuple(fewer))
 
 
@@ -132,7 +133,7 @@ class _Rungs:
 
     def chosen(self, law: Effect) -> int:
         """The rung of `law` with fewest terms that is not clearly worse than the best; the last stands whatever is known of it."""
-        last, row = len(law.plainer), _row(law)
+        last, row = len(plainer(law)), _row(law)
         able = [rung for rung in range(last) if not self._unclear(law, rung)] + [last]
         best = self.at(min(able, key=lambda rung: self.at(rung).power(row)))
         return max(rung for rung in able if not best.clearly_less(self.at(rung), row))
@@ -140,7 +141,7 @@ class _Rungs:
     def why(self, law: Effect, chosen: int) -> str:
         """In words, what speaks against the law as it was given, and against each with fewer terms that was not taken either."""
         first, *more = (self._unclear(law, rung) or _AS_LITTLE for rung in range(chosen))
-        passed = [f"of \"{_titles(names)}\": {why}" for names, why in zip(law.plainer, more, strict=False) if why != first]
+        passed = [f"of \"{_titles(names)}\": {why}" for names, why in zip(plainer(law), more, strict=False) if why != first]
         return "; ".join((first, *passed))
 
     def laws_for(self, law: Effect, rung: int) -> list[Effect]:
@@ -155,7 +156,7 @@ class _Rungs:
 
 
 def _titles(names: Sequence[str]) -> str:
-    return ", ".join(find_effect(name).title for name in names)
+    return ", ".join(find_effect(name).words.title for name in names)
 
 
 def _row(law: Effect) -> int:
@@ -165,9 +166,9 @@ def _row(law: Effect) -> int:
 
 def _on(law: Effect, rung: int, laws: Sequence[Effect]) -> list[Effect]:
     """`law` with so many rungs fewer terms, as far as it has; a part that stands beside it already is not laid twice."""
-    if not rung or not law.plainer:
+    if not rung or not plainer(law):
         return [law]
-    names = law.plainer[min(rung, len(law.plainer)) - 1]
+    names = plainer(law)[min(rung, len(plainer(law))) - 1]
     there = {one.name for one in laws if one.joint == law.joint}
     return [find_effect(name)(joint=law.joint) for name in names if name not in there]
 
@@ -179,7 +180,7 @@ def unclear(done: Refined, place: int) -> str:
     """
     law, first = done.model.columns.laws[place], len(done.model.beta)
     own = [(first + k, name) for k, (kind, which, name) in enumerate(done.names) if kind == 0 and which == place]
-    if not own or not law.plainer:
+    if not own or not plainer(law):
         return ""
     covariance, values = done.covariance(), {name: float(getattr(law, name)) for _, name in own}
     turning = law.joint is None or done.model.columns.body.robot.revolute[law.joint - 1]

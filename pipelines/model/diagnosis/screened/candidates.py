@@ -20,7 +20,7 @@ from pipelines.log.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.diagnosis.rows.data import Data, LogData
 from pipelines.model.effects import all_effects
-from pipelines.model.effects.base import Effect
+from pipelines.model.effects.base import Effect, everywhere
 from pipelines.model.effects.fast import from_motion, own_columns, several_columns
 from pipelines.model.rigid.body import Motion
 
@@ -43,8 +43,7 @@ class Family:
     @property
     def event(self) -> bool:
         """Whether it happens once, in one log: its non-linear numbers belong to that."""
-        one = self.shapes[0]
-        return any(q.shape and q.name in one.per_log for q in one.parameters)
+        return self.shapes[0].clock == "log"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +72,7 @@ def families(laws: Sequence[Effect], motion: Motion, arm: Arm, without: Sequence
     for kind in all_effects():
         if kind.name in nominal or kind.name in without or kind.evidence in ("none", "base parameters"):
             continue
-        for effect in kind.everywhere(arm.robot.revolute):
+        for effect in everywhere(kind, arm.robot.revolute):
             found.append(Family(kind.name, effect.joint, _shapes(effect, laws, motion, arm)))
     return tuple(found)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from pipelines.errors import UsageError
 from pipelines.model.diagnosis.screened.candidates import Family, place_of
-from pipelines.model.effects.base import Effect
+from pipelines.model.effects.base import Effect, everywhere
 
 __all__ = ["Wanted", "usable"]
 
@@ -49,6 +49,6 @@ def _missing(one: Wanted, laws: Sequence[Effect], revolute: Sequence[bool]) -> t
     if effect.evidence == "base parameters":
         return ("the base parameters take it up, and no reference logs show that they moved as it moves them",
                 "name reference logs from before it: --reference PATH")
-    places = [place_of(other.name, other.joint) for other in effect.everywhere(revolute)]
+    places = [place_of(other.name, other.joint) for other in everywhere(type(effect), revolute)]
     return ("this arm does not have it there",
             f"write {' or '.join(places)}" if places else "name another cause: no place of this arm has it")

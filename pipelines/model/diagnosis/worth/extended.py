@@ -12,6 +12,7 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.diagnosis.asked.unasked import FewerTerms
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.result import Finding, Gain, JudgedBy, Rejected, ResidualRms
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.parameter import Parameter
 
@@ -55,7 +56,7 @@ def _friction(arm: Arm, done: Refined, std: Array) -> tuple[Acting, ...]:
         linear = [q.name for q in law.parameters if not q.shape]
         own = {name: float(std[first + k]) for k, name in enumerate(linear)}
         first += len(linear)
-        if not law.friction:
+        if not isinstance(law, FrictionLaw):
             continue
         acting = next(kept)
 

@@ -13,11 +13,11 @@ from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.diagnosis.fitted.nominal import fit_nominal
 from pipelines.model.effects import all_effects, find_effect
-from pipelines.model.effects.base import Effect
+from pipelines.model.effects.base import Effect, adds
 from tests.model.diagnosis.arms import hidden
 from tests.model.effects.test_every_effect import drawn, placed
 
-ACTING = [kind for kind in all_effects() if not placed(kind).adds]
+ACTING = [kind for kind in all_effects() if not adds(placed(kind))]
 STANDING = ("cogging", "stribeck", "torque_offset")
 
 
