@@ -242,7 +242,8 @@ class Later:
     def _mostly_acting(self, effect: Effect) -> bool:
         """Return whether an effect acts in most rows: a joint that is clipped so follows nothing."""
         logs, arm = self.rows.data.logs, self.dataset.arm
-        acting = [one.at_rows(effect.columns(one.motion, arm).any(axis=2)).T.ravel() for one in logs]
+        table = [np.any(effect.columns(one.motion, arm), axis=2) for one in logs]
+        acting = [one.at_rows(x).T.ravel() for one, x in zip(logs, table, strict=True)]
         own = self.rows.data.counts & (self.rows.joint == (effect.joint or 1) - 1)
         return float(np.concatenate(acting)[own].mean()) > _HALF
 
