@@ -100,7 +100,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 def _of_one_robot(logs: Sequence[ExperimentLog], label: str) -> None:
     if len({log.robot_text for log in logs}) > 1:
         raise UsageError("C02", "logs of several robots", where=label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+                         remedy="name the logs of one; 'rrrid batch' takes a folder of several")
 
 
 def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], settings: Settings, law: Law | None,

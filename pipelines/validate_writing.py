@@ -161,7 +161,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                              remedy="record the writing task with role validate; --text RRR designs it")
     if len({log.robot_text for log in logs}) > 1:
         raise UsageError("C02", "logs of several robots", where=inputs.label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+                         remedy="name the logs of one; 'rrrid batch' takes a folder of several")
     arm, said = _model(inputs, logs, judges)
     found = validate(judges, arm, Effort(settings.torque_gate, settings.draws, settings.seed, settings.simulate))
     done = found.imitation

@@ -73,7 +73,7 @@ def logs_of_roles(logs: Sequence[ExperimentLog], label: str) -> Logs:
     known = [log for log in logs if log.origin != "planned"]
     if len({log.robot_text for log in known}) > 1:
         raise UsageError("C02", "logs of several robots", where=label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
+                         remedy="name the logs of one; 'rrrid batch' takes a folder of several")
     chosen = Logs.by_role(known)
     if not chosen.identify:
         kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in known})) or "none"
