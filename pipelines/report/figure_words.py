@@ -13,14 +13,18 @@ from pipelines.report.diagnosis_words import named, spoken
 __all__ = ["figure_in_words"]
 
 
-def figure_in_words(name: str) -> str:
-    """`name`, which `log.result_figures` gave, with its cause in words; as it is where it is of none."""
+def figure_in_words(name: str, within: bool = False) -> str:
+    """`name`, which `log.result_figures` gave, with its cause in words; as it is where it is of none.
+
+    Args:
+        within: it stands within a sentence, and begins small.
+    """
     found = named_in(name)
     if found is None:
         return name
     said, parameter = _of_a_joint(found) if found.of_law else (named(found.cause, found.joint), found.what)
     parameter = spoken(parameter)
-    said = f"{found.before}: {said}" if found.before else f"{said[:1].upper()}{said[1:]}"
+    said = f"{found.before}: {said}" if found.before else said if within else f"{said[:1].upper()}{said[1:]}"
     return f"{said}, {parameter}" if parameter else said
 
 
