@@ -130,7 +130,7 @@ def _only(a: Mapping[str, Any], b: Mapping[str, Any]) -> tuple[tuple[str, ...], 
 
 def _modelled(result: Mapping[str, Any]) -> set[tuple[str, int | None]]:
     """What its models have."""
-    return {(cause, joint) for _, cause, joint in modelled(result)}
+    return set(modelled(result))
 
 
 def _chosen(result: Mapping[str, Any]) -> set[tuple[str, int | None]]:
@@ -145,17 +145,15 @@ def _answers(a: Mapping[str, Any], b: Mapping[str, Any]) -> Iterator[Answer]:
         yield Answer(what, said[0].get(what, "–"), said[1].get(what, "–"))
 
 
-def _said(result: Mapping[str, Any], place: str = "") -> Iterator[tuple[str, str]]:
+def _said(result: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     if isinstance(result.get("verdict"), str):
-        yield f"{place}verdict", result["verdict"]
+        yield "verdict", result["verdict"]
     for kind in ("findings", "baseline_effects"):
         if isinstance(result.get(kind), list):  # what stands is named already where `extend` says it
             places = (one if kind == "baseline_effects" and isinstance(one, str) else _place(one) for one in result[kind])
-            yield f"{place}{kind}", ", ".join(sorted(places)) or "none"
+            yield kind, ", ".join(sorted(places)) or "none"
     for one in result.get("stages") or ():
-        yield f"{place}{one['name']} ends in", str(one["exit"])
-    for one in result.get("runs") or ():
-        yield from _said(one, f"{one['name']}: ")
+        yield f"{one['name']} ends in", str(one["exit"])
 
 
 def _place(finding: Mapping[str, Any]) -> str:

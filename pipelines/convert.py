@@ -104,4 +104,5 @@ def report(result: Result) -> Report:
     return Report("Convert", verdict, "good", sections=(Section("Logs", tables=(table,)),))
 
 
-STAGE = Stage("convert", "Convert logs from one container to the other", Settings, compute, report, read_logs, write)
+STAGE = Stage("convert", "Convert logs from one container to the other", Settings, compute, report, read_logs, write,
+              sessions="folder")

@@ -289,5 +289,6 @@ def report(result: Result) -> Report:
 
 
 STAGE = Stage("design-excitation", "Design the excitation", Settings, compute, report, read, write,
-              lambda result, check: result.stopped or int(check and any(found.gate for found in doubts(result))), doubts)
+              lambda result, check: result.stopped or int(check and any(found.gate for found in doubts(result))), doubts,
+              sessions="folder")
 

@@ -35,6 +35,8 @@ from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
+_CUT = 3  # causes named of those that --max-causes cut off
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -134,7 +136,20 @@ def _diagnosed(logs: Logs, settings: Settings, given: Material, whole: bool) -> 
     prepared = with_terms_told_apart(prepare(logs, rows, given.arm), settings.blocks)
     given.tell("comparing with the reference logs" if logs.reference else "looking for causes")
     found = diagnose_prepared(prepared, config, settings.exclude)
-    return answer(prepared, found, given.tell, settings.blocks, whole, settings.exclude)
+    told, extension = answer(prepared, found, given.tell, settings.blocks, whole, settings.exclude)
+    return _with_cut(told, found.look.selection.cut, settings.max_causes), extension
+
+
+def _with_cut(found: Diagnosis, cut: Sequence[tuple[str, int | None]], most: int) -> Diagnosis:
+    """Say that the search ended at --max-causes, and which causes were still significant there."""
+    if not cut:
+        return found
+    places = [cause if joint is None else f"{cause}:{joint}" for cause, joint in cut[:_CUT]]
+    more = f" and {len(cut) - _CUT} more" if len(cut) > _CUT else ""
+    words = (f"the search ended at {most} cause{'s' if most > 1 else ''} (--max-causes {most}); "
+             f"still significant: {', '.join(places)}{more}")
+    return replace(found, reason=f"{found.reason}; {words}" if found.reason else words,
+                   summary=f"{found.summary} T{words[1:]}.")
 
 
 def _beside_clocks(found: Diagnosis, said: Sequence[Check]) -> Diagnosis:

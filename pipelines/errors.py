@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 __all__ = ["Check", "EnvironmentFault", "Gathering", "InputRejected", "Interrupted", "Level", "NothingMatched", "RrridError",
            "UsageError", "clean", "did_you_mean", "escaped"]
@@ -74,7 +74,7 @@ class RrridError(Exception):
     def __reduce__(self) -> tuple[object, ...]:
         return (_rebuild, (type(self), self.code, self.message, self.where, self.remedy))
 
-    def as_dict(self) -> dict[str, str]:
+    def as_dict(self) -> dict[str, Any]:
         return {"code": self.code, "where": self.where, "message": self.message, "remedy": self.remedy}
 
 

@@ -63,7 +63,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         NothingMatched: C06, no friction log to fit.
-        UsageError: C02, settings that do not fit, or logs of several robots.
+        UsageError: C02, settings that do not fit.
         InputRejected: the doctor rejects a log: its first reason; T08, too few windows are left.
     """
     law = _law(settings)
@@ -79,7 +79,6 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         raise NothingMatched("C06", f"no friction log of role identify; there are: {kinds}", where=inputs.label,
                              remedy="drive each joint alone, the others held, and record it as experiment 'friction'" + (
                                  "; fit-friction by itself also takes logs in which all move" if together else ""))
-    _of_one_robot(logs, inputs.label)
     used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
     seen, said = _examined(used, Reconstruction(order=settings.order))
     joints = [by_method(fit_joint(part, settings.window, law), settings.method) for part in _by_joint(seen)]
@@ -97,16 +96,9 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
                                 for pair in (*joint.logs.identify, *joint.logs.validate)))
 
 
-def _of_one_robot(logs: Sequence[ExperimentLog], label: str) -> None:
-    if len({log.robot_text for log in logs}) > 1:
-        raise UsageError("C02", "logs of several robots", where=label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
-
-
 def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], settings: Settings, law: Law | None,
               label: str) -> Result:
     """No joint was driven alone: friction with the base parameters, from logs in which all move."""
-    _of_one_robot((*identify, *validate), identify[0].name)
     how = Reconstruction(order=settings.order)
     if settings.method != "varpro":
         raise UsageError("C02", f"'{settings.method}' needs joints that were driven alone", where="--method", remedy="take varpro")

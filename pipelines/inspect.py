@@ -272,4 +272,4 @@ def _onward(result: Result, inputs: Inputs) -> Inputs:
 
 STAGE = Stage("inspect", "Examine logs", Settings, compute, report, read, exit_code=exit_code,
               checks=lambda result: result.checks[result.from_reading:], onward=_onward, hands_on="choice",
-              uses=Uses(rejected=True))
+              uses=Uses(rejected=True), sessions="folder")

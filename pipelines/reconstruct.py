@@ -152,4 +152,5 @@ def _restored(result: Result, folder: Path) -> Result:
 
 
 STAGE = Stage("reconstruct", "Reconstruct motion", Settings, compute, report, read_logs, write,
-              exit_code=exit_code, checks=lambda result: result.checks, onward=_onward, hands_on="logs", restored=_restored)
+              exit_code=exit_code, checks=lambda result: result.checks, onward=_onward, hands_on="logs", restored=_restored,
+              sessions="folder")

@@ -1,6 +1,6 @@
 """Run the whole workflow on a folder of logs.
 
-Reads    a folder of logs of one robot; several robots or days of recording below it are taken apart
+Reads    a folder of logs of one robot and one day
 Writes   result.json with every stage's result, one report.html, and each stage's own files in a folder of its name
 Source   cli-contract.md; the order is the way of the data: what a stage finds, the next ones build on
 
@@ -21,10 +21,10 @@ from pipelines.errors import Check, InputRejected, Level, NothingMatched, UsageE
 from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.doctor.columns_first import columns_first
 from pipelines.log.files import expanded
+from pipelines.log.mixed import of_one_session
 from pipelines.log.places import renamed, short_names, tilde
 from pipelines.log.results import decode, encode
 from pipelines.log.robot import format_robot
-from pipelines.log.sessions import apart
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.recall.chain import Chain
 from pipelines.recall.key import Key, digest_of_json
@@ -32,10 +32,10 @@ from pipelines.recall.pictures import Pictures, pictures_of, with_pictures, writ
 from pipelines.recall.store import CACHE, Kept, Missed, Store
 from pipelines.report.report import Report
 from pipelines.report.run_report import run_report
-from pipelines.report.run_result import Group, Result, Step
-from pipelines.stage import Beside, Inputs, Request, Stage, default_out, read_logs, result_type, slug
+from pipelines.report.run_result import Result, Step
+from pipelines.stage import Beside, Inputs, Request, Stage, default_out, read_logs, result_type
 
-__all__ = ["MODULES", "STAGE", "STEPS", "Group", "Planned", "Result", "Settings", "Step", "compute", "plan", "report", "restored"]
+__all__ = ["MODULES", "STAGE", "STEPS", "Planned", "Result", "Settings", "Step", "compute", "plan", "report", "restored"]
 
 # Modules of the stages, in the order they are run.
 STEPS = ("inspect", "fit_friction", "reconstruct", "estimate_bps", "validate_writing", "frf", "diagnose", "extend")
@@ -65,9 +65,8 @@ class Material:
 
 @dataclass(frozen=True)
 class Planned:
-    """What a run would do with one stage of one group of logs, and why."""
+    """What a run would do with one stage, and why."""
 
-    logs: str
     stage: str
     computed: bool  # else taken back
     why: str
@@ -75,7 +74,7 @@ class Planned:
 
 def read(request: Request, settings: Settings) -> Inputs:
     """Every log that can be opened, the files that settings of stages name, and what earlier runs have left."""
-    inputs = read_logs(request, settings, keep_rejected=True)
+    inputs = of_one_session(read_logs(request, settings, keep_rejected=True))
     out = request.out or default_out(inputs, "run")
     robot = None if inputs.robot is None else digest_of_json(format_robot(inputs.robot))
     options: dict[str, Any] = {"robot": robot, "assume_units": request.assume_units, "joints": list(request.joints),
@@ -92,19 +91,20 @@ def read(request: Request, settings: Settings) -> Inputs:
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
-    """Every stage on every group of logs; what is unchanged is taken back."""
+    """Run every stage on the logs; take what is unchanged from the cache."""
     _refuse_strange(settings)
-    done = [(name, _stages(name, part, settings)) for name, part in _apart(inputs)]
-    groups = tuple(Group(name, steps, _boundary(steps), _diagnosis(steps)) for name, steps in done)
-    one = groups[0]
-    return Result((), groups) if len(groups) > 1 else Result(one.stages, boundary=one.boundary, diagnosis=one.diagnosis)
+    return _result(_stages(inputs, settings))
+
+
+def _result(steps: tuple[Step, ...]) -> Result:
+    return Result(steps, boundary=_boundary(steps), diagnosis=_diagnosis(steps))
 
 
 def plan(request: Request, settings: Settings) -> tuple[Planned, ...]:
     """What `compute` would do. Nothing is written; the doctor alone is asked, for it decides which logs the others get."""
     _refuse_strange(settings)
     request = dataclasses.replace(request, paths=tuple(path.absolute() for path in expanded(request.paths)))
-    return tuple(one for name, part in _apart(read(request, settings)) for one in _planned(name, part, settings))
+    return tuple(_planned(read(request, settings), settings))
 
 
 def _refuse_strange(settings: Settings) -> None:
@@ -136,33 +136,33 @@ def _wanted(settings: Settings) -> Iterator[tuple[Stage[Any, Any], Any]]:
             yield stage, settings.stages.get(stage.name) or stage.in_run or stage.settings()
 
 
-def _stages(group: str, inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
+def _stages(inputs: Inputs, settings: Settings) -> tuple[Step, ...]:
     """Every stage in turn, each on what those before it leave; one that finds nothing to read is passed over."""
     given: Material = inputs.material
     chain, steps = Chain(inputs, given.names, given.options, given.beside), []
     for stage, own in _wanted(settings):
-        key, place = chain.key(stage, own), _place(group, stage.name)
-        kept = given.store.recall(place, key)
-        given.request.tell(f"{place}: {'unchanged' if isinstance(kept, Kept) else kept.why}")
+        key = chain.key(stage, own)
+        kept = given.store.recall(stage.name, key)
+        given.request.tell(f"{stage.name}: {'unchanged' if isinstance(kept, Kept) else kept.why}")
         if isinstance(kept, Kept):
             step = _step(stage, kept)
             step = dataclasses.replace(step, report=with_pictures(step.report, given.pictures))
             chain.taken_back(stage, key, step.result, kept.files)
         else:
-            kept, result = _computed(stage, own, chain.inputs_of(stage), place, key, given)
+            kept, result = _computed(stage, own, chain.inputs_of(stage), key, given)
             step = _step(stage, kept)
             chain.passed(stage, key, result)
         steps.append(step)
     return tuple(steps)
 
 
-def _planned(group: str, inputs: Inputs, settings: Settings) -> Iterator[Planned]:
+def _planned(inputs: Inputs, settings: Settings) -> Iterator[Planned]:
     given: Material = inputs.material
     chain = Chain(inputs, given.names, given.options, given.beside)
     for stage, own in _wanted(settings):
-        key, place = chain.key(stage, own), _place(group, stage.name)
-        kept = given.store.recall(place, key, dry=True)
-        yield Planned(group or "all", stage.name, isinstance(kept, Missed), "unchanged" if isinstance(kept, Kept) else kept.why)
+        key = chain.key(stage, own)
+        kept = given.store.recall(stage.name, key, dry=True)
+        yield Planned(stage.name, isinstance(kept, Missed), "unchanged" if isinstance(kept, Kept) else kept.why)
         if isinstance(kept, Kept):
             chain.taken_back(stage, key, _step(stage, kept).result, kept.files)
         else:
@@ -173,40 +173,31 @@ def restored(folder: Path, result: Mapping[str, Any]) -> Result:
     """The result of the run that has left `folder`, of what it stored there; `result` is the object of its result.json.
 
     Raises:
-        InputRejected: F05, what is stored is missing or changed.
+        InputRejected: F05, what is stored is missing or changed; F17, it is a result of several sessions.
     """
+    if result["runs"]:
+        raise InputRejected("F17", "holds several robots or days, as an earlier version wrote them", where=folder,
+                            remedy="run the command again on each session")
     store = Store(folder)
-
-    def steps(group: str, stages: Iterable[Mapping[str, Any]]) -> tuple[Step, ...]:
-        by_name = {stage.name: stage for stage, _ in _wanted(Settings())}
-        return tuple(_step(by_name[one["name"]], store.stored(_place(group, one["name"]))) for one in stages)
-
-    groups = tuple(Group(one["name"], steps(one["name"], one["stages"])) for one in result["runs"])
-    whole = tuple(dataclasses.replace(group, boundary=_boundary(group.stages), diagnosis=_diagnosis(group.stages))
-                  for group in groups)
-    alone = steps("", result["stages"])
-    return Result(alone, whole, _boundary(alone), _diagnosis(alone))
+    by_name = {stage.name: stage for stage, _ in _wanted(Settings())}
+    return _result(tuple(_step(by_name[one["name"]], store.stored(one["name"])) for one in result["stages"]))
 
 
-def _place(group: str, stage: str) -> str:
-    return f"{slug(group)}/{stage}" if group else stage
-
-
-def _computed(stage: Stage[Any, Any], settings: Any, inputs: Inputs, place: str, key: Key, given: Material) -> tuple[Kept, Any]:
+def _computed(stage: Stage[Any, Any], settings: Any, inputs: Inputs, key: Key, given: Material) -> tuple[Kept, Any]:
     """Compute one stage and store what it found, or why it found nothing."""
     try:
         result = renamed(stage.compute(inputs, settings), given.names)
-    except (NothingMatched, InputRejected, UsageError) as problem:
-        if isinstance(problem, UsageError) and place == stage.name:  # of several robots one does without what fits another
-            raise
+    except (NothingMatched, InputRejected) as problem:
         told = tilde(renamed(problem.as_dict(), given.names)) | {"exit": problem.exit_code}
         # what is an option of the stage's own command is a setting here
         told["remedy"] = told["remedy"].replace("--skip-sanity-checks", f"--set {stage.name}.skip_sanity_checks=true")
-        return given.store.keep(place, key, {"problem": told}, None, lambda folder: None), None
+        return given.store.keep(stage.name, key, {"problem": told}, None, lambda folder: None), None
     about = {"exit": stage.exit_code(result, True), "problem": None,
              "checks": [tilde(renamed(check.as_dict(), given.names)) for check in stage.checks(result)]}
     write = stage.write or (lambda result, folder, request: None)
-    return given.store.keep(place, key, about, tilde(encode(result)), lambda folder: write(result, folder, given.request)), result
+    kept = given.store.keep(stage.name, key, about, tilde(encode(result)),
+                            lambda folder: write(result, folder, given.request))
+    return kept, result
 
 
 def _step(stage: Stage[Any, Any], kept: Kept) -> Step:
@@ -229,15 +220,6 @@ def _without(stage: Stage[Any, Any], problem: Mapping[str, Any]) -> tuple[Report
     return Report(stage.title, words, "neutral" if passed_over else "bad"), check
 
 
-def _apart(inputs: Inputs) -> list[tuple[str, Inputs]]:
-    """The inputs, one robot and one day of recording at a time. Files that no log came out of go with the first."""
-    groups = apart(inputs.logs, inputs.named)
-    if len(groups) < 2:
-        return [("", inputs)]
-    return [(one.name, dataclasses.replace(inputs, logs=one.logs, rejected=inputs.rejected if number == 0 else (),
-                                           robot_name=one.robot)) for number, one in enumerate(groups)]
-
-
 def report(result: Result) -> Report:
     """The verdict, one table of all stages, what diagnosis says, then every other stage's report."""
     return run_report(result)
@@ -245,23 +227,21 @@ def report(result: Result) -> Report:
 
 def write(result: Result, folder: Path, request: Request) -> None:
     """The files of every stage in a folder of its name, and what the next run may take back."""
-    for group in result.groups:
-        for step in group.stages:
-            step.kept.put(folder, _place(group.name, step.name))
+    for step in result.stages:
+        step.kept.put(folder, step.name)
     if not request.no_report:
         write_drawing(folder, MODULES)
 
 
 def _exit_code(result: Result, check: bool) -> int:
-    codes = [step.exit for group in result.groups for step in group.stages if step.exit != NothingMatched.exit_code]
-    told = next((code for code in (InputRejected.exit_code, UsageError.exit_code) if code in codes), 0)
-    return told or (max(codes, default=0) if check else 0)
+    codes = [step.exit for step in result.stages if step.exit != NothingMatched.exit_code]
+    if InputRejected.exit_code in codes:
+        return InputRejected.exit_code
+    return max(codes, default=0) if check else 0
 
 
 def _checks(result: Result) -> tuple[Check, ...]:
-    of = {group.name: f"{group.name}, " if result.runs else "" for group in result.groups}
-    return tuple(dataclasses.replace(check, where=f"{of[group.name]}{check.where}".removesuffix(", ")) for group in result.groups
-                 for check in columns_first(check for step in group.stages for check in step.checks))
+    return tuple(columns_first(check for step in result.stages for check in step.checks))
 
 
 def _remakes(name: str) -> bool:
@@ -270,4 +250,4 @@ def _remakes(name: str) -> bool:
 
 
 STAGE = Stage("run", "Run the whole workflow on a folder of logs", Settings, compute, report, read, write, _exit_code, _checks,
-              remakes=_remakes, ended=lambda inputs, finished: inputs.material.store.release(finished), sessions="apart")
+              remakes=_remakes, ended=lambda inputs, finished: inputs.material.store.release(finished), sessions="one")

@@ -157,4 +157,4 @@ def report(result: Result) -> Report:
     return simulation_report(model, result.faults, result.logs, result.tracking_rms)
 
 
-STAGE = Stage("simulate", "Simulate a model", Settings, compute, report, read, write, checks=_checks)
+STAGE = Stage("simulate", "Simulate a model", Settings, compute, report, read, write, checks=_checks, sessions="folder")

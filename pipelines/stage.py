@@ -27,10 +27,9 @@ from pipelines.log.earlier import Coming, put_in_place
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import PROVENANCE, expanded, hash_file
 from pipelines.log.inputs import Inputs, Rejected, Request, read_by_role, read_logs
-from pipelines.log.mixed import check_alike, of_one_session
+from pipelines.log.mixed import check_alike, of_one_session, refuse_mixed
 from pipelines.log.places import (
     given_names,
-    holds_apart,
     keep_apart,
     refuse_foreign,
     refuse_unwritable,
@@ -99,7 +98,7 @@ class Stage(Generic[S, R]):
     # what the earlier output in `folder` is of, where it must not be lost to this one: ("cogging:2",)
     spare: Callable[[R, Path], tuple[str, ...]] = lambda result, folder: ()
     ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None  # told at the end; `finished`: not by a signal
-    sessions: Literal["", "apart", "one"] = ""  # robots and days: each log by itself, told "apart" by the stage, or "one" at a time
+    sessions: Literal["", "folder", "one"] = ""  # which logs must be of one robot and day: those of a folder, or all
 
 
 @dataclass(frozen=True)
@@ -118,8 +117,8 @@ def run_stage(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     """Read, compute, report and write `stage`; the output folder is the old one or the complete new one.
 
     Raises:
-        RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed. SeveralSessions: the
-            logs are of several robots or days, and the stage takes one: `request.session` names it.
+        RrridError: with the code, the place and the exit code of what went wrong. Nothing is then changed.
+        SeveralSessions: the logs are of several robots or days; `request.session` names the one to take.
     """
     request = dataclasses.replace(request, paths=expanded(request.paths))
     given, inputs = given_names(request.paths), ", ".join(map(str, request.paths))
@@ -149,13 +148,13 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     if request.out is not None:
         keep_apart(request.out, (), request.paths)
         refuse_unwritable(request.out)
-        if not holds_apart(request.out, stage.name):  # one session lies beside another there; its own folder is asked later
-            refuse_foreign(request.out, request.force, stage.remakes)
+        refuse_foreign(request.out, request.force, stage.remakes)
     described = _hashes(robot_sources(request.robot), {}) if request.robot is not None else {}
     inputs = stage.read(request, settings)
+    if stage.sessions == "folder":
+        refuse_mixed(inputs, filter(os.path.isdir, request.paths))
     if stage.sessions == "one":
-        inputs = of_one_session(inputs, lambda log: stage.uses.logs(log, settings))
-    if stage.sessions:
+        inputs = of_one_session(inputs)
         inputs = dataclasses.replace(inputs, checks=(*inputs.checks, *check_alike(inputs)))
     try:
         outcome = _outcome(stage, request, settings, inputs, described, started)

@@ -147,7 +147,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
     Raises:
         NothingMatched: C06, no log of role validate, or neither a model nor logs to fit one.
-        UsageError: C02, settings that do not fit, logs of several robots, or a model of another one.
+        UsageError: C02, settings that do not fit, or a model of another robot.
         InputRejected: the doctor rejects a log: its first reason; D14, the model was fitted to a log that shall judge it.
     """
     _refuse_strange(settings)
@@ -159,9 +159,6 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in logs})) or "none"
         raise NothingMatched("C06", f"no log of role validate; there are: {kinds}", where=inputs.label,
                              remedy="record the writing task with role validate; --text RRR designs it")
-    if len({log.robot_text for log in logs}) > 1:
-        raise UsageError("C02", "logs of several robots", where=inputs.label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
     arm, said = _model(inputs, logs, judges)
     found = validate(judges, arm, Effort(settings.torque_gate, settings.draws, settings.seed, settings.simulate))
     done = found.imitation

@@ -26,7 +26,7 @@ class BatchCommand(StageCommand):
 
 @with_common_but(out="runs/several/ROOT/batch")
 def batch(
-    logs: Annotated[Path, typer.Argument(help="Folder with many folders of logs.", show_default=False, metavar="ROOT",
+    root: Annotated[Path, typer.Argument(help="Folder with many folders of logs.", show_default=False, metavar="ROOT",
                                          readable=False)],
     common: Common,
     stage: Annotated[str, typer.Option(help="Command to run on each: run, estimate-bps, inspect, …")] = "run",
@@ -40,7 +40,7 @@ def batch(
     backend: Annotated[str, typer.Option(help="local, or dask://HOST:PORT: a Dask scheduler.")] = "local",
     baseline: Annotated[str | None, typer.Option(help="model.json that is known: only what goes beyond it is found.")] = None,
 ) -> None:
-    """Run the whole workflow, or one stage, on each of many folders of logs, in parallel."""
+    """Run the whole workflow, or one stage, on every robot and day of many folders, in parallel."""
     from pipelines.batch.server import warm_up
 
     if backend == "local":
@@ -59,7 +59,7 @@ def batch(
     options = Options(common.robot, common.strict, common.force, common.no_report, common.assume_units, common.format or "h5",
                       common.joints, _memory(memory), _positive(timeout, "--timeout"))
     teller = Teller(common.quiet or common.json, common.verbose)
-    wanted = Wanted(logs, common.out, _jobs(jobs), each_log, "abort" if on_error == "abort" else "continue", resume,
+    wanted = Wanted(root, common.out, _jobs(jobs), each_log, "abort" if on_error == "abort" else "continue", resume,
                     read_shard(shard), backend, baseline, common.check, common.no_report, teller)
     try:
         outcome = run_batch(Plan(module_of(stage), settings, options), wanted)

@@ -95,15 +95,15 @@ def _write(text: str) -> None:
     sys.stderr.flush()
 
 
-def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: bool, stream: Any = None) -> None:
-    """The verdict, the key figures, what is not in order, and the folder; on `stream`, else where `as_json` leaves room."""
+def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: bool) -> None:
+    """The verdict, the key figures, what is not in order, and the folder; where `as_json` leaves room."""
     if as_json:
         from pipelines.log.results import json_text
 
         sys.stdout.write(json_text(outcome.json))
     if quiet:
         return
-    stream = stream or (sys.stderr if as_json else sys.stdout)
+    stream = sys.stderr if as_json else sys.stdout
     say_verdict(outcome.report, stream)
     if outcome.report.key_figures is not None:
         _say_table(outcome.report.key_figures, stream)

@@ -174,8 +174,10 @@ _ROLES: tuple[tuple[str, Any, Any], ...] = tuple((role, Annotated[list[str], _fl
     ("identify", "Identification logs, instead of the logs' own roles. Repeatable."), ("validate", "Validation logs. Repeatable."),
     ("reference", "Reference logs, of the arm as it was before. Repeatable.")))
 
-_SESSION = ("session", Annotated[str, _flag("Of several robots or days only this: 'ROBOT', or 'ROBOT 2026-05-18'. "
-                                            "[each by itself]", "--session")], "")
+# Of the commands that read logs, except `batch`, which takes all sessions.
+_SESSION = ("session", Annotated[str, _flag("Of several robots or days take this: 'ROBOT', or "
+                                            "'ROBOT 2026-05-18'. [several are refused]", "--session")], "")
+_LOGS = {"logs", "replay", "prior_logs"}
 
 
 def _but(kind: Any, **said: Any) -> Any:
@@ -206,7 +208,11 @@ def _with_common(command: Callable[..., None], idle: tuple[str, ...], out: str) 
         words["out"] = {"help": f"{_OUT}. [{out}]"}
     own = inspect.signature(command, eval_str=True)
     by_role = _ROLES if "roles" in own.parameters else ()
-    options = (*by_role, *((_SESSION,) if by_role else ()), *_SHARED, *((_JOINTS,) if "logs" in own.parameters else ()))
+    options = [*by_role, *_SHARED]
+    if own.parameters.keys() & _LOGS:
+        options.append(_SESSION)
+    if own.parameters.keys() & {"logs", "root"}:
+        options.append(_JOINTS)
     shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=_but(kind, **words.get(name, {})), default=default)
               for name, kind, default in options]
     kept = [p for p in own.parameters.values() if p.name not in ("common", "roles")]

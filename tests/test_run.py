@@ -6,16 +6,14 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
 
 from pipelines import estimate_bps, run
-from pipelines.errors import UsageError
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
+from pipelines.log.sessions import apart
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 from tests.cli.commands import rrrid
@@ -41,14 +39,14 @@ def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result
         whole.folder / "estimate-bps/logs").iterdir()} | {f"{n}.h5" for n in ("friction-1", "friction-2", "friction-3", "hold-1")}
     assert (whole.folder / "estimate-bps/model.json").is_file()
     table = next(section for section in whole.report.sections if section.title == "Stages").tables[0]
-    assert "The model holds on the held-out log" in str(table.rows[4][2])  # in order: the headline has what is not
+    assert "The model holds on the held-out log" in str(table.rows[4][1])  # in order: the headline has what is not
     assert table.tones[4] == "good"
     assert stages[4]["result"]["model"].startswith("estimate-bps")
 
 
 def test_the_ledger_begins_with_no_model(whole: Outcome[run.Result]) -> None:
     """The torque itself, the rigid body alone, then with friction: each line builds on the one before, and every joint gains."""
-    nothing, rigid, friction = ledger_lines(whole.result.groups[0])
+    nothing, rigid, friction = ledger_lines(whole.result.stages)
     assert (nothing.before, rigid.before, friction.before) == (None, nothing.rms, rigid.rms)
     assert all(f < r < n for n, r, f in zip(nothing.rms, rigid.rms, friction.rms, strict=True))
     tables = next(section for section in whole.report.sections if section.title.startswith("Error by model stage")).tables
@@ -59,8 +57,8 @@ def test_what_to_record_is_said(whole: Outcome[run.Result]) -> None:
     """No frf log is there: the report says what recording would bring it."""
     lacking = next(section for section in whole.report.sections if section.title == "What these logs lack")
     (row,) = lacking.tables[0].rows
-    assert row[1] == "frf"
-    assert "let one joint turn" in str(row[3])
+    assert row[0] == "frf"
+    assert "let one joint turn" in str(row[2])
 
 
 def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
@@ -124,27 +122,13 @@ def test_a_bad_log_costs_itself_alone(samples: Path, tmp_path: Path) -> None:
     assert outcome.json["stages"][3]["result"]["parameters"] == good.json["stages"][3]["result"]["parameters"]
 
 
-def test_several_robots_are_reported_apart(samples: Path, tmp_path: Path) -> None:
-    """Two arms in one folder: one run each, and neither's parameters know of the other."""
-    (tmp_path / "logs/a").mkdir(parents=True)
-    shutil.copy(samples / "rrr-closed-form/excitation-1.h5", tmp_path / "logs/a")
-    log = open_log(tmp_path / "logs/a/excitation-1.h5").log
-    write_log(tmp_path / "logs/b.h5", replace(log, robot_name="other", robot_text=log.robot_text.replace("rrr-tue", "other")))
-    outcome = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True), WITHOUT)
-    assert outcome.json["stages"] == []
-    assert [group["name"] for group in outcome.json["runs"]] == ["rrr-tue", "other"]
-    assert {p.name for p in (tmp_path / "out").iterdir() if p.is_dir()} == {"rrr-tue", "other", ".cache"}
-    lacking = [check.where for check in outcome.checks if check.code == "RRID-C06"]
-    assert sorted({where.split(", ")[0] for where in lacking}) == ["other", "rrr-tue"]  # whose logs lack something is said
-
-
 def sessions(tmp_path: Path, samples: Path, **logs: tuple[str, str | None]) -> dict[str, set[str]]:
     """Which logs (name -> role and time of recording) go together, by the name of their session."""
     log = open_log(samples / "rrr-closed-form/hold-1.h5").log
     for name, (role, recorded) in logs.items():
         write_log(tmp_path / f"{name}.h5", replace(log, name=name, role=role, recorded=recorded))
     inputs = read_logs(Request((tmp_path,)), run.Settings())
-    return {name: {opened.log.name for opened in part.logs} for name, part in run._apart(inputs)}
+    return {part.name: {opened.log.name for opened in part.logs} for part in apart(inputs.logs)}
 
 
 def test_days_are_apart_and_share_what_was_recorded_before(samples: Path, tmp_path: Path) -> None:
@@ -160,28 +144,13 @@ def test_a_reference_belongs_to_what_it_is_compared_with(samples: Path, tmp_path
     day, later = "2026-03-04T10:00:00Z", "2026-05-18T09:00:00Z"
     for number, (reference, rest) in enumerate(((day, later), (None, later), (day, None), (day, day), (later, day))):
         (tmp_path / str(number)).mkdir()
-        assert sessions(tmp_path / str(number), samples, c=("reference", reference), d=("identify", rest)) == {"": {"c", "d"}}
+        found = sessions(tmp_path / str(number), samples, c=("reference", reference), d=("identify", rest))
+        assert list(found.values()) == [{"c", "d"}]
 
 
 def test_the_sample_logs_are_three_sessions(samples: Path) -> None:
     """The arm in closed form; the arm of the bench in order; the same one later, with its commissioning."""
     inputs = read_logs(Request((samples,)), run.Settings())
-    parts = [sorted({opened.path.parent.name for opened in part.logs}) for _, part in run._apart(inputs)]
+    parts = [sorted({opened.path.parent.name for opened in part.logs}) for part in apart(inputs.logs)]
     assert sorted(parts) == [["rrr-changed"], ["rrr-closed-form"], ["rrr-healthy"]]
-    assert sum(len(part.logs) for _, part in run._apart(inputs)) == len(inputs.logs)
-
-
-@pytest.mark.parametrize("place", ["rrr-a/diagnose", "diagnose"])
-def test_one_of_several_robots_does_without_what_fits_another(place: str) -> None:
-    """C02 of a robot's stage is that stage's word, where several robots are reported apart; alone it ends the run."""
-    def refused(inputs: object, settings: object) -> None:
-        raise UsageError("C02", "the model has 2 joints", remedy="leave it out")
-
-    stage: Any = SimpleNamespace(name="diagnose", compute=refused)
-    given: Any = SimpleNamespace(names={}, store=SimpleNamespace(keep=lambda place, key, about, *rest: about))
-    if place == stage.name:
-        with pytest.raises(UsageError):
-            run._computed(stage, None, given, place, given, given)
-    else:
-        told: Any = run._computed(stage, None, given, place, given, given)
-        assert (told[0]["problem"]["code"], told[0]["problem"]["exit"]) == ("RRID-C02", 2)
+    assert sum(len(part.logs) for part in apart(inputs.logs)) == len(inputs.logs)

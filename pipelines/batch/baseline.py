@@ -35,21 +35,15 @@ _LAW = re.compile(r"\b(?P<law>[a-z_]+)(?::(?P<at>\d+):| joint (?P<joint>\d+) )")
 def against(record: Record, baseline: ModelFile) -> Record:
     """`record` as it stands with the baseline in mind: "ok" where it holds nothing new, "found" with the changes where it does.
 
-    What is wrong beside named causes, or in another robot, no baseline explains: the record's words stand before the changes.
+    What is wrong beside named causes no baseline explains: the record's words stand before the changes.
     What is of another robot than the baseline's is not judged by it.
     """
-    own = [part for part in record.parts if _robot(baseline) in ("", part.robot)]
-    if record.status not in ("ok", "found") or not own:
+    part = record.part
+    if record.status not in ("ok", "found") or part is None or _robot(baseline) not in ("", part.robot):
         return record
-    changes, remarks = list[str](), list[str]()
-    for part in own:
-        moved = [*_moved(part, baseline), *_new_causes(part, baseline)]
-        gone, unsure = _gone(part, baseline)
-        of = f"{part.name}: " if part.name else ""
-        changes += [f"{of}{words}" for words in (*moved, *gone)]
-        remarks += [f"{of}{words}" for words in unsure]
-    elsewhere = any(part.findings for part in record.parts if part not in own)
-    explained = record.status == "ok" or (record.accepts and not elsewhere)
+    gone, remarks = _gone(part, baseline)
+    changes = [*_moved(part, baseline), *_new_causes(part, baseline), *gone]
+    explained = record.status == "ok" or record.accepts
     if changes:
         told = _limited("Beyond the baseline", [*changes, *remarks])
         return dataclasses.replace(record, status="found", verdict=told if explained else f"{record.verdict} {told}".strip())
@@ -68,7 +62,8 @@ def unheld(stage: str, records: Iterable[Record], baseline: ModelFile, sharded: 
     Where that is all of it, the check is a gate: what was asked for has not been done. Of a batch in shards another one may
     have the items of the baseline's robot: laid together, they are asked again.
     """
-    done = [(record.called(part), part) for record in records if record.status in ("ok", "found") for part in record.parts]
+    done = [(record.name, part) for record in records
+            if record.status in ("ok", "found") and (part := record.part) is not None]
     strange = [name for name, part in done if _robot(baseline) not in ("", part.robot)]
     judged = [part for _, part in done if _robot(baseline) in ("", part.robot)]
     if not judged:

@@ -1,4 +1,4 @@
-"""Run a stage on every folder of logs below a root, and say what came of all of them.
+"""Run a stage on every robot and day of every folder of logs below a root, and say what came of all of them.
 
     outcome = run_batch(plan, wanted)
 
@@ -81,11 +81,12 @@ def run_batch(plan: Plan, wanted: Wanted) -> Outcome[Summary]:
         wanted.tell(f"{check.where}: {check.message}")
     plan = dataclasses.replace(plan, root=str(root), out=str(folder.items), folder=os.getcwd())
     with locked(out), Listener() as listener:
-        folder.begin(plan, {item.slug for item in everything})
+        folder.begin(plan, everything)
         done = _Done(plan, plan_key(plan), folder, wanted, listener)
         done.notices += moved
         done.go(items)
-        records = _judged([done.records.get(item.slug) or done.missing(item) for item in items], baseline)
+        every = [one for item in items for one in done.sessions.get(item.slug, (item,))]
+        records = _judged([done.records.get(one.slug) or done.missing(one) for one in every], baseline)
         unmet = () if baseline is None else unheld(plan.stage, records, baseline, wanted.shard[1] > 1)
         remarks = (*(_short(check, root) for check in checks), *unmet)
         summary = Summary(plan.stage, records, drift_of(records), remarks, baseline, bool(listener.number))
@@ -150,6 +151,7 @@ class _Done:
     def __init__(self, plan: Plan, key: str, folder: BatchFolder, wanted: Wanted, listener: Listener) -> None:
         self.plan, self.key, self.folder, self.wanted, self.listener = plan, key, folder, wanted, listener
         self.records: dict[str, Record] = {}
+        self.sessions: dict[str, tuple[Item, ...]] = {}  # of each item whose logs are of several
         self.notices: list[Check] = []
         self.kept = 0
         self.fault: EnvironmentFault | None = None  # no output can be written, or nobody can do the work
@@ -157,23 +159,33 @@ class _Done:
 
     def go(self, items: Sequence[Item]) -> None:
         """Do what is not done yet, until all is done or something stops it."""
-        left = [item for item in items if not (self.wanted.resume and self._keep(item))]
-        self.kept = len(self.records)
-        if self.kept:
-            self.wanted.tell(f"{self.kept} of {len(items)} are done already")
-        if left:
-            try:
-                self._through(left, len(items))
-            except EnvironmentFault as problem:  # no workers, or none any more: what is done is done
-                self.fault = problem
+        total = len(items)
+        while items and not self.stopped():
+            before = len(self.records)
+            left = [item for item in items if not (self.wanted.resume and self._keep(item))]
+            if kept := len(self.records) - before:
+                self.kept += kept
+                self.wanted.tell(f"{self.kept} of {total} are done already")
+            items = ()
+            if left:
+                try:
+                    items = self._through(left, total)
+                except EnvironmentFault as problem:  # no workers, or none any more: what is done is done
+                    self.fault = problem
+            total += len(items)
 
-    def _through(self, left: Sequence[Item], total: int) -> None:
+    def _through(self, left: Sequence[Item], total: int) -> list[Item]:
+        """Do the items; return the sessions of those that hold several, which are still to be done."""
+        divided: list[Item] = []
         with closing(self._results(left)) as results:
             for item, record in results:
                 self._take(item, record)
-                self.wanted.tell(f"{len(self.records)} of {total}: {record.name} {record.status}")
+                divided += self.sessions.get(item.slug, ())
+                if item.slug in self.records:
+                    self.wanted.tell(f"{len(self.records)} of {total}: {record.name} {record.status}")
                 if self.stopped():
                     break
+        return divided
 
     def stopped(self) -> bool:
         return bool(self.listener.number) or self.fault is not None or self.aborted
@@ -213,6 +225,9 @@ class _Done:
             self.folder.ledger.put(self.folder.traced(record))
         except EnvironmentFault as problem:
             self.fault = problem
+            return
+        if record.sessions:
+            self.sessions[item.slug] = item.divided(record.sessions)
             return
         self.records[item.slug] = record
         self.aborted = self.wanted.on_error == "abort" and record.status in ("rejected", "failed")

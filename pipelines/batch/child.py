@@ -103,14 +103,16 @@ def _line(handle: int, seconds: float | None) -> bytes | None:
 def words_of(item: Item) -> dict[str, Any]:
     """An item as JSON."""
     fault = None if item.fault is None else item.fault.as_dict()
-    return {"name": item.name, "paths": list(map(str, item.paths)), "logs": list(map(str, item.logs)), "fault": fault}
+    return {"name": item.name, "paths": list(map(str, item.paths)), "logs": list(map(str, item.logs)), "fault": fault,
+            "session": item.session}
 
 
 def item_of(words: dict[str, Any]) -> Item:
     """The item that `words_of` made them of."""
     fault = words["fault"] and EnvironmentFault(words["fault"]["code"].removeprefix("RRID-"), words["fault"]["message"],
                                                 where=words["fault"]["where"], remedy=words["fault"]["remedy"])
-    return Item(words["name"], tuple(map(Path, words["paths"])), tuple(map(Path, words["logs"])), fault)
+    return Item(words["name"], tuple(map(Path, words["paths"])), tuple(map(Path, words["logs"])), fault,
+                words["session"])
 
 
 def serve() -> None:

@@ -66,12 +66,10 @@ class Drift:
 
 
 def drift_of(records: Iterable[Record]) -> tuple[Drift, ...]:
-    """The courses of every robot's figures, in the order of the names; empty for robots with a single item.
-
-    Of an item with several robots, or days of one, each is followed by itself.
-    """
+    """The courses of every robot's figures, in the order of the names; empty for robots with a single item."""
     robots: dict[str, list[_Seen]] = {}
-    seen = [_Seen(record.called(part), part) for record in records for part in record.parts if part.figures or part.residuals]
+    seen = [_Seen(record.name, part) for record in records
+            if (part := record.part) is not None and (part.figures or part.residuals)]
     for one in sorted(seen, key=lambda one: (one.part.recorded, one.name)):
         robots.setdefault(one.part.robot, []).append(one)
     return tuple(Drift(robot, _figures(done), _residuals(done)) for robot, done in sorted(robots.items()) if len(done) > 1)

@@ -12,11 +12,12 @@ import dataclasses
 import json
 import os
 import shutil
-from collections.abc import Collection, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from pipelines import __version__
+from pipelines.batch.items import Item
 from pipelines.batch.junit import junit_xml
 from pipelines.batch.lock import LOCK
 from pipelines.batch.plan import Plan
@@ -75,9 +76,11 @@ class BatchFolder:
             return {}
         return about if isinstance(about, dict) and about.get("tool") == "rrrid" and about.get("command") == "batch" else {}
 
-    def begin(self, plan: Plan, slugs: Collection[str]) -> None:
-        """Mark the folder as one that is being worked on, and drop what belongs to no item of `slugs`, or to another stage."""
-        slugs = slugs if self.about().get("stage", plan.stage) == plan.stage else ()
+    def begin(self, plan: Plan, items: Iterable[Item]) -> None:
+        """Mark the folder as one that is being worked on, and drop what belongs to none of `items`, or to another stage."""
+        slugs = set[str]()
+        if self.about().get("stage", plan.stage) == plan.stage:
+            slugs = {one.slug for item in items for one in (item, *self._sessions(item))}
         about = {"tool": "rrrid", "command": "batch", "version": __version__, "stage": plan.stage}
         write_file(self.out / _MARK, lambda draft: _text(draft, json_text(about)))
         with environment_faults(self.out):
@@ -90,6 +93,11 @@ class BatchFolder:
             for path in self.ledger.folder.glob("*.json"):
                 if path.stem not in slugs:
                     self.ledger.forget(path.stem)
+
+    def _sessions(self, item: Item) -> tuple[Item, ...]:
+        """What the last batch divided the item into."""
+        record = self.ledger.get(item)
+        return () if record is None else item.divided(record.sessions)
 
     def clean(self) -> None:
         """Sweep away the drafts of processes that are dead."""

@@ -10,8 +10,8 @@ links out of the folder.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pipelines.errors import Check, RrridError, UsageError
@@ -24,17 +24,22 @@ __all__ = ["Item", "find_items", "read_shard", "shard"]
 
 @dataclass(frozen=True)
 class Item:
-    """One folder of logs, or one log."""
+    """One folder of logs, one robot and day of it, or one log."""
 
-    name: str  # the path relative to the root, "." for the root itself
+    name: str  # the path relative to the root, "." for the root itself; with the session
     paths: tuple[Path, ...]  # what the stage is given
     logs: tuple[Path, ...]  # the logs among and below them
     fault: RrridError | None = field(default=None, compare=False)  # the folder could not be looked into
+    session: str = ""  # the only one to take
 
     @property
     def slug(self) -> str:
         """The name as that of one folder; two names never share one."""
         return slug(self.name)
+
+    def divided(self, sessions: Iterable[str]) -> tuple[Item, ...]:
+        """The item's sessions, each an item of its own."""
+        return tuple(replace(self, name=f"{self.name}: {session}", session=session) for session in sessions)
 
 
 def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tuple[Check, ...]]:

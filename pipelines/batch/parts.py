@@ -1,29 +1,25 @@
 """What is known of one robot's logs of one day: followed from item to item, and held against a baseline.
 
-    parts = parts_of(result, robot, recorded)       of an item's result.json; several where `rrrid run` took its logs apart
+    part = part_of(result, robot, recorded)       of an item's result.json
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pipelines.log.result_figures import fitted, residuals, robot_of
+from pipelines.log.result_figures import fitted, residuals
 
-__all__ = ["Part", "parts_of", "place_of", "read_part"]
-
-_DAY = re.compile(r"\b\d{4}-\d\d-\d\d\b")
+__all__ = ["Part", "part_of", "place_of", "read_part"]
 
 
 @dataclass(frozen=True)
 class Part:
     """One robot's logs of one day."""
 
-    name: str = ""  # within its item; "" where that is all one
     robot: str = ""
-    recorded: str = ""  # the day of its logs, else the earliest of the item's
+    recorded: str = ""  # the earliest of its logs
     figures: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)  # name -> value, std, unit
     residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)
     findings: tuple[Mapping[str, Any], ...] = ()  # of a diagnosis: cause, joint, parameters
@@ -33,25 +29,12 @@ class Part:
     detection_limits: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # "cogging:2" -> parameter, limit
 
 
-def parts_of(result: Mapping[str, Any], robot: str, recorded: str, turning: Sequence[bool] = ()) -> tuple[Part, ...]:
-    """The parts of an item by its result.json, of which `robot`, the joints of one that turn, and `recorded` are known."""
-    runs = result.get("runs") or ()
-    if not runs:
-        return (_part(result, "", robot, recorded, turning),)
-    return tuple(_part(run, run["name"], robot_of(run) or robot, _day(run["name"]) or recorded) for run in runs)
-
-
-def _day(name: str) -> str:
-    """The day that a run's name holds, where its logs say one."""
-    found = _DAY.search(name)
-    return "" if found is None else found[0]
-
-
-def _part(result: Mapping[str, Any], name: str, robot: str, recorded: str, turning: Sequence[bool] = ()) -> Part:
+def part_of(result: Mapping[str, Any], robot: str, recorded: str, turning: Sequence[bool] = ()) -> Part:
+    """Return what an item's result.json says; `turning`: which of the robot's joints are revolute."""
     findings = tuple({key: one.get(key) for key in ("cause", "joint", "parameters")} for one in result.get("findings") or ())
     least = {place_of(one): (str(one["parameter"]), float(one["minimum"]["value"])) for one in result.get("detection_limits") or ()
              if (one.get("minimum") or {}).get("value") is not None and not one.get("or_less")}
-    return Part(name, robot, recorded, fitted(result), residuals(result, turning), findings, result.get("findings") is not None,
+    return Part(robot, recorded, fitted(result), residuals(result, turning), findings, result.get("findings") is not None,
                 str(result.get("verdict") or ""), tuple(map(place_of, result.get("baseline_effects") or ())), least)
 
 

@@ -36,9 +36,9 @@ class Record:
     exit: int  # what the stage's own command would have ended in, with --check
     error: dict[str, str] | None = None  # code, where, message, remedy
     verdict: str = ""
-    robot: str = ""  # "several" where it holds several
+    robot: str = ""
     recorded: str = ""  # the earliest of its logs
-    parts: tuple[Part, ...] = ()  # more than one where it holds several robots or days; none without a result
+    part: Part | None = None  # what its result says; None without one
     accepts: bool = False  # the diagnoses' causes are all that kept it from "ok"
     inputs: Mapping[str, str] = field(default_factory=dict)  # file, relative to the root where it lies below -> SHA-256
     logs: tuple[str, ...] = ()
@@ -47,10 +47,7 @@ class Record:
     seconds: float = 0.0
     trace: str = ""  # of an internal error
     stops: bool = False  # the output itself cannot be written: the next item would fare no better
-
-    def called(self, part: Part) -> str:
-        """What one of its parts is called among those of all items."""
-        return f"{self.name}: {part.name}" if part.name else self.name
+    sessions: tuple[str, ...] = ()  # its logs are of so many robots or days, and each is an item of its own
 
 
 class Ledger:
@@ -87,8 +84,9 @@ class Ledger:
 
 def read_record(about: dict[str, Any]) -> Record:
     """The record that was written as JSON."""
-    parts = tuple(map(read_part, about["parts"]))
-    return Record(**(about | {"parts": parts, "logs": tuple(about["logs"])}))
+    part = None if about["part"] is None else read_part(about["part"])
+    lists = {name: tuple(about[name]) for name in ("logs", "sessions")}
+    return Record(**(about | {"part": part} | lists))
 
 
 def relative(path: Path, root: Path) -> str:

@@ -25,7 +25,7 @@ class Problem:
 class DoneItem:
     """One item."""
 
-    name: str  # its path below the root
+    name: str  # its path below the root; with the session, where the folder holds several
     status: Status
     error: Problem | None
     verdict: str

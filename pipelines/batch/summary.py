@@ -59,18 +59,18 @@ def rows_of(summary: Summary) -> list[Mapping[str, str | float | int | None]]:
         about: dict[str, str | float | int | None] = {
             "item": r.name, "status": r.status, "exit": r.exit, "code": (r.error or {}).get("code"),
             "message": (r.error or {}).get("message"), "verdict": r.verdict, "robot": r.robot, "recorded": r.recorded}
-        numbers = [number for part in r.parts for number in _numbers(r, part, away)]
-        rows += [{**about, **number} for number in numbers] or [about]
+        numbers = [] if r.part is None else [{**about, **number} for number in _numbers(r, r.part, away)]
+        rows += numbers or [about]
     return rows
 
 
 def _numbers(record: Record, part: Part, away: Mapping[tuple[str, str], float]) -> Iterator[Mapping[str, str | float | None]]:
-    """One row for each figure and residual of a part; of one of several its quantities say whose they are."""
+    """One row for each figure and residual."""
     numbers: list[tuple[str, float, float | None, str]] = [(name, *figure) for name, figure in part.figures.items()]
     numbers += [(name, value, None, unit) for name, (value, unit) in part.residuals.items()]
     for name, value, std, unit in numbers:
-        yield {"robot": part.robot, "quantity": f"{part.name} {name}".strip(), "value": value, "std": std, "unit": unit,
-               "away": away.get((name, record.called(part)))}
+        yield {"robot": part.robot, "quantity": name, "value": value, "std": std, "unit": unit,
+               "away": away.get((name, record.name))}
 
 
 def summary_report(summary: Summary, figures: bool = True) -> Report:
@@ -92,7 +92,8 @@ def _verdict(summary: Summary) -> str:
     total, wrong, found = len(summary.records), summary.count("rejected", "failed"), summary.count("found")
     said = f"{total} items: {total - wrong - found} in order"
     said += f", in {found} something was found" if found else ""
-    unjudged = sum(one.status == "found" and any(part.verdict == "cannot-judge" for part in one.parts) for one in summary.records)
+    unjudged = sum(one.status == "found" and one.part is not None and one.part.verdict == "cannot-judge"
+                   for one in summary.records)
     said += f" ({unjudged} of these cannot be judged)" if unjudged else ""
     how = "rejected, failed or not done" if summary.interrupted else "rejected or failed"
     said += f", {wrong} {'was' if wrong == 1 else 'were'} {how}" if wrong else ""

@@ -18,13 +18,14 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.batch.items import Item
-from pipelines.batch.parts import parts_of
+from pipelines.batch.parts import part_of
 from pipelines.batch.plan import Plan, load_stage, read_plan
 from pipelines.batch.process import economise
 from pipelines.batch.record import Record, Status, relative
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, RrridError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 from pipelines.log.guard import die_with_parent
+from pipelines.log.mixed import SeveralSessions
 from pipelines.log.places import renamed, tilde
 from pipelines.stage import Inputs, Outcome, Request, Stage, run_stage
 
@@ -75,6 +76,8 @@ def attempt(item: Item) -> Record:
     warm, began = _warm[0], time.monotonic()
     try:
         return _done(item, warm, began)
+    except SeveralSessions as several:
+        return dataclasses.replace(undone(item, several, warm.plan, warm.key), sessions=several.names)
     except RrridError as problem:
         return undone(item, problem, warm.plan, warm.key)
     except Exception as problem:  # one item's misfortune, told with its trace; nothing may end the worker but a crash
@@ -102,7 +105,8 @@ def _done(item: Item, warm: _Warm, began: float) -> Record:
         return seen[0]
 
     request = Request(item.paths, Path(plan.out) / item.slug, options.robot, options.strict, True, options.force,
-                      options.no_report, options.assume_units, options.format, joints=options.joints)
+                      options.no_report, options.assume_units, options.format, joints=options.joints,
+                      session=item.session)
     outcome = run_stage(dataclasses.replace(warm.stage, read=read), request, plan.settings)
     return _record(item, warm, outcome, seen[0], Path(plan.root), time.monotonic() - began)
 
@@ -113,21 +117,20 @@ def _record(item: Item, warm: _Warm, outcome: Outcome[Any], inputs: Inputs, root
     error = None if wrong is None else {"code": wrong.code, "where": wrong.where, "message": wrong.message, "remedy": wrong.remedy}
     hashes = {relative(path, root): inputs.hashes.get(path) or hash_file(path) for path in inputs.sources if path.is_file()}
     turning = inputs.logs[0].log.robot.revolute if inputs.logs else ()
-    recorded = min((opened.log.recorded for opened in inputs.logs if opened.log.recorded), default="")
+    own = [opened.log for opened in inputs.logs if opened.log.role != "reference"]
+    recorded = min((log.recorded for log in own if log.recorded), default="")
     return Record(
         clean(item.name), item.slug, status, outcome.exit_code, error, clean(outcome.report.verdict, None),
         inputs.robot_name, recorded,
-        parts_of(outcome.json, inputs.robot_name, recorded, turning), _only_causes(outcome.json), hashes,
+        part_of(outcome.json, inputs.robot_name, recorded, turning), _only_causes(outcome.json), hashes,
         tuple(relative(log, root) for log in item.logs), hash_file(outcome.folder / PROVENANCE), warm.key, seconds)
 
 
 def _only_causes(result: Mapping[str, Any]) -> bool:
     """Whether nothing but named causes is wrong: of a run, every stage but the diagnosis, and what extends by it, is in order."""
-    runs = result.get("runs") or (result,)
-    others = any(stage["exit"] not in (0, 5) for run in runs for stage in run.get("stages", ())
+    others = any(stage["exit"] not in (0, 5) for stage in result.get("stages", ())
                  if stage["name"] not in ("diagnose", "extend"))
-    said = {run.get("verdict", "no-fault-found") for run in runs}
-    return "cause" in said and said <= {"cause", "no-fault-found"} and not others
+    return result.get("verdict") == "cause" and not others
 
 
 def undone(item: Item, problem: BaseException, plan: Plan, key: str) -> Record:

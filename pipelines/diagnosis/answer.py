@@ -146,7 +146,9 @@ def _sentence(
     what = f"{first.title}{how_much(first)}{where(first)}"
     others = _others(first, found)
     if others:
-        return f"{what}{''.join(f', or {one}' for one in others)}: these logs do not tell which. {first.experiment or ''}".rstrip()
+        which = "".join(f", or {one}" for one in others)
+        more = first.experiment or ""
+        return f"{what}{which}: these logs do not tell which. {more}".rstrip()
     size = f": {first.torque_rms:.2g} {unit}{taken_in(first, trained.models[0].rms)}"
     return f"{what}{size}{beside(findings[1:])}."
 

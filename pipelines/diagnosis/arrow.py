@@ -47,7 +47,7 @@ class Structure:
         return Structure(self.own, np.r_[self.shared, np.arange(k, k + more)])
 
     def among(self, matrix: Array) -> Structure:
-        """Return the structure; where the matrix couples joints directly, all numbers are shared."""
+        """Return the structure; all numbers are shared where the matrix couples joints."""
         for j, one in enumerate(self.own):
             for other in self.own[:j]:
                 if matrix[np.ix_(one, other)].any():

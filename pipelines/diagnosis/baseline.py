@@ -166,7 +166,7 @@ def _squares(table: Table, parts: Sequence[Parts]) -> Array:
 
 
 def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Return splits of the parts into two, half of them each, spread evenly over all that there are."""
+    """Return splits of the parts into two, half of them each, spread evenly over all splits."""
     count, size = comb(parts, parts // 2), parts // 2
     ranks = range(0, count, max(1, count // _SPLITS))[:_SPLITS]
     halves = [_combination(parts, size, rank) for rank in ranks]

@@ -168,8 +168,8 @@ Make = Callable[[Motion], Array]  # (samples, k) on one joint
 def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
     """Return the shapes without a name: splines of q, dq and torque, ripple, form of friction.
 
-    The form of a friction law is a sum of sigmoids tanh(dq / w) of any widths w (Kostić et al. 2004,
-    eq. 7): no law has the form of a machine's friction at every speed.
+    The form of a friction law is a sum of sigmoids tanh(dq / w) of any widths w (Kostić et al.
+    2004, eq. 7): no law has the form of a machine's friction at every speed.
     """
     motions = [
         one.motion for rows in (dataset.reference, dataset.later) if rows for one in rows.data.logs

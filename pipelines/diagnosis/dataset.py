@@ -117,7 +117,7 @@ class Rows:
         return self.signal(model.torque(self.data))
 
     def mixed(self, model: Exact) -> Table | None:
-        """Return the nominal columns as drives pass them on; None where no drive mixes or scales."""
+        """Return the nominal columns as drives pass them on; None if no drive mixes or scales."""
         every = [mixing(one.effect, one.values, self.n_joints) for one in model.effects]
         found = [one for one in every if one is not None]
         if not found:
@@ -149,7 +149,7 @@ class Rows:
         return tuple(numbered[self.joint == j] for j in range(self.n_joints))
 
     def less(self, torque: Array | None) -> Rows:
-        """Return the rows less a torque (rows,) [N m] that has passed no whitening; None: as measured."""
+        """Return the rows less a torque (rows,) [N m] without whitening; None: as measured."""
         return replace(self, data=replace(self.data, known=torque))
 
     @cached_property
@@ -217,7 +217,7 @@ class Dataset:
 
     @property
     def noise_ratio(self) -> Array:
-        """(joints,) variance of the later rows' noise, over that of the reference at such speeds."""
+        """(joints,) variance of the later rows' noise, over the reference's at such speeds."""
         later, level = self.later, self.known.level
         if level is None:
             return np.ones(later.n_joints)
@@ -260,7 +260,7 @@ def _session_start(data: Data) -> float | None:
 
 
 def _columns(prepared: Prepared) -> Columns:
-    """Return the nominal columns; without reference logs the curve of the sign change is fitted too.
+    """Return the nominal columns; without reference logs the sign change's curve is fitted too.
 
     By which curve friction changes its sign nobody knows, and none is a fault. With reference logs
     the form of friction (`prior`) holds what they show of it.

@@ -138,10 +138,10 @@ def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
 
 
 def _wandering(later: Later) -> Array:
-    """Return the share of each joint's torque (joints,) that its noise has for a whole block of time.
+    """Return the share of each joint's torque (joints,) that its noise keeps for a block of time.
 
-    Noise of level σ whitened by A has the density σ² / A(1)² at the lowest frequencies: its means over
-    n rows have the variance σ² / (n A(1)²). With reference logs their noise is what is usual.
+    Noise of level σ whitened by A has the density σ² / A(1)² at the lowest frequencies: its means
+    over n rows have the variance σ² / (n A(1)²). With reference logs their noise is what is usual.
     """
     rows = later.rows
     whitening = rows.data.logs[0].whitening

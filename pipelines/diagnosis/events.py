@@ -48,9 +48,10 @@ def standing_out(
     """Return the best window on a residual (rows of each joint), None where it may be noise.
 
     An event is of one moment: its window stands out of what is left at other times of the session.
-    The largest gain of m independent windows of white noise has a known law; what other times exceed
-    it by is measured, by the largest of each half of a log without its best window (`upper_point`).
-    No model of a torque is exact: a push has to be more than a share of the torque at its moment.
+    The largest gain of m independent windows of white noise has a known law; what other times
+    exceed it by is measured, by the largest of each half of a log without its best window
+    (`upper_point`). No model of a torque is exact: a push has to be more than a share of the torque
+    at its moment.
     """
     best, gains = None, list[float]()
     for log in range(len(rows.data.logs)):

@@ -2,7 +2,8 @@
 
     limits = limits_of(later, state, baseline)
 
-A cause of amplitude a adds a² h to T_c, h its share of H_c (`screening`). It is found with 95 % where
+A cause of amplitude a adds a² h to T_c, h its share of H_c (`screening`). It is found with
+95 % where
 
     a √h > √threshold + 1.65
 
@@ -151,7 +152,7 @@ def _told(
 
 
 def _main(effect: Effect, values: dict[str, float]) -> Quantity | None:
-    """Return the parameter that says how much there is of an effect; None where no value is finite."""
+    """Return the parameter that is the size of an effect; None where no value is finite."""
     return next(
         (
             q

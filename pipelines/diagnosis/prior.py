@@ -1,13 +1,13 @@
 """Prior of a healthy machine: what its reference logs, or its other joints, tell of it.
 
     prior = prior_of(dataset, dictionary, config)
-    prior.start                            information and moment of the numbers before the later logs
-    prior.of(parts)                        the same after some parts of the known logs
+    prior.start                 information and moment of the numbers before the later logs
+    prior.of(parts)             the same after some parts of the known logs
 
 With reference logs, the prior of later logs is their posterior N(m, V), plus what may drift between
 sessions without a fault: friction, by a relative standard deviation; rigid-body numbers not at all.
-Without them nominal numbers have a flat prior, and standing ones are as large as is typical of their
-family over the joints of this machine: a fault is what stands out of its family.
+Without them nominal numbers have a flat prior, and standing ones are as large as is typical of
+their family over the joints of this machine: a fault is what stands out of its family.
 """
 
 from __future__ import annotations

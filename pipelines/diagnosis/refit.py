@@ -1,4 +1,4 @@
-"""Exact fits to the later rows: Levenberg-Marquardt under the prior, and the block-wise predictive score.
+"""Exact fits to the later rows: Levenberg-Marquardt under the prior; score of each block.
 
 later = Later.of(dataset, dictionary, prior)
 state = later.start(config)
@@ -205,12 +205,12 @@ class Later:
         return sum(price(a - b) for a, b in zip(*both, strict=True))
 
     def possible(self, state: State, explained: float, config: DiagnosisConfig) -> bool:
-        """Return whether the last effect can be a cause with its numbers, each as uncertain as it is.
+        """Return whether the last effect can be a cause with its numbers and their deviations.
 
-        An amplitude outside its range may be within it by its standard deviation, and one that surely
-        is as slight as in any arm is no cause; a number of a shape that is held at the end of its
-        range has its best value outside. What it costs to be in its range, (distance / std)², may be
-        a share of what the effect explains, for no law is exact.
+        An amplitude outside its range may be within it by its standard deviation, and one that
+        surely is as slight as in any arm is no cause; a number of a shape that is held at the end
+        of its range has its best value outside. What it costs to be in its range,
+        (distance / std)², may be a share of what the effect explains, for no law is exact.
 
         Args:
             explained: cost that the effect saves.
@@ -240,7 +240,7 @@ class Later:
         return within
 
     def _mostly_acting(self, effect: Effect) -> bool:
-        """Return whether an effect acts in most rows: a joint that is clipped so follows nothing."""
+        """Return whether an effect acts in most rows; a joint clipped so follows nothing."""
         logs, arm = self.rows.data.logs, self.dataset.arm
         table = [np.any(effect.columns(one.motion, arm), axis=2) for one in logs]
         acting = [one.at_rows(x).T.ravel() for one, x in zip(logs, table, strict=True)]
@@ -343,7 +343,7 @@ class Later:
         return state.belief.losses(state.effects.take(state.lasting), state.residual)
 
     def unchanged(self, state: State, key: Key) -> State:
-        """Return the state refitted with the standing numbers of a cause held at their prior mean."""
+        """Return the state refitted with a cause's standing numbers held at their prior mean."""
         own = [group.key == key for group in self.prior.groups]
         at = self.prior.n_nominal + np.flatnonzero(own)
         if not len(at):

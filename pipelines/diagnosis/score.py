@@ -43,8 +43,8 @@ _SEED = 1
 class Blocks:
     """What predicts each block of rows from all others, by the numbers of some columns.
 
-    I - J_bᵀ P⁻¹ J_b = D - Uᵀ U: D of each joint and its own numbers, U (s, rows) of the shared ones;
-    its inverse is D⁻¹ + D⁻¹Uᵀ (I - U D⁻¹Uᵀ)⁻¹ U D⁻¹ (Woodbury).
+    I - J_bᵀ P⁻¹ J_b = D - Uᵀ U: D of each joint and its own numbers, U (s, rows) of the shared
+    ones; its inverse is D⁻¹ + D⁻¹Uᵀ (I - U D⁻¹Uᵀ)⁻¹ U D⁻¹ (Woodbury).
     """
 
     rows: tuple[tuple[Indices, ...], ...]  # of each block, of each joint
@@ -100,7 +100,7 @@ def log_scores(losses: Array, rows: Array) -> Array:
 
 
 def probabilities(scores: Mapping[K, Array], config: DiagnosisConfig) -> dict[K, float]:
-    """Return how probable each model is: the mean of exp(-score / 2), normalised, over the bootstrap.
+    """Return how probable each model is: the bootstrap mean of exp(-score / 2), normalised.
 
     Yao, Vehtari, Simpson & Gelman 2018, pseudo-BMA+.
     """

@@ -68,6 +68,7 @@ class Selection:
     stopped: str  # why a significant cause was not selected; "" where there was none
     follows: str  # what the rest follows; "" where nothing is significant
     rounds: tuple[Round, ...] = ()
+    cut: tuple[Key, ...] = ()  # causes still significant when the largest number was reached
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +115,14 @@ def select(
         causes.append(found.cause)
         explained += max(state.cost - found.state.cost, 0.0)
         state = found.state
+    cut: tuple[Key, ...] = ()
+    if len(causes) >= config.causes:
+        taken = [cause.key for cause in causes]
+        more = _significant(later, state, taken, explained, baseline, config).values()
+        ranked = sorted(more, key=lambda one: -one.gain)
+        cut = tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
     causes, state = _backward(later, causes, state, config)
-    return Selection(tuple(causes), start, state, explained, stopped, follows, tuple(rounds))
+    return Selection(tuple(causes), start, state, explained, stopped, follows, tuple(rounds), cut)
 
 
 def _round(
@@ -163,9 +170,9 @@ def _significant(
 ) -> dict[Key, Screened]:
     """Return the candidates above the family-wise threshold, the best shape of each.
 
-    No law is exact: at the joints of the causes found so far, and of what stands since the reference,
-    what remains of these is larger than the noise, and a further cause has to gain more than a share
-    of what they explain there.
+    No law is exact: at the joints of the causes found so far, and of what stands since the
+    reference, what remains of these is larger than the noise, and a further cause has to gain more
+    than a share of what they explain there.
     """
     rows = later.rows.count
     known = later.shares @ (explained * later.acting(state) + later.standing)
@@ -220,7 +227,7 @@ def _nearly(
     others: Mapping[Key, State],
     config: DiagnosisConfig,
 ) -> list[Candidate]:
-    """Return the cause that explains as much as any shape without a name, as far as laws are exact."""
+    """Return the cause that explains as much as any unnamed shape, as far as laws are exact."""
     best = min(tried, key=lambda one: _loss(later, one.state))
     free = min(_loss(later, other) for other in others.values())
     missing = _loss(later, best.state) - free
@@ -314,7 +321,7 @@ def _candidate(
 
 
 def _plainer(model: Exact) -> tuple[Exact, ...]:
-    """Return the model with the plain sign change at the joint of its last effect, if it has another.
+    """Return the model with the plain sign change at its last effect's joint, if it has another.
 
     Fitted without the effect, the curve of the sign change has taken some of it.
     """

@@ -81,7 +81,7 @@ class Trained:
     standing: tuple[Acting, ...] = ()  # effects that the models have beside those of their own
 
     def arm(self, place: int) -> Arm:
-        """Return an arm with the baseline effects and every lasting cause, with their deviations."""
+        """Return an arm with the baseline effects and every lasting cause, and their deviations."""
         done = self.models[place]
         known = done.covariance()
         kept = [k for k, one in enumerate(done.model.effects) if one.log is None]
@@ -97,7 +97,8 @@ class Trained:
         """Return the residual (rows,) [N m] of model number `place` on rows it was not fitted to.
 
         Without validation logs, each block of time is predicted from all others, to first order:
-        θ_-b - θ = -(P - J_b J_bᵀ)⁻¹ J_b r_b. An event keeps its numbers, which no other block tells.
+        θ_-b - θ = -(P - J_b J_bᵀ)⁻¹ J_b r_b. An event keeps its numbers, which no other block
+        tells.
         """
         done, state = self.models[place], self.states[place]
         if self.judge is not None:

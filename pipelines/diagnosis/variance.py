@@ -4,9 +4,9 @@
     dataset, dictionary = settle(dataset, dictionary, config)
 
 Standing numbers s_g ~ N(0, τ_g), with τ_g by empirical Bayes: expectation maximisation, each group
-shrunk to its family (Dempster, Laird & Rubin 1977; Efron & Morris 1973). The noise Σ of each session
-is an autoregressive process for each joint: what the nominal model and every candidate together leave,
-fitted by generalised least squares (Cochrane & Orcutt 1949).
+shrunk to its family (Dempster, Laird & Rubin 1977; Efron & Morris 1973). The noise Σ of each
+session is an autoregressive process for each joint: what the nominal model and every candidate
+together leave, fitted by generalised least squares (Cochrane & Orcutt 1949).
 """
 
 from __future__ import annotations
@@ -110,9 +110,9 @@ def settle(
 ) -> tuple[Dataset, Dictionary]:
     """Return the rows of each session whitened, in units of its own noise, and their columns.
 
-    Sessions that are compared use the same columns, the first shapes: what is left of them is alike.
-    Rows alone use the best shape of each cause, and the best window of each log, or a fault of another
-    shape would be noise.
+    Sessions that are compared use the same columns, the first shapes: what is left of them is
+    alike. Rows alone use the best shape of each cause, and the best window of each log, or a fault
+    of another shape would be noise.
 
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
@@ -146,7 +146,7 @@ def settle(
 
 
 def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tuple[Group, ...]:
-    """Return of each cause at each joint the shape that explains most beside the nominal columns."""
+    """Return each cause's shape at each joint that explains most beside the nominal columns."""
     nominal = rows.nominal.scaled(_unit(rows.nominal))
     known = Arrow.of(nominal.gram(nominal) + _FLAT * np.eye(nominal.width), Structure.of(nominal))
     cross = nominal.gram(candidates)

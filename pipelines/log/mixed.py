@@ -1,57 +1,69 @@
-"""Refuse to take the logs of several robots or days for one, and say where nothing but the folder tells two apart.
+"""Refuse the logs of several robots or days, and name logs that nothing but their folder distinguishes.
 
-    of_one_session(inputs, reads)   the logs of one; SeveralSessions, with the name of each, where a stage would mix them
-    check_alike(inputs)             S21: logs of one name in two folders, which nothing in them tells apart; another day that judges
+    of_one_session(inputs)          the logs of one session; SeveralSessions, with the list, where there are more
+    refuse_mixed(inputs, folders)   the same for each of several folders, whose logs are read one by one
+    check_alike(inputs)             S21: logs of one name in two folders; validation logs of another day
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pipelines.errors import Check, UsageError, clean
-from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
 from pipelines.log.inputs import Inputs, only
 from pipelines.log.sessions import Session, apart, day_that_judges
 
-__all__ = ["SeveralSessions", "check_alike", "of_one_session"]
+__all__ = ["SeveralSessions", "check_alike", "of_one_session", "refuse_mixed"]
 
 _LISTED: Final = 4  # logs of a session that lies among others
-_SESSIONS: Final = 6  # named in one error
+_SESSIONS: Final = 6  # listed with their logs; where there are more, by their names alone
 
 
 class SeveralSessions(UsageError):
-    """Logs of several robots or days, for a stage that wants those of one; `names` are those of the sessions."""
+    """C02: the logs are of several robots or days. `names` are those of the sessions."""
 
     names: tuple[str, ...] = ()
 
+    def as_dict(self) -> dict[str, Any]:
+        return {**super().as_dict(), "sessions": [clean(name) for name in self.names]}
 
-def of_one_session(inputs: Inputs, reads: Callable[[ExperimentLog], bool]) -> Inputs:
-    """The inputs with the logs of one robot and one day, and what was named for a role: all where the stage reads none of others.
 
-    Args:
-        reads: whether the stage looks at a log; what it does not look at it cannot mix.
+def of_one_session(inputs: Inputs) -> Inputs:
+    """Return the inputs if their logs are of one robot and one day; logs named for a role go with every day of their robot.
 
     Raises:
-        SeveralSessions: C02, they are of several, which can be taken one at a time.
-        UsageError: C02, of several robots, and some were named for a role: those of one can mean nothing to the other.
+        SeveralSessions: C02, they are of several; --session takes one, `batch` takes all.
+        UsageError: C02, they are of several robots, and some were named for a role.
     """
-    parts = [(session, [o for o in session.logs if o.log.origin != "planned" and reads(o.log)])
+    parts = [(session, [o for o in session.logs if o.log.origin != "planned"])
              for session in apart(inputs.logs, inputs.named)]
     every = {opened.path for _, used in parts for opened in used}
     if len(parts) < 2 or not every:
         return inputs
-    if (whole := next((session for session, used in parts if len(used) == len(every)), None)) is not None:
+    whole = next((session for session, used in parts if len(used) == len(every)), None)
+    if whole is not None:
         return only(inputs, whole)
-    raise _several(inputs, [(session, used) for session, used in parts if not _within_another(used, parts)])
+    raise _several(inputs, [part for part in parts if not _within_another(part[1], parts)])
+
+
+def refuse_mixed(inputs: Inputs, folders: Iterable[Path]) -> None:
+    """Refuse a folder whose logs are of several sessions; logs that were named one by one may be of any.
+
+    Raises:
+        SeveralSessions: C02, one of `folders` holds several.
+    """
+    for folder in folders:
+        logs = tuple(opened for opened in inputs.logs if opened.path.is_relative_to(folder))
+        of_one_session(replace(inputs, logs=logs, label=str(folder)))
 
 
 def _within_another(used: list[Opened], parts: Iterable[tuple[Session, list[Opened]]]) -> bool:
-    """Whether a session has no log of its own: none at all, or what was before alone, which stands with the later ones too."""
+    """Return whether another session has all logs of this one, such as reference logs alone."""
     mine = {opened.path for opened in used}
     return any(mine < {opened.path for opened in others} for _, others in parts)
 
@@ -59,28 +71,32 @@ def _within_another(used: list[Opened], parts: Iterable[tuple[Session, list[Open
 def _several(inputs: Inputs, parts: Collection[tuple[Session, list[Opened]]]) -> UsageError:
     robots = len({(session.robot, session.description) for session, _ in parts})
     days = len(parts) > robots
-    of = " and ".join(kind for kind, there in (("robots", robots > 1), ("days", days)) if there)
-    message = f"logs of several {of}: {_listed(parts)}"
+    kinds = " and ".join(kind for kind, there in (("robots", robots > 1), ("days", days)) if there)
+    message = f"logs of several {kinds}: {_listed(parts)}"
     if robots > 1 and inputs.named:
-        return UsageError("C02", message, where=inputs.label,
-                          remedy="name logs of one robot alone for --identify, --validate and --reference; if it is one robot, "
-                          "described twice, give --robot FILE")
-    names = tuple(session.name for session, _ in parts)
-    own = "; days that belong together: name their logs with --identify and --validate" if days else ""
-    problem = SeveralSessions("C02", message, where=inputs.label,
-                              remedy=f"take one at a time: --session '{names[0]}'; or 'rrrid run', which reports each{own}")
-    problem.names = names
+        return UsageError(
+            "C02", message, where=inputs.label,
+            remedy="name logs of one robot alone for --identify, --validate and --reference; if "
+            "it is one robot, described twice, give --robot FILE")
+    own = "; for days that belong together, name their logs with --identify and --validate"
+    problem = SeveralSessions(
+        "C02", message, where=inputs.label,
+        remedy=f"take one with --session '{next(iter(parts))[0].name}', or all with "
+        f"'rrrid batch FOLDER [--stage COMMAND]'{own if days else ''}")
+    problem.message = message  # the list is complete, however long
+    problem.names = tuple(session.name for session, _ in parts)
     return problem
 
 
 def _listed(parts: Collection[tuple[Session, list[Opened]]]) -> str:
     """The sessions, and the logs of each: by their folder, where that holds no others."""
+    if len(parts) > _SESSIONS:
+        return "; ".join(clean(session.name, 60) for session, _ in parts)
     homes: dict[Path, set[str]] = defaultdict(set)
     for session, used in parts:
         for opened in used:
             homes[opened.path.parent].add(session.name)
-    told = [f"{clean(session.name, 60)} ({_members(used, homes)})" for session, used in parts]
-    return "; ".join(told[:_SESSIONS]) + (f"; and {len(told) - _SESSIONS} more" if len(told) > _SESSIONS else "")
+    return "; ".join(f"{clean(session.name, 60)} ({_members(used, homes)})" for session, used in parts)
 
 
 def _members(used: list[Opened], homes: dict[Path, set[str]]) -> str:

@@ -17,10 +17,9 @@ from typing import Any
 from pipelines.errors import EnvironmentFault, UsageError, clean
 from pipelines.log.files import PROVENANCE, hash_file
 
-__all__ = ["free_name", "given_names", "holds_apart", "keep_apart", "provenance_of", "refuse_foreign", "refuse_own_place",
+__all__ = ["free_name", "given_names", "keep_apart", "provenance_of", "refuse_foreign", "refuse_own_place",
            "refuse_unwritable", "renamed", "short_names", "slug", "tilde", "told_apart", "written_by"]
 
-_MOST_APART = 1000  # outputs in one folder
 _ELSEWHERE = "choose another folder with --out"
 
 
@@ -122,14 +121,6 @@ def _members(folder: Path, above: str = "") -> Iterator[str]:
             yield f"{above}{name}"
         else:
             yield from _members(path, f"{above}{name}/")
-
-
-def holds_apart(folder: Path, command: str) -> bool:
-    """Return whether `folder` holds nothing but outputs of `command`, one beside the other: of several robots or days."""
-    if folder.is_symlink() or not folder.is_dir():
-        return False
-    there = list(islice(folder.iterdir(), _MOST_APART))
-    return bool(there) and len(there) < _MOST_APART and all(written_by(one) == command and not one.is_symlink() for one in there)
 
 
 def written_by(folder: Path) -> str:

@@ -99,7 +99,7 @@ def name_in(robot: str) -> str:
 
 def _single(result: Mapping[str, Any]) -> Mapping[str, Any]:
     """Of a run its stages alone: what it repeats of them beside stands there as well."""
-    return {key: result[key] for key in ("stages", "runs") if result.get(key)} if "stages" in result else result
+    return {"stages": result["stages"]} if "stages" in result else result
 
 
 def _walk(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:

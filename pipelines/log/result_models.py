@@ -14,43 +14,39 @@ from typing import Any, Final
 
 __all__ = ["Place", "less_findings", "modelled"]
 
-Place = tuple[str, str, int | None]  # the part of a run with several robots or days, else ""; cause; joint, from 1
+Place = tuple[str, int | None]  # cause; joint, from 1
 _FINDINGS: Final = ("findings", "baseline_effects")
 
 
-def modelled(result: Mapping[str, Any], part: str = "") -> frozenset[Place]:
+def modelled(result: Mapping[str, Any]) -> frozenset[Place]:
     """Every law and effect of every model in `result`: a stage's, a run's, or a model file's.
 
     Raises:
         KeyError, TypeError, AttributeError: it is no result.
     """
-    return frozenset(_held(result, part))
+    return frozenset(_held(result))
 
 
-def _held(result: Mapping[str, Any], part: str) -> Iterator[Place]:
+def _held(result: Mapping[str, Any]) -> Iterator[Place]:
     for kind in ("friction", "effects") if "base_parameters" in result else ():
-        yield from ((part, str(one["effect"]), one["joint"]) for one in result[kind])
+        yield from ((str(one["effect"]), one["joint"]) for one in result[kind])
     if isinstance(result.get("model"), Mapping):
-        yield from _held(result["model"], part)
+        yield from _held(result["model"])
     for step in result.get("stages") or ():
-        yield from _held(step.get("result") or {}, part)
-    for run in result.get("runs") or ():
-        yield from _held(run, run["name"])
+        yield from _held(step.get("result") or {})
 
 
-def less_findings(result: Mapping[str, Any], held: Container[Place], part: str = "") -> dict[str, Any]:
+def less_findings(result: Mapping[str, Any], held: Container[Place]) -> dict[str, Any]:
     """`result` without the findings, and baseline effects, that are `held`."""
     less = dict(result)
     for kind in _FINDINGS:
         if isinstance(less.get(kind), list):
-            less[kind] = [one for one in less[kind] if not _is_held(one, held, part)]
+            less[kind] = [one for one in less[kind] if not _is_held(one, held)]
     if less.get("stages"):
-        less["stages"] = [{**step, "result": less_findings(step["result"], held, part)} if step.get("result") else step
+        less["stages"] = [{**step, "result": less_findings(step["result"], held)} if step.get("result") else step
                           for step in less["stages"]]
-    if less.get("runs"):
-        less["runs"] = [less_findings(run, held, run["name"]) for run in less["runs"]]
     return less
 
 
-def _is_held(finding: Any, held: Container[Place], part: str) -> bool:
-    return isinstance(finding, Mapping) and (part, str(finding.get("cause")), finding.get("joint")) in held
+def _is_held(finding: Any, held: Container[Place]) -> bool:
+    return isinstance(finding, Mapping) and (str(finding.get("cause")), finding.get("joint")) in held

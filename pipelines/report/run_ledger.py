@@ -16,7 +16,7 @@ from pipelines.model.estimation.result import Result as Estimate
 from pipelines.report import style
 from pipelines.report.diagnosis_words import together
 from pipelines.report.report import Figure, Section, Table, Tone
-from pipelines.report.run_result import Group
+from pipelines.report.run_result import Step
 from pipelines.report.style import format_number, to_one_place
 from pipelines.report.tip_words import span_words
 
@@ -50,10 +50,10 @@ class Line:
         return 100.0 * (1.0 - math.sqrt(sum(x * x for x in self.rms)) / before) if before > 0.0 else None
 
 
-def ledger_lines(group: Group) -> tuple[Line, ...]:
-    """Every step that a group's stages have judged on held-out logs, in the order in which the model grows."""
+def ledger_lines(stages: Sequence[Step]) -> tuple[Line, ...]:
+    """Every step that the stages have judged on held-out logs, in the order in which the model grows."""
     lines = list[Line]()
-    for line in (line for step in group.stages for line in _of(step.result, step.name)):
+    for line in (line for step in stages for line in _of(step.result, step.name)):
         if line.before is not None and not any(_alike(above.rms, line.before) for above in lines):
             lines.append(Line(f"the model of {line.stage}, without it", line.stage, line.before, None, None))
         lines.append(line)
@@ -129,44 +129,39 @@ def _whole(gain: Gain) -> bool:
     return bool(np.isfinite(gain.validate_torque_rms.after).all() and np.isfinite(gain.validate_torque_rms.before).all())
 
 
-def ledger_section(groups: Sequence[tuple[str, tuple[Line, ...]]]) -> Section | None:
+def ledger_section(lines: Sequence[Line]) -> Section | None:
     """The table and its picture; None where no step was judged."""
-    told = [(name, lines) for name, lines in groups if lines]
-    if not told:
+    if not lines:
         return None
-    joints = max(len(line.rms) for _, lines in told for line in lines)
-    several = len(groups) > 1
+    joints = len(lines[0].rms)
     rows, tones = [], list[Tone]()
-    for name, lines in told:
-        rounded = iter(to_one_place([error for line in lines for error in line.rms]))
-        for line in lines:
-            errors = [next(rounded) if j < len(line.rms) else None for j in range(joints)]
-            rows.append((*((name,) if several else ()), line.step, *errors, _rounded(line.gain), _judged(line), _tip(line)))
-            tones.append("attention" if line.sure is False else "good" if line.sure else "neutral")
-    heads = (*(("logs",) if several else ()), "step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain in rms [%]",
-             "beyond chance", "simulated tip [mm]")
+    rounded = iter(to_one_place([error for line in lines for error in line.rms]))
+    for line in lines:
+        errors = [next(rounded) for _ in line.rms]
+        rows.append((line.step, *errors, _rounded(line.gain), _judged(line), _tip(line)))
+        tones.append("attention" if line.sure is False else "good" if line.sure else "neutral")
+    heads = ("step", *(f"joint {j + 1} [N m]" for j in range(joints)), "gain in rms [%]", "beyond chance", "simulated tip [mm]")
     text = ("Torque error on held-out logs, root mean square, with each step of the model. A gain is the share of that error, "
             "all joints together, that a step takes off the line it builds on. The table of candidate causes gives it in the "
-            "square, of the fitted logs: half the error is 50 % here and 75 % there.", _compared(told), *_simulated(told))
+            "square, of the fitted logs: half the error is 50 % here and 75 % there.", _compared(lines), *_simulated(lines))
     return Section("Error by model stage, on held-out logs", text, (Table(heads, tuple(rows), tones=tuple(tones)),),
-                   tuple(_picture(name, lines, several) for name, lines in told))
+                   (_picture(lines),))
 
 
-def _compared(told: Sequence[tuple[str, tuple[Line, ...]]]) -> str:
+def _compared(lines: Sequence[Line]) -> str:
     """Which lines may be laid beside each other."""
-    stages = list(dict.fromkeys(line.stage for _, lines in told for line in lines))
+    stages = list(dict.fromkeys(line.stage for line in lines))
     if len(stages) < 2:
         return f"All of them are {stages[0]}'s."
     return (f"The lines are {', '.join(stages[:-1])}'s and {stages[-1]}'s, in this order. Each stage filters and thins out the "
             "torque in its own way: lines of one stage can be compared with each other, those of two only roughly.")
 
 
-def _simulated(told: Sequence[tuple[str, tuple[Line, ...]]]) -> Iterator[str]:
+def _simulated(lines: Sequence[Line]) -> Iterator[str]:
     """What the last column is taken over."""
-    for name, lines in told:
-        over = "; and ".join(dict.fromkeys(line.over for line in lines if line.over))
-        if over:
-            yield f"The tip{f' of {name}' if len(told) > 1 else ''} is simulated {over}."
+    over = "; and ".join(dict.fromkeys(line.over for line in lines if line.over))
+    if over:
+        yield f"The tip is simulated {over}."
 
 
 def _rounded(x: float | None) -> float | None:
@@ -188,7 +183,7 @@ def _two_lines(step: str) -> str:
     return textwrap.fill(textwrap.shorten(step, 68, placeholder=" …"), 36)
 
 
-def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
+def _picture(lines: Sequence[Line]) -> Figure:
     joints = len(lines[0].rms)
 
     def draw(drawing: Drawing) -> None:
@@ -196,7 +191,7 @@ def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
         places = np.arange(len(lines), dtype=np.float64)
         ends = [k for k in range(1, len(lines)) if lines[k].stage != lines[k - 1].stage]
         for j in range(joints):
-            errors = np.array([line.rms[j] if j < len(line.rms) else math.nan for line in lines])
+            errors = np.array([line.rms[j] for line in lines])
             axes.plot(np.insert(errors, ends, math.nan), np.insert(places, ends, math.nan), marker="o", markersize=4.0,
                       linewidth=1.0, color=_COLOURS[j % len(_COLOURS)], alpha=1.0 if j < len(_COLOURS) else 0.5,
                       label=f"joint {j + 1}")
@@ -207,7 +202,6 @@ def _picture(name: str, lines: tuple[Line, ...], several: bool) -> Figure:
         axes.set_xlabel("held-out torque error [N m]")
         axes.legend(fontsize=7)
 
-    of = f" of {name}" if several else ""
     joined = "; joined are the steps of one stage" if len({line.stage for line in lines}) > 1 else ""
-    caption = f"Held-out torque error{of} with each step of the model{joined}; to the left is better."
-    return Figure(f"ledger-{name}" if several else "ledger", caption, draw, (6.0, 1.2 + 0.28 * len(lines)))
+    caption = f"Held-out torque error with each step of the model{joined}; to the left is better."
+    return Figure("ledger", caption, draw, (6.0, 1.2 + 0.28 * len(lines)))

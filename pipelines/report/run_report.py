@@ -14,7 +14,7 @@ from pipelines.report.boundary_card import CARD, boundary_card
 from pipelines.report.joint_units import units_in
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.run_ledger import ledger_lines, ledger_section
-from pipelines.report.run_result import Group, Result, Step
+from pipelines.report.run_result import Result, Step
 from pipelines.report.style import format_number
 
 __all__ = ["run_report"]
@@ -25,47 +25,35 @@ _FIGURES = 12  # of one stage: ten logs drawn four times each are for who asks f
 
 def run_report(result: Result) -> Report:
     """The answer before its sources."""
-    steps = [(group.name, step) for group in result.groups for step in group.stages]
-    tone = max((step.report.tone for _, step in steps), key=_WORST.index)
-    verdicts = [text for group in result.groups for text in _verdicts(group)]
-    single = len(steps) == 1
-    sections = [] if single else [section for section in (
-        ledger_section([(group.name, ledger_lines(group)) for group in result.groups]), _stages(steps), _lacking(steps)) if section]
-    cards = [_titled(boundary_card(group.boundary), group.name) for group in result.groups]
-    sections = [*(section for card in cards for section in card if not single), *sections]
-    for name, step in sorted(steps, key=lambda one: not isinstance(one[1].result, Diagnosis)):
-        own = step.report.sections if single else _fewer(step.report.sections, step.name)
-        sections += _titled(own, "" if single else " · ".join(filter(None, (name, step.name))))
-    return Report(_title(result), " ".join(verdicts), tone, _key_figures([step for _, step in steps]), tuple(sections),
-                  _advice(steps))
+    steps = result.stages
+    tone = max((step.report.tone for step in steps), key=_WORST.index)
+    advice = tuple(line for step in steps for line in step.report.advice)
+    if len(steps) == 1:
+        sections = list(steps[0].report.sections)
+    else:
+        sections = [*boundary_card(result.boundary), *filter(None, (
+            ledger_section(ledger_lines(steps)), _stages(steps), _lacking(steps)))]
+        for step in sorted(steps, key=lambda step: not isinstance(step.result, Diagnosis)):
+            sections += _titled(_fewer(step.report.sections, step.name), step.name)
+    return Report(_title(steps), " ".join(_verdicts(steps)), tone, _key_figures(steps), tuple(sections), advice)
 
 
-def _advice(steps: Iterable[tuple[str, Step]]) -> tuple[str, ...]:
-    """That of every diagnosis, with the logs it is of."""
-    return tuple(f"{name}: {line}" if name else line for name, step in steps for line in step.report.advice)
-
-
-def _title(result: Result) -> str:
-    """With the robot, where a diagnosis knows it and there is one."""
-    robots = {step.result.robot for group in result.groups for step in group.stages if isinstance(step.result, Diagnosed)} - {""}
+def _title(steps: Iterable[Step]) -> str:
+    """With the robot, where a diagnosis knows it."""
+    robots = {step.result.robot for step in steps if isinstance(step.result, Diagnosed)} - {""}
     return f"Run: {robots.pop()}" if len(robots) == 1 else "Run"
 
 
-def _verdicts(group: Group) -> list[str]:
+def _verdicts(steps: Sequence[Step]) -> list[str]:
     """What diagnosis says, and the extended model. Then what was refused, each reason once; where nothing was, which stages have
     remarks, or what these say where there is neither. Without all that, what the last stage says.
-
-    Of several robots or days each has its first answer there; the table of stages has the others.
     """
-    done = [step for step in group.stages if step.result is not None]
+    done = [step for step in steps if step.result is not None]
     answers = [step for kind in (Diagnosis, Extension) for step in done if isinstance(step.result, kind)]
-    refused = _refusals(group)
-    others = [step for step in group.stages if step not in answers and step.report.tone in ("attention", "bad")]
+    refused = _refusals(steps)
+    others = [step for step in steps if step not in answers and step.report.tone in ("attention", "bad")]
     told = _look_at(others) if answers else [step.report.verdict for step in others]
-    shown = [*(step.report.verdict for step in answers), *(refused or told)] or [step.report.verdict for step in done[-1:]]
-    if group.name:
-        return [f"{group.name}: {words}" for words in shown[:1]]
-    return shown
+    return [*(step.report.verdict for step in answers), *(refused or told)] or [step.report.verdict for step in done[-1:]]
 
 
 def _look_at(steps: Sequence[Step]) -> list[str]:
@@ -79,10 +67,10 @@ def _look_at(steps: Sequence[Step]) -> list[str]:
     return found
 
 
-def _refusals(group: Group) -> list[str]:
+def _refusals(steps: Iterable[Step]) -> list[str]:
     """Why stages were not done: one sentence for each reason and one for what to do, with the stages it stopped."""
     reasons: dict[tuple[str, str], list[tuple[str, str]]] = {}
-    for step in group.stages:
+    for step in steps:
         if step.result is None and step.exit != NothingMatched.exit_code:
             for check in step.checks:
                 reasons.setdefault((check.code, check.message), []).append((step.name, check.remedy))
@@ -93,7 +81,7 @@ def _refusals(group: Group) -> list[str]:
     return found
 
 
-def _key_figures(steps: list[Step]) -> Table | None:
+def _key_figures(steps: Sequence[Step]) -> Table | None:
     """Those of the diagnosis, where there is one alone; of a single stage its own.
 
     Its extended model is not the one in the folder of `extend`, which fits everything again: what that leaves is said below.
@@ -108,20 +96,19 @@ def _key_figures(steps: list[Step]) -> Table | None:
     return dataclasses.replace(table, caption=f"{table.caption} {said}")
 
 
-def _stages(steps: Iterable[tuple[str, Step]]) -> Section:
-    steps = list(steps)
-    table = Table(("logs", "stage", "verdict"), tuple((name or "all", step.name, step.report.verdict) for name, step in steps),
-                  caption="Each stage in the order it was run.", tones=tuple(step.report.tone for _, step in steps))
+def _stages(steps: Iterable[Step]) -> Section:
+    table = Table(("stage", "verdict"), tuple((step.name, step.report.verdict) for step in steps),
+                  caption="Each stage in the order it was run.", tones=tuple(step.report.tone for step in steps))
     return Section("Stages", tables=(table,))
 
 
-def _lacking(steps: Iterable[tuple[str, Step]]) -> Section | None:
+def _lacking(steps: Iterable[Step]) -> Section | None:
     """What was passed over for want of a recording, and which one would bring it."""
-    rows = tuple((name or "all", step.name, check.message, check.remedy) for name, step in steps
+    rows = tuple((step.name, check.message, check.remedy) for step in steps
                  if step.exit == NothingMatched.exit_code for check in step.checks)
     if not rows:
         return None
-    return Section("What these logs lack", (), (Table(("logs", "stage", "why it was passed over", "what to record"), rows),))
+    return Section("What these logs lack", (), (Table(("stage", "why it was passed over", "what to record"), rows),))
 
 
 def _fewer(sections: Iterable[Section], stage: str) -> list[Section]:
@@ -145,6 +132,6 @@ def _these(section: Section) -> str:
 def _titled(sections: Iterable[Section], prefix: str) -> list[Section]:
     """`sections`, their titles and figures told apart from those of other stages."""
     return [dataclasses.replace(
-        section, title=f"{prefix}: {section.title}" if prefix else section.title,
-        figures=tuple(dataclasses.replace(f, name=f"{slug(prefix)}-{f.name}" if prefix else f.name) for f in section.figures))
+        section, title=f"{prefix}: {section.title}",
+        figures=tuple(dataclasses.replace(f, name=f"{slug(prefix)}-{f.name}") for f in section.figures))
         for section in sections]

@@ -1,4 +1,4 @@
-"""What a run leaves: every stage's outcome, for every group of logs; everything computed, nothing drawn."""
+"""What a run leaves: every stage's outcome; everything computed, nothing drawn."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pipelines.log.results import FLAT, NOT_STORED
 from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.report import Report
 
-__all__ = ["Group", "Result", "Step"]
+__all__ = ["Result", "Step"]
 
 
 @dataclass(frozen=True)
@@ -27,24 +27,10 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Group:
-    """The logs of one robot, recorded on one day, and what the stages made of them."""
+class Result:
+    """The stages of a run, on the logs of one robot and one day."""
 
-    name: str
     stages: tuple[Step, ...]
+    runs: tuple[Any, ...] = ()  # one for each of several sessions; empty, for those are refused
     boundary: Boundary | None = None  # what the logged torque is, also where it keeps the arm from being diagnosed
     diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
-
-
-@dataclass(frozen=True)
-class Result:
-    """One group's stages; with several groups, `runs` holds each of them and `stages` is empty."""
-
-    stages: tuple[Step, ...]
-    runs: tuple[Group, ...] = ()
-    boundary: Boundary | None = None  # of one group's logs: what their torque is, also where it keeps the arm from being diagnosed
-    diagnosis: Diagnosis | None = field(default=None, metadata=FLAT, repr=False)
-
-    @property
-    def groups(self) -> tuple[Group, ...]:
-        return self.runs or (Group("", self.stages, self.boundary, self.diagnosis),)

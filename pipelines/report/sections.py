@@ -31,14 +31,14 @@ def level_tone(levels: Iterable[Level]) -> Tone:
     return _TONES[worst]
 
 
-def checks_table(checks: Iterable[Check], caption: str = "", *, as_given: bool = False) -> Table:
+def checks_table(checks: Iterable[Check], *, as_given: bool = False) -> Table:
     """What was checked and found, the worst first, or `as_given`."""
     ordered = list(checks) if as_given else sorted(checks, key=lambda check: _ORDER.index(check.level))
     return Table(columns=("result", "finding", "where", "what to do", "code"),
                  rows=tuple((_RESULTS[check.level], check.message, check.where, check.remedy,
                              f"{check.code} {title_of(check.code)}".strip())
                             for check in ordered),
-                 caption=caption, tones=tuple(_TONES[check.level] for check in ordered))
+                 tones=tuple(_TONES[check.level] for check in ordered))
 
 
 def joint_signal_figure(name: str, caption: str, t: Array, values: Array, unit: str, *, quantity: str = "",

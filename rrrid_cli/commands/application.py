@@ -42,19 +42,8 @@ def about(
 
 def go(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],
        fallback: dict[str, Any] | None = None, roles: Roles | None = None) -> None:
-    """Run one stage as the options say, print its outcome, and end with its exit code; where a stage of one robot is given the
-    logs of several robots or days, one after the other."""
-    from pipelines.log.mixed import SeveralSessions
-
-    request, settings, teller = asked(stage, paths, common, given, fallback, roles)
-    try:
-        code = _done(stage, request, settings, teller, common).exit_code
-    except SeveralSessions as several:
-        from rrrid_cli.apart import each_by_itself
-
-        teller.done()
-        code = each_by_itself(stage, request, settings, several, common, teller)
-    raise typer.Exit(code)
+    """Run one stage as the options say, print its outcome, and end with its exit code."""
+    raise typer.Exit(done(stage, paths, common, given, fallback, roles).exit_code)
 
 
 def done(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, Any],
@@ -66,13 +55,9 @@ def done(stage: Any, paths: tuple[Path, ...], common: Common, given: dict[str, A
         fallback: what holds where nothing else was said.
         roles: logs that are named for a role, instead of the logs' own roles.
     """
-    request, settings, teller = asked(stage, paths, common, given, fallback, roles)
-    return _done(stage, request, settings, teller, common)
-
-
-def _done(stage: Any, request: Request, settings: Any, teller: Teller, common: Common) -> Outcome[Any]:
     from pipelines.stage import run_stage
 
+    request, settings, teller = asked(stage, paths, common, given, fallback, roles)
     try:
         outcome = run_stage(stage, request, settings)
     finally:

@@ -45,8 +45,8 @@ def run(
     elif not common.quiet:
         from rrrid_cli.console import say_table
 
-        say_table(("logs", "stage", "would be", "because"),
-                  [(one.logs, one.stage, "computed" if one.computed else "cached", one.why) for one in planned])
+        say_table(("stage", "would be", "because"),
+                  [(one.stage, "computed" if one.computed else "cached", one.why) for one in planned])
 
 
 app.command(cls=BatchCommand)(batch)

@@ -12,4 +12,4 @@ STD = 0.02
 
 def item_of(name: str, status: Status = "ok", accepts: bool = False, **known: Any) -> Record:
     """An item of one robot, of which `known` is known."""
-    return Record(name, name, status, int(status == "found"), parts=(Part(**known),), accepts=accepts)
+    return Record(name, name, status, int(status == "found"), part=Part(**known), accepts=accepts)

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from pipelines.batch.baseline import against, unheld
 from pipelines.batch.drift import drift_of
-from pipelines.batch.parts import parts_of
+from pipelines.batch.parts import part_of
 from pipelines.batch.record import Record, Status
 from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
 from tests.batch.conftest import Lay, obey
@@ -43,7 +43,8 @@ def test_a_baseline_accepts_what_is_known() -> None:
 
 def _known(record: Record, **more: Any) -> Record:
     """The same item, of which more is known."""
-    return dataclasses.replace(record, parts=tuple(dataclasses.replace(part, **more) for part in record.parts))
+    assert record.part is not None
+    return dataclasses.replace(record, part=dataclasses.replace(record.part, **more))
 
 
 def test_friction_is_held_against_the_baseline_by_any_name() -> None:
@@ -57,7 +58,8 @@ def test_friction_is_held_against_the_baseline_by_any_name() -> None:
             judged = against(record, baseline)
             assert judged.status == status
             assert judged.verdict.count("coefficient") == (status == "found")
-    (stronger,) = _found(0.6).parts
+    stronger = _found(0.6).part
+    assert stronger is not None
     told = _known(_found(0.6), figures={**stronger.figures, "extend model cogging joint 2 amplitude": (0.6, 0.01, "N m")})
     assert against(told, baseline).verdict.count("amplitude") == 1
 
@@ -77,7 +79,7 @@ def test_what_no_item_can_be_held_against_is_said() -> None:
     assert ["baseline, friction met" in one.message for one in unheld("run", [diagnosed, estimated], baseline)] == [True]
     whole = _known(estimated, figures=figures | {"viscous:1:coefficient": (0.6, 0.01, "N m s/rad")})
     assert unheld("run", [whole, diagnosed], baseline) == ()
-    extended = _known(whole, figures={**whole.parts[0].figures, "cogging joint 2 amplitude": (0.5, 0.01, "N m")})
+    extended = _known(whole, figures={**whole.part.figures, "cogging joint 2 amplitude": (0.5, 0.01, "N m")})
     assert unheld("simulate", [extended], baseline) == ()
     assert unheld("run", [Record("a", "a", "rejected", 3)], baseline) == ()
 
@@ -195,50 +197,41 @@ def test_where_something_has_no_name_no_cause_is_gone() -> None:
     moved = against(_known(unnamed, figures={"p1": (1.2, STD, "kg m^2")}), _baseline())
     assert moved.verdict.startswith(f"{said} Beyond the baseline: p1 1.2 kg m²")
     assert "not found any more" not in judged.verdict + moved.verdict
-    other = {"stages": [], "runs": [_run("arm", "arm", 0.6), _run("other", "other", 0.5)]}
-    elsewhere = Record("a", "a", "found", 1, verdict=said, parts=parts_of(other, "several", "2026-01-01"), accepts=True)
-    words = against(elsewhere, dataclasses.replace(_baseline(), robot='name = "arm"')).verdict
-    assert words.startswith(f"{said} Beyond the baseline: arm: cogging:2 amplitude 0.6 N m")
     unknown = {"verdict": "unknown", "findings": [], "detection_limits": []}
-    assert [part.verdict for part in parts_of(unknown, "arm", "2026-01-01")] == ["unknown"]
+    assert part_of(unknown, "arm", "2026-01-01").verdict == "unknown"
 
 
-def _run(name: str, robot: str, amplitude: float | None, p1: float = 1.0) -> dict[str, Any]:
-    """What result.json has of one of several robots: a cause or none, and a fitted figure."""
+def _run(amplitude: float | None, p1: float = 1.0) -> dict[str, Any]:
+    """What result.json has of a run: a cause or none, and a fitted figure."""
     finding = {"cause": "cogging", "joint": 2, "parameters": {"amplitude": {"value": amplitude, "std": 0.01, "unit": "N m"}}}
     findings = [] if amplitude is None else [finding]
     least = [{"cause": "cogging", "joint": 2, "parameter": "amplitude", "minimum": {"value": 0.04, "std": None, "unit": "N m"}}]
     figure = {"name": "p1", "value": p1, "std": STD, "unit": "kg m^2"}
-    estimated = {"name": "estimate-bps", "exit": 0, "result": {"robot": robot, "parameters": [figure]}}
-    return {"name": name, "stages": [estimated], "verdict": "cause" if findings else "no-fault-found", "findings": findings,
+    estimated = {"name": "estimate-bps", "exit": 0, "result": {"parameters": [figure]}}
+    return {"stages": [estimated], "verdict": "cause" if findings else "no-fault-found", "findings": findings,
             "baseline_effects": [], "detection_limits": least}
 
 
-def test_several_robots_in_one_folder_are_held_against_the_baseline() -> None:
-    """What `runs` say of the baseline's robot is judged, each day by itself; another robot's is not."""
+def test_only_items_of_the_baselines_robot_are_held_against_it() -> None:
+    """What a run of that robot says is judged, day by day; another robot's is not."""
     baseline = dataclasses.replace(_baseline(), robot='name = "arm"')
 
-    def item(*runs: dict[str, Any], accepts: bool = True) -> Record:
-        status: Status = "found" if any(run["findings"] for run in runs) else "ok"
-        return Record("a", "a", status, 1, parts=parts_of({"stages": [], "runs": runs}, "several", "2026-01-01"), accepts=accepts)
+    def item(name: str, run: dict[str, Any], robot: str = "arm", recorded: str = "") -> Record:
+        status: Status = "found" if run["findings"] else "ok"
+        return Record(name, name, status, 1, part=part_of(run, robot, recorded), accepts=True)
 
-    known = item(_run("arm 2026-01-05", "arm", 0.5), _run("other", "other", None))
-    assert [(part.robot, part.recorded, list(part.figures)) for part in known.parts] == [
-        ("arm", "2026-01-05", ["estimate-bps p1"]), ("other", "2026-01-01", ["estimate-bps p1"])]
+    known, other = item("a: arm", _run(0.5), recorded="2026-01-05"), item("a: other", _run(0.5), "other")
     assert against(known, baseline).status == "ok"
-    (said,) = unheld("run", [known], baseline)
+    assert against(other, baseline) == other  # nobody knows that cause of the other one
+    (said,) = unheld("run", [known, other], baseline)
     assert said.message == "1 of 2 items are of another robot than the baseline, and not held against it: a: other"
-    for record, says in ((item(_run("arm", "arm", 0.6), _run("other", "other", None)), "arm: cogging:2 amplitude 0.6 N m"),
-                         (item(_run("arm", "arm", 0.5, 1.2)), "arm: estimate-bps p1 1.2"),
-                         (item(_run("day 1", "arm", 0.5), _run("day 2", "arm", None)), "day 2: cogging:2 is not found any more")):
-        judged = against(record, baseline)
+    for run, says in ((_run(0.6), "cogging:2 amplitude 0.6 N m"), (_run(0.5, 1.2), "estimate-bps p1 1.2"),
+                      (_run(None), "cogging:2 is not found any more")):
+        judged = against(item("a", run), baseline)
         assert judged.status == "found"
         assert judged.verdict.startswith(f"Beyond the baseline: {says}")
-    strange = item(_run("arm", "arm", 0.5), _run("other", "other", 0.5))
-    assert against(strange, baseline) == strange  # nobody knows that cause of the other one
-    days = drift_of([known, item(_run("arm 2026-01-04", "arm", None, 1.5)), item(_run("arm 2026-01-03", "arm", None))])
-    assert [(one.robot, one.figures[0].items) for one in days] == [("arm", ("a: arm 2026-01-03", "a: arm 2026-01-04",
-                                                                            "a: arm 2026-01-05"))]
+    days = drift_of([known, item("b", _run(None, 1.5), recorded="2026-01-04"), item("c", _run(None), recorded="2026-01-03"), other])
+    assert [(one.robot, one.figures[0].items) for one in days] == [("arm", ("c", "b", "a: arm"))]
 
 
 def test_a_phase_is_the_same_after_a_whole_turn() -> None:

@@ -89,9 +89,9 @@ def test_a_torn_ledger_is_no_ledger(lay: Lay) -> None:
 def test_a_record_that_was_kept_says_what_it_said_at_once(tmp_path: Path) -> None:
     """P07: the same figures in the same order, and so the same drift, and the same stage to hold against a baseline."""
     said = ("reconstruct noise", "estimate-bps p10", "estimate-bps p2", "estimate-bps p1", "diagnose cogging joint 2 amplitude")
-    first, second = (Record(name, name, "ok", 0, parts=(Part(
+    first, second = (Record(name, name, "ok", 0, part=Part(
         recorded=name, figures=dict.fromkeys(said, (value, 0.1, "N m")), baseline_effects=("stribeck:2",),
-        residuals={f"{one} rms": (value, "N m") for one in said}, detection_limits={"cogging:2": ("amplitude", 0.04)}),))
+        residuals={f"{one} rms": (value, "N m") for one in said}, detection_limits={"cogging:2": ("amplitude", 0.04)}))
         for name, value in (("a", 1.0), ("b", 2.0)))
     ledger = Ledger(tmp_path)
     for record in (first, second):

@@ -10,7 +10,6 @@ import pytest
 
 from pipelines.errors import UsageError
 from pipelines.log.compared import label_of, of_other_commands
-from pipelines.log.places import slug
 from pipelines.log.results import headed
 from pipelines.log.run_results import read_any_result
 from pipelines.log.stored_result import read_result
@@ -57,7 +56,7 @@ def test_a_comparison_is_called_by_both(runs: Path, a: str, b: str, label: str) 
 
 
 def test_a_stage_of_a_run_is_a_result(runs: Path) -> None:
-    """By its folder, though that has no result.json; also where it has no file and no folder; and one of several days."""
+    """By its folder, though that has no result.json; also where it has no file and no folder."""
     found = read_any_result(runs / "monday/run/estimate-bps")
     assert (found.command, found.object, found.path) == (
         "estimate-bps", {"command": "estimate-bps", "parameters": ["monday"]}, runs / "monday/run/result.json")
@@ -67,13 +66,10 @@ def test_a_stage_of_a_run_is_a_result(runs: Path) -> None:
     for stranger in ("monday/run/diagnose", "monday/nowhere"):
         with pytest.raises(UsageError, match="C04"):
             read_any_result(runs / stranger)
-    stages = [{"name": "diagnose", "exit": 0, "result": {"verdict": "unknown"}}]
-    several = left(runs / "several", "run", stages=[], runs=[{"name": "arm, 2026-01-05", "stages": stages}])
-    assert read_any_result(several / slug("arm, 2026-01-05") / "diagnose").object["verdict"] == "unknown"
 
 
 def test_what_lies_beside_a_folder_that_is_not_there_is_none_of_its_faults(tmp_path: Path) -> None:
-    """A run without stages of several days; and a result.json of some other program."""
+    """A run without stages; and a result.json of some other program."""
     (tmp_path / "run").mkdir()
     provenance = json.dumps({"tool": "rrrid", "command": "run", "outputs": {}})
     for text in (json.dumps(headed("run", {})), "[]", "{"):

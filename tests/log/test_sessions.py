@@ -8,7 +8,7 @@ import pytest
 
 from pipelines.log.files import Opened
 from pipelines.log.inputs import Inputs
-from pipelines.log.mixed import SeveralSessions, check_alike, of_one_session
+from pipelines.log.mixed import SeveralSessions, check_alike, of_one_session, refuse_mixed
 from pipelines.log.sessions import apart, called
 from tests.log.logs import ROBOT_TEXT, small_log
 
@@ -104,25 +104,41 @@ def test_midnight_alone_ends_no_session(times: tuple[str, ...], sessions: int) -
     assert len(together(*hourly)) == 3
 
 
-def test_a_stage_is_given_one_session_or_told_the_names_of_all() -> None:
-    """What a stage does not read it cannot mix; what it reads has to be of one, and the error says what is whose."""
+def test_several_robots_are_refused_with_the_names_of_all() -> None:
+    """The error says what is whose."""
     a, b = opened("a", robot_name="arm-a"), opened("b", "other", robot_name="arm-b")
     with pytest.raises(SeveralSessions, match=r"several robots: arm-a.* \(1 log in logs\); arm-b.* \(1 log in other\)") as refused:
-        of_one_session(Inputs((a, b)), lambda log: True)
+        of_one_session(Inputs((a, b)))
     assert [name.split()[0] for name in refused.value.names] == ["arm-a", "arm-b"]
     assert refused.value.exit_code == 2
-    assert of_one_session(Inputs((a, b)), lambda log: log.robot_name == "arm-b").logs == (b,)
-    assert of_one_session(Inputs((a, b)), lambda log: False).logs == (a, b)
+    assert refused.value.as_dict()["sessions"] == list(refused.value.names)
+    assert of_one_session(Inputs((b,))).logs == (b,)
+
+
+def test_the_list_of_many_days_is_complete() -> None:
+    logs = [opened(str(i), recorded=f"2026-03-{i:02d}T09:00:00Z") for i in range(1, 29)]
+    with pytest.raises(SeveralSessions) as refused:
+        of_one_session(Inputs(tuple(logs)))
+    assert all(f"rrr-tue 2026-03-{i:02d}" in str(refused.value) for i in range(1, 29))
+
+
+def test_each_of_several_folders_is_of_one_session_by_itself() -> None:
+    """Commands that take each log by itself accept the folders of two days, and logs that were named one by one."""
+    monday, tuesday = opened("a", "monday", recorded=DAY), opened("b", "tuesday", recorded=NEXT)
+    refuse_mixed(Inputs((monday, tuesday)), (Path("monday"), Path("tuesday")))
+    refuse_mixed(Inputs((monday, tuesday)), ())
+    with pytest.raises(SeveralSessions):
+        refuse_mixed(Inputs((monday, opened("c", "monday", recorded=NEXT))), (Path("monday"),))
 
 
 def test_reference_logs_are_of_both_days_and_none_by_themselves() -> None:
     """Of two later days each is compared with what was before; that is no third session."""
     before = opened("r", recorded=DAY, role="reference")
     with pytest.raises(SeveralSessions) as refused:
-        of_one_session(Inputs((before, opened("a", recorded=NEXT), opened("b", recorded=LATER))), lambda log: True)
+        of_one_session(Inputs((before, opened("a", recorded=NEXT), opened("b", recorded=LATER))))
     assert refused.value.names == ("rrr-tue 2026-03-03", "rrr-tue 2026-05-18")
     later = (before, opened("a", recorded=LATER))
-    assert of_one_session(Inputs(later), lambda log: True).logs == later
+    assert of_one_session(Inputs(later)).logs == later
 
 
 def test_two_folders_that_nothing_tells_apart_are_said() -> None:

@@ -18,7 +18,7 @@ from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualR
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.run_ledger import ledger_lines, ledger_section
 from pipelines.report.run_report import run_report
-from pipelines.report.run_result import Group, Result, Step
+from pipelines.report.run_result import Result, Step
 
 
 def of_logs(count: int, figures: int) -> Report:
@@ -59,7 +59,7 @@ def finding(cause: str, joint: int | None, origin: str, before: np.ndarray, afte
     return Finding(cause, joint, cause, {}, 0.9, 0.9, (), None, gained(before, after), origin, 0.1, 0.01, None)  # type: ignore[arg-type]
 
 
-def told(*findings: Finding, was: np.ndarray = NOMINAL, now: np.ndarray = CARRYING) -> Group:
+def told(*findings: Finding, was: np.ndarray = NOMINAL, now: np.ndarray = CARRYING) -> tuple[Step, ...]:
     """A run whose diagnosis found these, and whose extension has them all."""
     bare = {field.name: None for field in fields(Diagnosis)}
     rms = ResidualRms(NOMINAL, NOMINAL, NOMINAL)
@@ -67,8 +67,7 @@ def told(*findings: Finding, was: np.ndarray = NOMINAL, now: np.ndarray = CARRYI
     blank = {field.name: None for field in fields(Extension)}
     extended = Extension(**(blank | {"findings": findings, "gain": gained(was, now), "revolute": (),  # type: ignore[arg-type]
                                      "residual_rms": ResidualRms(was, was, was), "after_rms": ResidualRms(now, now, now)}))
-    return Group("", tuple(Step(name, 0, result, Report("", ""), ())
-                           for name, result in (("diagnose", diagnosed), ("extend", extended))))
+    return tuple(Step(name, 0, result, Report("", ""), ()) for name, result in (("diagnose", diagnosed), ("extend", extended)))
 
 
 RIPPLE = finding("cogging", 2, "residual", NOMINAL, RIPPLED)
@@ -102,7 +101,7 @@ def test_findings_that_build_on_one_another_stand_in_that_order() -> None:
 def test_no_line_joins_the_steps_of_two_stages() -> None:
     """The model of extend without its cause is no step back from what diagnose found."""
     lines = ledger_lines(told(RIPPLE, was=2.0 * NOMINAL))
-    section = ledger_section([("", lines)])
+    section = ledger_section(lines)
     assert section is not None
     drawing = Drawing()
     section.figures[0].draw(drawing)
@@ -114,7 +113,7 @@ def test_no_line_joins_the_steps_of_two_stages() -> None:
 
 def test_what_a_gain_is_a_share_of_stands_above_it() -> None:
     """Of the error here, of its square in the ledger of hypotheses: a reader lays the two side by side."""
-    section = ledger_section([("", ledger_lines(told(RIPPLE)))])
+    section = ledger_section(ledger_lines(told(RIPPLE)))
     assert section is not None
     assert "gain in rms [%]" in section.tables[0].columns
     assert "in the square" in section.text[0]
@@ -123,21 +122,9 @@ def test_what_a_gain_is_a_share_of_stands_above_it() -> None:
 def test_the_ledger_writes_the_tip_as_the_verdict_does() -> None:
     """0.125 mm is 0.125 mm in every line, not 0.13 in one and 0.12 in the next."""
     tips = dataclasses.replace(RIPPLE.gain, tip_error_rms=TipError(1.2509e-4, 1.86e-5))
-    section = ledger_section([("", ledger_lines(told(dataclasses.replace(RIPPLE, gain=tips))))])
+    section = ledger_section(ledger_lines(told(dataclasses.replace(RIPPLE, gain=tips))))
     assert section is not None
     assert "0.125 → 0.0186" in [row[-1] for row in section.tables[0].rows]
-
-
-def test_of_several_robots_each_has_one_sentence() -> None:
-    """What its diagnosis says; what the extension says stands in the table of stages. One robot alone is told in full."""
-    def of(name: str) -> Group:
-        group = told(RIPPLE)
-        words = {"diagnose": "Cogging.", "extend": "Better."}
-        return dataclasses.replace(group, name=name, stages=tuple(
-            dataclasses.replace(step, report=Report("", words[step.name])) for step in group.stages))
-
-    assert run_report(Result((), (of("a"), of("b")))).verdict == "a: Cogging. b: Cogging."
-    assert run_report(Result(of("").stages)).verdict == "Cogging. Better."
 
 
 def refused(stage: str, remedy: str) -> Step:
@@ -156,7 +143,7 @@ def test_each_refusal_is_told_once_and_nothing_that_follows_from_it() -> None:
                   (Check.of("C06", "warn", "no frf log", remedy="record one"),)))
     said = run_report(Result(steps))
     assert said.verdict == "Not done (estimate-bps, diagnose): columns 1,2 fit swapped. Correct the map."
-    assert [row[1] for row in next(s for s in said.sections if s.title == "Stages").tables[0].rows] == [s.name for s in steps]
+    assert [row[0] for row in next(s for s in said.sections if s.title == "Stages").tables[0].rows] == [s.name for s in steps]
 
 
 def test_what_is_not_in_order_is_told_where_nothing_was_refused() -> None:
@@ -180,14 +167,13 @@ def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: dict[str, A
     told = run_report(Result(steps))
     assert told.verdict == f"Cogging. {said}"
     table = next(section for section in told.sections if section.title == "Stages").tables[0]
-    assert "Waist: a long story." in [row[2] for row in table.rows]
+    assert "Waist: a long story." in [row[1] for row in table.rows]
 
 
 def test_the_extended_model_of_the_key_figures_is_told_from_the_file() -> None:
     """They are those of diagnose; what the model.json of extend leaves is said beside them, where there is one."""
-    group = told(RIPPLE)
     table = Table(("joint", "torque error now [N m]", "extended [N m]"), ((1, 0.5, 0.18), (2, 0.1, 0.1)), "Of what was held out.")
-    diagnosed, extended = group.stages
+    diagnosed, extended = told(RIPPLE)
     diagnosed = dataclasses.replace(diagnosed, report=Report("", "", key_figures=table))
     assert run_report(Result((diagnosed, extended))).key_figures == table
     model = ModelFile("arm", "", ())

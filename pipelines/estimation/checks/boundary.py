@@ -407,7 +407,7 @@ class _Estimate:
         return max(*near, *(fits.model.fit(STANDARD_GRAVITY * vector).score for vector in cones))
 
     def direction_spread(self, fits: _Fits) -> tuple[float | None, str]:
-        """Return the standard deviation [rad] of gravity's direction, or why it is not identifiable.
+        """Return the standard deviation [rad] of gravity's direction, or why there is none.
 
         The set of directions u of which (g u - a)ᵀ C⁻¹ (g u - a) is within 4 of the least, a the
         free vector and C its covariance; half the angle to the farthest is the deviation.
@@ -576,7 +576,8 @@ def _in_words(fits: _Fits, order: JointOrder) -> list[str]:
     described, none = _rms(fits.described), _rms(fits.none)
     said = [
         f"the model leaves {_percent(described)} of a joint's torque with gravity as described, "
-        f"{_percent(none)} without gravity, {_percent(fits.rms)} with the gravity vector that fits best"
+        f"{_percent(none)} without gravity, "
+        f"{_percent(fits.rms)} with the gravity vector that fits best"
     ]
     if order.signal and order.before is not None and order.after is not None:
         said.append(

@@ -18,7 +18,7 @@ class BoundaryConfig:
             are no evidence for one model against another.
         decisive: gain in log likelihood that decides between two models, after the residual's
             correlation is counted: odds of 20,000.
-        alike: difference in log likelihood, below which two answers are equally likely: odds of 150.
+        alike: difference in log likelihood, below which two answers are equally likely: odds 150.
         explained: share of the residual power of the rejected model that the accepted one may
             leave.
         lost: of the torques' RMS: where all joints together leave more, every order is tried, and

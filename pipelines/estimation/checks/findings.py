@@ -99,8 +99,8 @@ def _turned(boundary: Boundary, where: str) -> Check:
         f"the description {described}",
         where=where,
         gate=True,
-        remedy=f"write gravity = {told} in the robot's description (for a URDF under [robot] in the "
-        "recipe of the import), or correct its base frame",
+        remedy=f"write gravity = {told} in the robot's description (for a URDF under [robot] in "
+        "the recipe of the import), or correct its base frame",
     )
 
 

@@ -184,7 +184,7 @@ class GravityModel:
         return self._climb(start, lambda _: groups, stepped)
 
     def search_direction(self, start: Array, size: float) -> GravityFit:
-        """Fit the direction of a gravity of `size` [m/s^2], alike at all joints, from `start` (3,)."""
+        """Fit the direction of gravity of `size` [m/s^2], the same at all joints, from `start`."""
         n = self.rows.n_joints
 
         def across(fit: GravityFit) -> Array:

@@ -25,7 +25,8 @@ def effective_moments(residuals: Array, starts: npt.NDArray[np.intp]) -> Array:
     """Return the number of independent moments (n,) of residuals (n, N), `starts` the first of
     each stretch.
 
-    ν = N / (1 + 2 Σ ρ_k), summed over the initial positive pairs of the autocorrelation (Geyer 1992).
+    ν = N / (1 + 2 Σ ρ_k), summed over the initial positive pairs of the autocorrelation (Geyer
+    1992).
     """
     n, total = residuals.shape
     edges = [*starts.tolist(), total]

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
-from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
+from pipelines.errors import Check, InputRejected, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.log.derive import recording
@@ -67,13 +67,9 @@ def logs_of_roles(logs: Sequence[ExperimentLog], label: str) -> Logs:
 
     Raises:
         NothingMatched: C06, no log to fit.
-        UsageError: C02, logs of several robots.
         InputRejected: D14, one recording in two roles.
     """
     known = [log for log in logs if log.origin != "planned"]
-    if len({log.robot_text for log in known}) > 1:
-        raise UsageError("C02", "logs of several robots", where=label,
-                         remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
     chosen = Logs.by_role(known)
     if not chosen.identify:
         kinds = ", ".join(sorted({f"{log.experiment} ({log.role})" for log in known})) or "none"
