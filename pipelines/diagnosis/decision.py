@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,12 +37,12 @@ def decide(
     causes, end = selection.causes, selection.end
     left = end.mean_squares * later.dataset.noise_ratio
     bound = max(config.excess * max(1.0, baseline.usual_fit), baseline.worst_fit)
-    missing = _missing(later, end, config)
-    rest = _rest(later, selection, missing, left, bound, config)
+    missing, (followed, shapes) = _missing(later, end, config), _followed(later, selection, config)
+    rest = _rest(later, selection, missing, shapes, left, bound, config)
     if causes:
         power = np.array([float(y @ y) for y in later.rows.y])
         too_much = np.where(left < bound, 0.0, left - baseline.usual_fit) * _counts(end)
-        beyond = np.maximum(missing**2 * power, too_much)
+        beyond = np.maximum(np.maximum(missing**2 * power, too_much), followed)
         strained = end.cost / later.rows.count >= bound
         explained = _explained(later, selection, beyond, strained)
         if explained < config.share:
@@ -82,6 +83,7 @@ def _rest(
     later: Later,
     selection: Selection,
     missing: Array,
+    shapes: Sequence[str],
     left: Array,
     bound: float,
     config: DiagnosisConfig,
@@ -93,9 +95,8 @@ def _rest(
             f"{missing.max():.1%} of the torque of joint {int(missing.argmax()) + 1} comes again "
             f"with the motion, and no cause explains it{more}"
         )
-    followed = _followed(later, selection, config)
-    if followed:
-        return followed
+    if shapes:
+        return shapes[0]
     if left.max() >= bound:
         return _too_large(left, bound) + more
     slow = _wandering(later)
@@ -153,19 +154,24 @@ def _wandering(later: Later) -> Array:
     return np.asarray(np.sqrt(lasting / np.maximum(np.mean(measured**2, axis=1), 1e-300)))
 
 
-def _followed(later: Later, selection: Selection, config: DiagnosisConfig) -> str:
-    """Return which shape without a name a relevant part of a joint's torque follows; "" if none.
+def _followed(
+    later: Later, selection: Selection, config: DiagnosisConfig
+) -> tuple[Array, tuple[str, ...]]:
+    """Return what shapes without a name would take off each joint (joints,), and which they are.
 
-    Without reference logs; with them it may have been there before.
+    Without reference logs, and of a relevant part of a joint's torque; with them it may have been
+    there before.
     """
+    taken = np.zeros(later.rows.n_joints)
     if later.dataset.reference is not None or not selection.rounds:
-        return ""
-    power = [float(y @ y) for y in later.rows.y]
+        return taken, ()
+    power, told = [float(y @ y) for y in later.rows.y], []
     for one in sorted(selection.rounds[-1].significant, key=lambda s: -s.gain):
         name, joint = one.group.key
-        if one.group.kind != "unnamed" or joint is None:
+        if one.group.kind != "unnamed" or joint is None or taken[joint - 1]:
             continue
         share = np.sqrt(one.gain / power[joint - 1])
         if share > config.misfit:
-            return f"{share:.1%} of the torque of joint {joint} follows {name}:{joint}"
-    return ""
+            taken[joint - 1] = one.gain
+            told.append(f"{share:.1%} of the torque of joint {joint} follows {name}:{joint}")
+    return taken, tuple(told)
