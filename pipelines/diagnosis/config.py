@@ -9,7 +9,7 @@ __all__ = ["DiagnosisConfig"]
 
 @dataclass(frozen=True)
 class DiagnosisConfig:
-    """All deciding numbers of the diagnosis; `benchmarks.diagnosis` varies each by ½ and 2."""
+    """All deciding numbers of the diagnosis; `benchmarks.sensitivity` varies each by ½ and 2."""
 
     cutoff_hz: float = (
         25.0  # zero-phase low-pass of all rows: above it quantised positions dominate
