@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Minimum", "least_squares"]
+__all__ = ["Minimum", "least_between", "least_squares"]
 
 Array = npt.NDArray[np.float64]
 
@@ -43,3 +43,11 @@ def least_squares(rest: Callable[[Array], Array], start: Array, low: Array | flo
 
     found = optimize.least_squares(rest, start, bounds=(low, high), x_scale="jac" if scale is None else scale, max_nfev=steps)
     return Minimum(found.x, found.fun, found.jac, np.asarray(found.active_mask != 0))
+
+
+def least_between(loss: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
+    """Return where `loss` of one number is smallest between two, to `tolerance` (Brent 1973)."""
+    from scipy import optimize
+
+    found = optimize.minimize_scalar(loss, bounds=(low, high), method="bounded", options={"xatol": tolerance})
+    return float(found.x)

@@ -23,6 +23,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.fit.bounded import least_between
 from pipelines.fit.flips import by_flips
 from pipelines.fit.varpro import held_out
 from pipelines.model.friction.ladder import no_worse
@@ -35,6 +36,7 @@ _FORMS = ("whole", "coulomb", "viscous")
 _ROUNDS = 4  # of scanning for a course and fitting the curve that changes
 Index = npt.NDArray[np.intp]
 
+_FINE = 1e-2  # numerics: of the logarithm of a time constant
 _RANK = 1e-7  # singular values of unit columns below it: two columns that are one
 
 
@@ -172,8 +174,6 @@ def _held_out(basis: Array, y: Array, blocks: Index) -> Array:
 
 def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     """The course of a trend with the time constant by which it explains most."""
-    from scipy.optimize import minimize_scalar
-
     starts = tuple(float(stretch.t[0]) for stretch in rows.stretches)
     duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in rows.stretches)
 
@@ -186,8 +186,7 @@ def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     times = np.log(rows.config.times)
     k = int(np.argmin([loss(time) for time in times]))
     ends = (float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)]))
-    found = minimize_scalar(loss, bounds=ends, method="bounded", options={"xatol": 1e-2})
-    return course(float(np.exp(found.x)))
+    return course(float(np.exp(least_between(loss, *ends, _FINE))))
 
 
 def _step(form: str, shape: Array, rows: _Rows) -> Course:
