@@ -58,7 +58,7 @@ def test_the_span_stands_wherever_millimetres_do(how: Any, span: tuple[Simulated
     gain = replace(finding().gain, simulation=how, tip_error_rms=TipError(2e-3, 1e-3), simulated_span=span,
                    simulated_position_rms=BeforeAfter(np.full(3, 1e-3), np.full(3, 1e-4)))
     line = Line("+ cogging", "diagnose", (0.1,), (0.2,), True, (2e-3, 1e-3), said)
-    ledger = ledger_section([("", (line,))])
+    ledger = ledger_section([line])
     assert ledger is not None
     for text in (tip_change(gain), tip_worth(gain), gain_table(gain, "Gain.").caption, " ".join(ledger.text)):
         assert said in text
