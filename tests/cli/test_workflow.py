@@ -28,12 +28,12 @@ def test_dry_run_writes_nothing_and_tells_why(short: Path) -> None:
     words = ("run", "logs", "--out", "out", "--no-report", *SKIP)
     first = rrrid(*words, "--dry-run", cwd=short)
     assert (first.returncode, first.stderr) == (0, "")
-    assert [line.split()[1:3] for line in first.stdout.splitlines()[1:]] == [["inspect", "computed"], ["reconstruct", "computed"]]
+    assert [line.split()[:2] for line in first.stdout.splitlines()[1:]] == [["inspect", "computed"], ["reconstruct", "computed"]]
     assert [p.name for p in short.iterdir()] == ["logs"]
     assert rrrid(*words, cwd=short).returncode == 0
     again = rrrid(*words, "--dry-run", "--json", cwd=short)
     assert json.loads(again.stdout)["stages"] == [
-        {"logs": "all", "stage": stage, "computed": False, "why": "unchanged"} for stage in ("inspect", "reconstruct")]
+        {"stage": stage, "computed": False, "why": "unchanged"} for stage in ("inspect", "reconstruct")]
     assert rrrid(*words, "--dry-run", "--no-cache", cwd=short).stdout.count("anew") == 2
 
 

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pipelines import diagnose
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.files import open_log
+from pipelines.log.files import open_log, write_log
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
+from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, session
 from tests.faulty import dropped
 from tests.healthy import with_signal
@@ -41,6 +44,26 @@ def test_cogging_is_found_at_its_joint_with_its_numbers() -> None:
     assert values["amplitude"] == pytest.approx(0.1, rel=0.03)
     assert values["phase"] == pytest.approx(0.6, abs=0.05)
     assert (found.after_rms.identify < np.array([0.012, 0.006, 0.004])).all()
+
+
+def both(motion: Motion) -> Array:
+    """Cogging at joint 2 and a drag at joint 1."""
+    out = wave(motion).copy()
+    out[:, 0] += 0.3 * motion.dq[:, 0] * np.abs(motion.dq[:, 0])
+    return out
+
+
+def test_the_largest_number_of_causes_hides_none(tmp_path: Path) -> None:
+    """Of two causes one is named, and the result says that the search ended before the other."""
+    (tmp_path / "logs").mkdir()
+    for log in logs(both):
+        write_log(tmp_path / "logs" / f"{log.name}.h5", replace(log, period=None))
+    settings = diagnose.Settings(exclude=but(*FEW), max_causes=1, skip_sanity_checks=True)
+    request = Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True)
+    found = run_stage(diagnose.STAGE, request, settings).result
+    assert [(one.cause, one.joint) for one in found.findings] == [("quadratic_drag", 1)]
+    for said in (found.reason, found.summary):
+        assert "he search ended at 1 cause (--max-causes 1); still significant: cogging:2" in said
 
 
 @pytest.mark.slow
