@@ -54,7 +54,8 @@ def decide(
     fits = max(float(left.max()), end.cost / later.rows.count) < bound
     if not rest and fits:
         return Decision("no-fault-found", "", ())
-    return Decision("unknown", selection.stopped or rest or _too_large(left, bound), ())
+    told = (rest or _too_large(left, bound), selection.stopped)
+    return Decision("unknown", "; ".join(one for one in told if one), ())
 
 
 def _counts(state: State) -> Array:
