@@ -171,7 +171,7 @@ WORDS: Final[dict[str, str]] = {
     "base_parameters": "base parameters of the rigid body", "validity": "range of the logs behind the model", "notes": "remarks",
     "format": "what kind of file this is", "format_version": "version of the format",
     # run, compare, demo and batch
-    "runs": "each of several sessions; empty, for several are refused", "exit": "exit code of the stage under --check",
+    "exit": "exit code of the stage under --check",
     "result": "the stage's own result; null: it was passed over", "diagnosis": "what diagnose found",
     "differ": "whether anything differs beyond its uncertainty", "alpha": "how often two results of one arm may be said to differ",
     "only_b": "figures that the second result alone has", "residuals": "errors that are left", "answers": "what both say in words",
