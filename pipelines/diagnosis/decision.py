@@ -50,7 +50,7 @@ def decide(
             return Decision("unknown", reason, ())
         if causes[0].alternatives:
             return Decision("unknown", "several causes explain it", causes)
-        return Decision("cause", f"beside it, {rest}" if rest else "", causes)
+        return Decision("cause", rest, causes)
     fits = max(float(left.max()), end.cost / later.rows.count) < bound
     if not rest and fits:
         return Decision("no-fault-found", "", ())

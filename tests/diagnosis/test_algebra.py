@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.arrow import Arrow, Structure
+from pipelines.diagnosis.belief import Belief
 from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.score import Blocks, confidence_set
@@ -73,6 +74,26 @@ def test_a_block_is_predicted_as_by_a_fit_without_it(rng: np.random.Generator) -
         _, without = _least_cost(base[:, block != b], y[block != b], info)
         left = y[block == b] - base[:, block == b].T @ without
         assert losses[b] == pytest.approx(left @ left)
+
+
+def test_a_block_is_predicted_beside_effects_as_by_a_fit_of_all_numbers_without_it(
+    rng: np.random.Generator,
+) -> None:
+    base, more, y, info, joint = _problem(rng)
+    block = np.tile(np.repeat(np.arange(4), _ROWS // _JOINTS // 4), _JOINTS)
+    every = np.concatenate([base, more])
+    wide = np.zeros((_KNOWN + _MORE,) * 2)
+    wide[:_KNOWN, :_KNOWN] = info
+    _, theta = _least_cost(every, y, wide)
+    table, effects = (Table.of(x, joint, _JOINTS) for x in (base, more))
+    blocks = tuple(block[joint == j] for j in range(_JOINTS))
+    belief = Belief(info, np.zeros(_KNOWN), table, table.gram(table), Structure.of(table), blocks)
+    losses = belief.losses(effects, by_joint(y - every.T @ theta, joint, _JOINTS))
+    assert belief.beside(effects).solve(every @ y) == pytest.approx(theta, rel=1e-6)
+    for b in range(4):
+        _, without = _least_cost(every[:, block != b], y[block != b], wide)
+        left = y[block == b] - every[:, block == b].T @ without
+        assert losses[b] == pytest.approx(left @ left, rel=1e-6)
 
 
 def test_columns_stay_what_they_were_when_chosen_stacked_and_scaled(
