@@ -136,9 +136,7 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
     kind: Kind = "compliance" if compliant else "named"
     for laid in lay_family(rows.data, family, arm):
         shapes, width, _ = laid.table.shape
-        columns = np.zeros((shapes * width, rows.count))
-        columns[:, laid.rows] = laid.table.reshape(shapes * width, -1)
-        parts.append(rows.table(columns).compact())
+        parts.append(rows.table(laid.table.reshape(shapes * width, -1), laid.rows).compact())
         for k in range(shapes):
             number = laid.first + k
             groups.append(

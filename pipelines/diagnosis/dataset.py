@@ -108,9 +108,22 @@ class Rows:
         """Return torque (…, rows) [N m] joint by joint, in units of the noise."""
         return by_joint(x * self.weight, self.joint, self.n_joints)
 
-    def table(self, columns: Array) -> Table:
-        """Return columns (k, rows) [N m] in units of the noise."""
-        return Table.of(columns * self.weight, self.joint, self.n_joints)
+    def table(self, columns: Array, rows: Indices | None = None) -> Table:
+        """Return columns (k, rows) [N m] in units of the noise.
+
+        Args:
+            rows: which of all rows these are, each joint's all or none; the others are zero.
+        """
+        weight = self.weight.astype(columns.dtype)
+        if rows is None:
+            return Table.of(columns * weight, self.joint, self.n_joints)
+        table = Table.of(columns * weight[rows], self.joint[rows], self.n_joints)
+        count = np.bincount(self.joint, minlength=self.n_joints)
+        values = (
+            v if len(v) else np.zeros((0, n), v.dtype)
+            for v, n in zip(table.values, count, strict=True)
+        )
+        return Table(table.width, table.index, tuple(values))
 
     def torque(self, model: Exact) -> tuple[Array, ...]:
         """Return the torque of an exact model, joint by joint, in units of the noise."""

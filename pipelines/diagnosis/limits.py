@@ -23,7 +23,7 @@ import numpy as np
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group, Key
 from pipelines.diagnosis.refit import Later, State
-from pipelines.diagnosis.table import Array, Table
+from pipelines.diagnosis.table import Array
 from pipelines.model.diagnosis.result import DetectionLimit, NotIdentifiable, Value
 from pipelines.model.effects.base import Effect, Quantity
 
@@ -71,7 +71,7 @@ class _Shape:
 def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
     """Return the limits beside the model that was found."""
     shapes: dict[Key, list[_Shape]] = {}
-    both = Table.stacked([later.base, state.effects])
+    norms = np.r_[later.base.norms, state.effects.norms]
     cross = np.concatenate([later.cross, state.effects.gram(later.candidates)])
     solved = state.factor.solve(cross)
     for group, square in zip(later.dictionary.groups, later.squares, strict=True):
@@ -79,7 +79,7 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
         if group.kind != "named" or family is None:
             continue
         length = np.sqrt(np.maximum(np.diag(square), 0.0))
-        part = np.abs(solved[:, at]) * both.norms[:, None] / np.maximum(length, 1e-300)
+        part = np.abs(solved[:, at]) * norms[:, None] / np.maximum(length, 1e-300)
         hidden = square - cross[:, at].T @ solved[:, at]
         shapes.setdefault(group.key, []).append(
             _Shape(family.shapes[group.shape], hidden, length, part, group)

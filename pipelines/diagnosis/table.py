@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -80,7 +81,7 @@ class Table:
         """Return the columns in single precision: of candidates there are many."""
         return Table(self.width, self.index, tuple(v.astype(np.float32) for v in self.values))
 
-    @property
+    @cached_property
     def norms(self) -> Array:
         """(k,) Euclidean length of each column."""
         total = np.zeros(self.width)

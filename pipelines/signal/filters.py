@@ -15,7 +15,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.blocks import impulse_toeplitz
 
 __all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "passed_both_ways",
-           "zero_phase"]
+           "thinned", "zero_phase"]
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
@@ -70,6 +70,15 @@ def zero_phase(x: Array, low_pass: LowPass) -> Array:
     extended = np.concatenate([2.0 * flat[0] - flat[pad:0:-1], flat, 2.0 * flat[-1] - flat[-2:-pad - 2:-1]])
     back = _one_pass(_one_pass(extended, low_pass)[::-1], low_pass)[::-1]
     return np.ascontiguousarray(back[pad:-pad]).reshape(x.shape)
+
+
+def thinned(x: Array, response: Array, every: int) -> Array:
+    """Return every so-manieth sample of signals (channels, samples), times `response` at their first frequencies."""
+    from scipy.fft import irfft, rfft  # several channels at once, and in single precision
+
+    spectrum = rfft(x, axis=1)[:, :len(response)]
+    spectrum *= (response / every).astype(x.dtype)
+    return np.asarray(irfft(spectrum, n=x.shape[1] // every, axis=1, overwrite_x=True))
 
 
 def _one_pass(u: Array, low_pass: LowPass) -> Array:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.estimation.regression import LogEquations
-from pipelines.signal.filters import passed_both_ways
+from pipelines.signal.filters import passed_both_ways, thinned
 
 __all__ = ["PAD", "Run", "quick_size", "run_of"]
 
@@ -47,17 +47,15 @@ class Run:
         return self._through(tau, self.response)
 
     def _through(self, x: Array, response: Array) -> Array:
-        pad, end, out = self.pad, x.shape[1] + self.pad, np.empty((len(x), len(self.chosen)))
-        wide, places = np.zeros((min(len(x), _AT_ONCE), self.size)), self.chosen + pad // self.every
+        pad, end, out = self.pad, x.shape[1] + self.pad, np.empty((len(x), len(self.chosen)), x.dtype)
+        wide, places = np.zeros((min(len(x), _AT_ONCE), self.size), x.dtype), self.chosen + pad // self.every
         for first in range(0, len(x), _AT_ONCE):
             some = x[first:first + _AT_ONCE]
             table = wide[:len(some)]
             table[:, pad:end] = some
             np.subtract(2.0 * some[:, :1], some[:, pad:0:-1], out=table[:, :pad])
             np.subtract(2.0 * some[:, -1:], some[:, -2:-pad - 2:-1], out=table[:, end:end + pad])
-            spectrum = np.fft.rfft(table, axis=1)[:, :len(response)]
-            spectrum *= response / self.every
-            out[first:first + _AT_ONCE] = np.fft.irfft(spectrum, n=self.size // self.every, axis=1)[:, places]
+            out[first:first + _AT_ONCE] = thinned(table, response, self.every)[:, places]
         return out
 
 

@@ -97,7 +97,7 @@ def whole_motion(data: Data) -> Motion:
 
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
-    """The columns of every shape, a few shapes at a time."""
+    """The columns of every shape, a few shapes at a time, in single precision: there are many, and none is fitted."""
     with np.errstate(all="ignore"):
         width = int(family.shapes[0].columns(_first_samples(data), arm).shape[2])
     size = max(1, _AT_ONCE // max(width, 1))
@@ -124,7 +124,7 @@ def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Arr
     table = own_columns(some, one.motion, arm)
     for shape in table:
         shape[...] = _finite(shape)
-    rows = one.lay_signals(table.reshape(-1, table.shape[2]), np.full(len(some) * table.shape[1], joint - 1))
+    rows = one.lay_signals(table.reshape(-1, table.shape[2]).astype(np.float32), np.full(len(some) * table.shape[1], joint - 1))
     return rows.reshape(len(some), table.shape[1], -1)
 
 
@@ -133,10 +133,10 @@ def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
     tables = [_finite(table).transpose(2, 1, 0) for table in several_columns(some, one.motion, arm)]
     k, joints, samples = tables[0].shape
     acting = np.flatnonzero([any(table[:, j].any() for table in tables) for j in range(joints)])
-    flat = np.empty((len(some), k, len(acting), samples))
+    flat = np.empty((len(some), k, len(acting), samples), np.float32)
     for into, table in zip(flat, tables, strict=True):
         into[...] = table[:, acting]
-    found = np.zeros((len(some), k, joints, one.rows))
+    found = np.zeros((len(some), k, joints, one.rows), np.float32)
     laid = one.lay_signals(flat.reshape(-1, samples), np.tile(acting, len(some) * k))
     found[:, :, acting] = laid.reshape(len(some), k, len(acting), one.rows)
     return found
