@@ -100,6 +100,8 @@ def _rest(
         return shapes[0]
     if left.max() >= bound:
         return _too_large(left, bound) + more
+    if selection.moment:
+        return selection.moment
     slow = _wandering(later)
     if slow.max() > config.misfit:
         joint = int(slow.argmax()) + 1

@@ -6,7 +6,7 @@ window = standing_out(rows, dictionary, arm, residual, config)
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,6 +36,7 @@ class Window:
     touched: Indices  # of the rows of each joint, those within it
     rows: slice  # of each joint, those of its log
     push: Array  # (joints, rows of its log) what it explains there, in units of the noise
+    free: float = 0.0  # gain of any torque of each joint over the same time, less what that costs
 
 
 def standing_out(
@@ -66,7 +67,26 @@ def standing_out(
     if best is None or best.gain < config.relevance**2 * _power(rows, best.touched):
         return None
     bound = chi2_bound(config.alpha / config.event_candidates, _DIRECTIONS)
-    return best if best.gain > max(bound, upper_point(gains, config.alpha)) else None
+    if best.gain <= max(bound, upper_point(gains, config.alpha)):
+        return None
+    return replace(best, free=_free(rows, best, residual))
+
+
+def _free(rows: Rows, window: Window, residual: Sequence[Array]) -> float:
+    """Return the gain of any torque of each joint over the time of a push.
+
+    Less what its further numbers cost (Schwarz 1978).
+    """
+    one = rows.data.logs[window.log - rows.data.first]
+    assert isinstance(window.effect, Event)
+    course = window.effect.course(one.motion.t - one.motion.t[0])
+    columns = one.lay(np.repeat(course[:, None], rows.n_joints, axis=1))
+    weight = by_joint(rows.weight, rows.joint, rows.n_joints)
+    gain = 0.0
+    for column, w, r in zip(columns, weight, residual, strict=True):
+        x = column * w[window.rows]
+        gain += float(x @ r[window.rows]) ** 2 / max(float(x @ x), 1e-300)
+    return gain - max(rows.n_joints - _DIRECTIONS, 0) * float(np.log(rows.count))
 
 
 def _power(rows: Rows, touched: Indices) -> float:

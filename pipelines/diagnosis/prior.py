@@ -111,15 +111,21 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
         return replace(out, start=out.of(range(len(parts))))
     gram, moment = np.sum(out.grams, axis=0), np.sum(out.moments, axis=0)
     found = components(gram, moment, out.structure, rows.count, kept, config)
-    return replace(out, start=(np.diag(_typical(found, kept).precision), np.zeros(len(keep))))
+    usual = _typical(found, kept, dataset, config)
+    return replace(out, start=(np.diag(usual.precision), np.zeros(len(keep))))
 
 
-def _typical(found: Components, of: Sequence[Group]) -> Components:
+def _typical(
+    found: Components, of: Sequence[Group], dataset: Dataset, config: DiagnosisConfig
+) -> Components:
     """Return the variances as far as they are those of the family over all joints.
 
     What a family has in common is in units of the noise of the joints on which it acts; of a family
-    of one place it is that of the other families.
+    of one place it is that of the other families. What healthy machines have in small is no more
+    than the part of a joint's torque that is a fault where no cause explains it.
     """
+    torque = np.array([float(np.mean(y**2)) for y in dataset.later.y])
+    small = [np.inf if _any(g) else _of_joint(g, torque) * config.misfit**2 for g in of]
     largest: dict[str, dict[int, float]] = {}  # of each family and joint
     for group, value in zip(of, found.variance, strict=True):
         at = largest.setdefault(group.family, {})
@@ -128,7 +134,20 @@ def _typical(found: Components, of: Sequence[Group]) -> Components:
     several = [value for word, value in median.items() if len(largest[word]) > 1]
     other = _lower_median(several or median.values())
     usual = [median[w] if len(largest[w]) > 1 else other for w in (g.family for g in of)]
-    return replace(found, variance=np.minimum(found.variance, usual))
+    return replace(found, variance=np.minimum.reduce([found.variance, usual, small]))
+
+
+def _any(group: Group) -> bool:
+    """Return whether a healthy machine may have any amount of it: the form of friction."""
+    if group.kind == "unnamed":
+        return group.key[0] == FORM
+    known = find_effect(group.key[0]).parameters.healthy
+    return known is not None and not np.isfinite(known)
+
+
+def _of_joint(group: Group, x: Array) -> float:
+    """Return x (joints,) of the joint of a group; of the whole arm, the largest."""
+    return float(x.max() if group.key[1] is None else x[group.key[1] - 1])
 
 
 def _lower_median(values: Iterable[float]) -> float:

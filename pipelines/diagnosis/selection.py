@@ -15,7 +15,7 @@ import numpy as np
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.events import standing_out
+from pipelines.diagnosis.events import Window, standing_out
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
@@ -69,6 +69,7 @@ class Selection:
     follows: str  # what the rest follows; "" where nothing is significant
     rounds: tuple[Round, ...] = ()
     cut: tuple[Key, ...] = ()  # causes still significant when the largest number was reached
+    moment: str = ""  # what stands out at one moment, and no event explains
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +83,7 @@ class Round:
     follows: str = ""
     significant: tuple[Screened, ...] = ()
     tried: tuple[Candidate, ...] = ()
+    moment: str = ""  # what stands out at one moment, and no event explains
 
 
 def select(
@@ -122,7 +124,10 @@ def select(
         ranked = sorted(more, key=lambda one: -one.gain)
         cut = tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
     causes, state = _backward(later, causes, state, config)
-    return Selection(tuple(causes), start, state, explained, stopped, follows, tuple(rounds), cut)
+    moment = rounds[-1].moment if rounds else ""
+    return Selection(
+        tuple(causes), start, state, explained, stopped, follows, tuple(rounds), cut, moment
+    )
 
 
 def _round(
@@ -138,16 +143,23 @@ def _round(
     significant = _significant(
         later, state, [cause.key for cause in causes], explained, baseline, config
     )
+    touch, moment = _touch(later, state, config)
+    promising = _promising(later, state, significant, config)
     tried = [
         one
-        for one in _refitted(
-            later, state, _promising(later, state, significant, config), responses, config
-        )
+        for one in _refitted(later, state, promising, responses, touch, config)
         if _loss(later, one.state) < _loss(later, state)
         and not (one.event and one.gain < config.relevance * explained)
     ]
     others = _unnamed(later, state, significant, bool(responses))
-    seen = Round(state, None, None, significant=tuple(significant.values()), tried=tuple(tried))
+    seen = Round(
+        state,
+        None,
+        None,
+        significant=tuple(significant.values()),
+        tried=tuple(tried),
+        moment=moment,
+    )
     if not tried:
         return replace(seen, follows=_place(next(iter(others))) if others else "")
     pick, cause, stopped = _contest(later, state, tried, others, config)
@@ -249,16 +261,31 @@ def _promising(
     return [named[key] for key in order if worth[key] > config.promising * worth[order[0]]]
 
 
+def _touch(later: Later, state: State, config: DiagnosisConfig) -> tuple[Window | None, str]:
+    """Return the push that stands out, or what does and is none.
+
+    A push on the tip acts on the joints in one proportion: where any other explains relevantly
+    more, something else happened at that moment.
+    """
+    rows = later.rows
+    touch = standing_out(rows, later.dictionary, later.dataset.arm, state.residual, config)
+    if touch is None or touch.free - touch.gain < config.relevance * touch.free:
+        return touch, ""
+    log = rows.data.logs[touch.log - rows.data.first].log.name
+    start = getattr(touch.effect, "start", 0.0)
+    return None, f"what happened {start:.2f} s into {log} is not what a push on the tip does"
+
+
 def _refitted(
     later: Later,
     state: State,
     named: Sequence[Screened],
     responses: Sequence[Acting],
+    touch: Window | None,
     config: DiagnosisConfig,
 ) -> list[Candidate]:
     """Return causes with all their numbers fitted exactly, beside the best window of an event."""
     out = []
-    touch = standing_out(later.rows, later.dictionary, later.dataset.arm, state.residual, config)
     if touch is not None:
         out.append(
             _candidate(

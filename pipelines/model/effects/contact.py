@@ -56,8 +56,7 @@ class Contact(Event):
         table = np.zeros((3, *q.shape[::-1])).transpose(2, 1, 0)  # samples side by side
         during = np.flatnonzero(self._acting(t))
         if len(during):
-            window = np.sin(math.pi * (t[during] - self.start) / self.duration)
-            table[during] = -window[:, None, None] * jacobian(chain, q[during])[:, :3].transpose(0, 2, 1)
+            table[during] = -self.course(t)[during, None, None] * jacobian(chain, q[during])[:, :3].transpose(0, 2, 1)
         return table
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
@@ -73,6 +72,10 @@ class Contact(Event):
 
     def _acting(self, t: Array) -> npt.NDArray[np.bool_]:
         return np.asarray((t > self.start) & (t < self.start + self.duration))
+
+    def course(self, t: Array) -> Array:
+        """Return how large it is (samples,) at `t` since the start of the log, of its largest."""
+        return np.where(self._acting(t), np.sin(math.pi * (t - self.start) / self.duration), 0.0)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Windows of 0.2 s that overlap by half."""

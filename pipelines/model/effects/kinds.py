@@ -35,6 +35,10 @@ class Event(Effect):
     def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
         """Return windows that may explain `residual` (samples, joints) [N m], at most a few tens."""
 
+    @abstractmethod
+    def course(self, t: Array) -> Array:
+        """Return how large it is (samples,) at `t` since the start of the log, of its largest."""
+
 
 def plainer(law: Effect) -> tuple[tuple[str, ...], ...]:
     """Return the names of laws with fewer terms; none where `law` is no law of friction."""
