@@ -14,6 +14,7 @@ import numpy as np
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.engine import Diagnosis as Found
 from pipelines.diagnosis.findings import (
+    Worth,
     alternatives_of,
     extension_of,
     findings_of,
@@ -21,7 +22,7 @@ from pipelines.diagnosis.findings import (
 )
 from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.diagnosis.screening import best_of
-from pipelines.diagnosis.selection import Candidate
+from pipelines.diagnosis.selection import Candidate, Cause
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import Trained, train
 from pipelines.model.arm import Acting
@@ -39,8 +40,10 @@ from pipelines.model.diagnosis.result import (
     Value,
     Verdict,
 )
+from pipelines.model.diagnosis.screened.candidates import place_of
 from pipelines.model.diagnosis.worth.evidence import evidence
 from pipelines.model.diagnosis.worth.extended import Extended
+from pipelines.model.diagnosis.worth.gains import worse_log
 from pipelines.model.diagnosis.worth.numbers import told
 from pipelines.model.diagnosis.worth.simulated import as_simulated, with_simulation
 from pipelines.model.words import within
@@ -82,12 +85,9 @@ def answer(
         exclude: causes that were not considered.
     """
     tell("weighing what was found, and what these logs would have shown")
-    causes, end = found.decision.causes, found.look.selection.end
-    standing = standing_of(prepared.reference, found.look.later, found.config)
-    named_effects = end.model.effects if causes else ()
-    trained = train(prepared, found.look.later, named_effects, blocks, standing)
-    worth = weigh(prepared, trained, standing.floor, whole)
-    last, floor = len(causes), worth.floor
+    end = found.look.selection.end
+    causes, worth, worse = _worth(prepared, found, blocks, whole)
+    trained, last, floor = worth.trained, len(causes), worth.floor
     rounds = found.look.selection.rounds
     own = [next(one for one in rounds if one.cause is cause) for cause in causes]
     named_causes = [
@@ -99,13 +99,14 @@ def answer(
     open_to = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
     named = {one.cause for one in findings}
     reference = prepared.reference is not None
-    verdict, reason = _VERDICTS[found.decision.verdict], _plain(found.decision.reason)
+    verdict = "unknown" if worse and not causes else _VERDICTS[found.decision.verdict]
+    reason = "; ".join(one for one in (worse, _plain(found.decision.reason)) if one)
     told_of = Diagnosis(
         verdict,
         _sentence(verdict, reason, findings, trained, found),
         findings,
-        standing.told,
-        _rejected(found),
+        worth.standing,
+        _rejected(found, causes, worse),
         limits.detection_limits,
         (*limits.not_identifiable, *(one for one in open_to if whole and one.cause not in named)),
         worth.rms(0),
@@ -127,6 +128,28 @@ def answer(
         unsized = without_limit(told_of, bool(prepared.logs.frf), exclude)
         told_of = replace(told_of, without_limit=unsized)
     return told_of, extension_of(prepared, worth, findings) if verdict == "cause" else None
+
+
+def _worth(
+    prepared: Prepared, found: Found, blocks: int, whole: bool
+) -> tuple[tuple[Cause, ...], Worth, str]:
+    """Return the causes, what they are worth on held-out rows, and why the last of them are none.
+
+    A gain counts on rows that a model was not fitted to: a cause with which the torque of a
+    held-out log is predicted worse than by the nominal model has no name.
+    """
+    causes = found.decision.causes
+    standing = standing_of(prepared.reference, found.look.later, found.config)
+    effects = found.look.selection.end.model.effects if causes else ()
+    trained = train(prepared, found.look.later, effects, blocks, standing)
+    worth, why = weigh(prepared, trained, standing, whole), ""
+    while causes:
+        worse = worse_log(trained.data, worth.left[0], worth.left[len(causes)])
+        if not worse:
+            break
+        why = f"with {place_of(*causes[-1].key)} {worse}"
+        causes = causes[:-1]
+    return causes, worth.first(len(causes)), why
 
 
 def _sentence(
@@ -182,15 +205,19 @@ def _plain(reason: str) -> str:
     return reason
 
 
-def _rejected(found: Found) -> tuple[Rejected, ...]:
-    """Return the causes above their thresholds that are not named."""
-    named = {one.key for one in found.decision.causes}
-    alike = {key for one in found.decision.causes for key in one.alternatives}
+def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Rejected, ...]:
+    """Return the causes above their thresholds that are not named.
+
+    Args:
+        worse: why some that were found are none.
+    """
+    named = {one.key for one in causes}
+    alike = {key for one in causes for key in one.alternatives}
     out: dict[Key, Rejected] = {}
     for one in found.look.selection.rounds:
         for trial in one.tried:
             if trial.key not in named | alike:
-                out[trial.key] = Rejected(*trial.key, _plain(one.stopped) or _WORSE)
+                out[trial.key] = Rejected(*trial.key, _plain(one.stopped) or worse or _WORSE)
     return tuple(out.values())
 
 

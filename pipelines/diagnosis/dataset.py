@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -108,7 +109,7 @@ class Rows:
         """Return torque (…, rows) [N m] joint by joint, in units of the noise."""
         return by_joint(x * self.weight, self.joint, self.n_joints)
 
-    def table(self, columns: Array, rows: Indices | None = None) -> Table:
+    def table(self, columns: npt.NDArray[Any], rows: Indices | None = None) -> Table:
         """Return columns (k, rows) [N m] in units of the noise.
 
         Args:

@@ -64,7 +64,7 @@ def extend(
         refused += impossible
         left = taken
         trained = train(prepared, later, state.model.effects, blocks, standing)
-        worth = weigh(prepared, trained, standing.floor, whole=True)
+        worth = weigh(prepared, trained, standing, whole=True)
         doubts = [_doubt(worth, place) for place in range(len(left))]
         if not any(doubts):
             break

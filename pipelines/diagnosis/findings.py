@@ -1,13 +1,13 @@
 """Build findings: parameters with deviations, gain on held-out rows, proof.
 
-worth = weigh(prepared, trained, floor, whole=True)
+worth = weigh(prepared, trained, standing, whole=True)
 findings = findings_of(worth, later, end, causes)
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,12 +15,13 @@ import numpy as np
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.selection import Round
 from pipelines.diagnosis.table import Array
-from pipelines.diagnosis.trained import Trained, covariance
+from pipelines.diagnosis.trained import Standing, Trained, covariance
 from pipelines.model.arm import Acting
 from pipelines.model.diagnosis.asked.inputs import Prepared
 from pipelines.model.diagnosis.fitted.refit import Refined
 from pipelines.model.diagnosis.given.compliance import Compliance
 from pipelines.model.diagnosis.result import Alternative, Answer, Finding, Gain, Proof, ResidualRms
+from pipelines.model.diagnosis.result import Standing as Told
 from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.diagnosis.worth.gains import (
     Simulation,
@@ -43,6 +44,15 @@ class Worth:
     simulated: tuple[Simulation, ...]  # each model, under the controllers of the held-out logs
     floor: Array  # (joints,) [N m]
     whole: bool  # with figures
+    standing: tuple[Told, ...] = ()  # baseline effects
+
+    def first(self, count: int) -> Worth:
+        """Return the same of the nominal model and the first `count` causes."""
+        some = slice(count + 1)
+        trained = replace(
+            self.trained, models=self.trained.models[some], states=self.trained.states[some]
+        )
+        return replace(self, trained=trained, left=self.left[some], simulated=self.simulated[some])
 
     def gain(self, before: int, after: int) -> Gain:
         """Return what model number `after` gains over another."""
@@ -55,12 +65,11 @@ class Worth:
         return ResidualRms(self.trained.models[place].rms, held_out, self.floor)
 
 
-def weigh(prepared: Prepared, trained: Trained, floor: Array | None, whole: bool) -> Worth:
+def weigh(prepared: Prepared, trained: Trained, standing: Standing, whole: bool) -> Worth:
     """Return what the models are worth on held-out rows.
 
-    Args:
-        floor: (joints,) [N m] what a model leaves of the machine in order; None, without reference
-            logs: what the last model leaves of the rows it was fitted to.
+    The floor is what a model leaves of the machine in order; without reference logs what the last
+    model leaves of the rows it was fitted to.
     """
     arms = [trained.arm(k) for k in range(len(trained.models))]
     simulated = (
@@ -68,9 +77,9 @@ def weigh(prepared: Prepared, trained: Trained, floor: Array | None, whole: bool
         if whole
         else [Simulation.none(arm.n_joints) for arm in arms]
     )
-    floor = trained.models[-1].rms if floor is None else floor
+    floor = trained.models[-1].rms if standing.floor is None else standing.floor
     left = tuple(trained.held_out(k) for k in range(len(arms)))
-    return Worth(trained, left, tuple(simulated), floor, whole)
+    return Worth(trained, left, tuple(simulated), floor, whole, standing.told)
 
 
 def findings_of(

@@ -134,7 +134,7 @@ def _typical(
     several = [value for word, value in median.items() if len(largest[word]) > 1]
     other = _lower_median(several or median.values())
     usual = [median[w] if len(largest[w]) > 1 else other for w in (g.family for g in of)]
-    return replace(found, variance=np.minimum.reduce([found.variance, usual, small]))
+    return replace(found, variance=np.minimum(found.variance, np.minimum(usual, small)))
 
 
 def _any(group: Group) -> bool:

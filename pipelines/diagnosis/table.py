@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,7 +21,7 @@ Indices = npt.NDArray[np.intp]
 Parts = Sequence[npt.NDArray[np.bool_]]
 
 
-def by_joint(x: Array, joint: Indices, n_joints: int) -> tuple[Array, ...]:
+def by_joint(x: npt.NDArray[Any], joint: Indices, n_joints: int) -> tuple[npt.NDArray[Any], ...]:
     """Return a signal (…, rows) split into an array (…, rows of the joint) for each joint."""
     return tuple(np.ascontiguousarray(x[..., joint == j]) for j in range(n_joints))
 
@@ -34,7 +35,7 @@ class Table:
     values: tuple[npt.NDArray[np.floating], ...]  # of each joint (columns there, rows there)
 
     @classmethod
-    def of(cls, columns: Array, joint: Indices, n_joints: int) -> Table:
+    def of(cls, columns: npt.NDArray[Any], joint: Indices, n_joints: int) -> Table:
         """Return the table of dense columns (k, rows); `joint` (rows,) counts from 0."""
         index, values = [], []
         for part in by_joint(columns, joint, n_joints):

@@ -7,6 +7,7 @@ other, and the parameters between them do not feel it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -72,7 +73,7 @@ def zero_phase(x: Array, low_pass: LowPass) -> Array:
     return np.ascontiguousarray(back[pad:-pad]).reshape(x.shape)
 
 
-def thinned(x: Array, response: Array, every: int) -> Array:
+def thinned(x: npt.NDArray[Any], response: Array, every: int) -> npt.NDArray[Any]:
     """Return every so-manieth sample of signals (channels, samples), times `response` at their first frequencies."""
     from scipy.fft import irfft, rfft  # several channels at once, and in single precision
 

@@ -104,7 +104,7 @@ class LogData:
         """What `lay()` makes, or made before under the same key; not to be written to."""
         return self.kept.of((self.place, key), lay)
 
-    def lay_signals(self, x: Array, joints: Sequence[int] | Indices) -> Array:
+    def lay_signals(self, x: npt.NDArray[Any], joints: Sequence[int] | Indices) -> npt.NDArray[Any]:
         """(channels, samples) of torques of the `joints` (channels,), from 0 -> (channels, rows)."""
         rows = np.concatenate([run.lay(np.ascontiguousarray(x[:, piece])) for piece, run in self._parts], axis=1)
         return rows if self.whitening is None else self.whitening.through(rows, joints, self.stretches)
@@ -218,7 +218,7 @@ class Data:
         square = np.bincount(self.joint, np.where(self.counts, x, 0.0) ** 2, minlength=self.n_joints)
         return np.asarray(square, dtype=np.float64), np.bincount(self.joint[self.counts], minlength=self.n_joints)
 
-    def clear(self, x: Array, rows: Indices | None = None) -> Array:
+    def clear(self, x: npt.NDArray[Any], rows: Indices | None = None) -> npt.NDArray[Any]:
         """Return `x` (…, rows), zero in rows that do not count; `rows`: which these are, of some of the joints all."""
         counts = self.counts if rows is None else self.counts[rows]
         return x if counts.all() else np.where(counts, x, 0.0)

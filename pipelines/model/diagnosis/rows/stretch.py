@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +37,7 @@ class Run:
     every: int
     chosen: Indices  # places in the thinned stretch that become rows
 
-    def lay(self, x: Array) -> Array:
+    def lay(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """A smooth signal (channels, samples) -> (channels, rows)."""
         return self._through(x, self.response * self.average if self.held else self.response)
 
@@ -46,7 +47,7 @@ class Run:
             tau = 0.5 * (tau + np.concatenate([tau[:, :1], tau[:, :-1]], axis=1))
         return self._through(tau, self.response)
 
-    def _through(self, x: Array, response: Array) -> Array:
+    def _through(self, x: npt.NDArray[Any], response: Array) -> npt.NDArray[Any]:
         pad, end, out = self.pad, x.shape[1] + self.pad, np.empty((len(x), len(self.chosen)), x.dtype)
         wide, places = np.zeros((min(len(x), _AT_ONCE), self.size), x.dtype), self.chosen + pad // self.every
         for first in range(0, len(x), _AT_ONCE):

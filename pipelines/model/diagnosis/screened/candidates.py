@@ -27,6 +27,7 @@ from pipelines.model.rigid.body import Motion
 __all__ = ["Family", "Laid", "families", "lay_family", "place_of", "whole_motion"]
 
 Indices = npt.NDArray[np.intp]
+Columns = npt.NDArray[np.floating]  # in single precision: there are many, and none is fitted
 
 _AT_ONCE = 48  # columns
 _AWAY = 1e12  # [N m]: what is larger runs away, and is no torque any more
@@ -51,7 +52,7 @@ class Laid:
     """Columns of some shapes of a family, on the rows where they are not zero."""
 
     first: int  # shape
-    table: Array  # (shapes, k, rows here)
+    table: Columns  # (shapes, k, rows here)
     rows: Indices  # which of all rows
 
 
@@ -97,7 +98,7 @@ def whole_motion(data: Data) -> Motion:
 
 
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
-    """The columns of every shape, a few shapes at a time, in single precision: there are many, and none is fitted."""
+    """The columns of every shape, a few shapes at a time."""
     with np.errstate(all="ignore"):
         width = int(family.shapes[0].columns(_first_samples(data), arm).shape[2])
     size = max(1, _AT_ONCE // max(width, 1))
@@ -119,7 +120,7 @@ def _lay_some(data: Data, some: Sequence[Effect], first: int, arm: Arm) -> Laid:
     return Laid(first, data.clear(np.concatenate(parts, axis=2), rows), rows)
 
 
-def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Array:
+def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Columns:
     """(shapes, k, rows of the joint) of effects that act on it alone."""
     table = own_columns(some, one.motion, arm)
     for shape in table:
@@ -128,7 +129,7 @@ def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Arr
     return rows.reshape(len(some), table.shape[1], -1)
 
 
-def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm) -> Array:
+def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm) -> Columns:
     """(shapes, k, joints, rows)"""
     tables = [_finite(table).transpose(2, 1, 0) for table in several_columns(some, one.motion, arm)]
     k, joints, samples = tables[0].shape
