@@ -12,8 +12,10 @@ import pytest
 
 from benchmarks.recorded_diagnosis import Judged, imported, judged_odrive, judged_tx40, nested_error, payoff, searched
 from pipelines.diagnosis.selection import Selection
+from pipelines.log.hdf5 import read_parts
 from pipelines.model.diagnosis.asked.inputs import Logs, prepare
 from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from tests.model.diagnosis.asking import answered
 
 _FOLDS = 5
 _TORQUE_CONSTANT = 0.0551  # N m/A
@@ -50,6 +52,23 @@ def test_tx40_has_no_effect_that_does_not_pay_held_out(tx40: list[Judged]) -> No
     """What most of the searches name takes something off the blocks that they did not see."""
     usual = {name: taken for name, (times, taken) in payoff(tx40).items() if times > _FOLDS // 2}
     assert min(usual.values()) > 0.0, usual
+
+
+@pytest.mark.slow
+def test_a_rotor_of_seven_pole_pairs_cogs_seven_times_a_turn(shared: Path) -> None:
+    """One joint, no reference: no other joint tells what is usual, and a third of its torque is no small thing in any machine."""
+    found = answered(Logs.by_role(list(imported("odrive", shared / "real").values())))
+    assert {one.cause for one in found.findings} == {"cogging"}
+    assert found.findings[0].parameters["order"].value == pytest.approx(7.0, rel=0.005)
+    assert found.after_rms.validate[0] < 0.95 * found.residual_rms.validate[0]
+
+
+def test_a_joint_that_creeps_out_of_its_rest_was_not_touched(shared: Path) -> None:
+    """Friction of joint 3 remembers how long it stood: a force at the tip would move the other joints in proportion."""
+    logs = [read_parts(path)[0] for path in sorted((shared / "real" / "kr300" / "logs").glob("*.h5"))]
+    found = answered(Logs.by_role(logs))
+    assert found.verdict == "unknown"
+    assert not found.findings
 
 
 @pytest.fixture(scope="module")
