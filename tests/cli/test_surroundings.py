@@ -35,8 +35,8 @@ def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path) -> None:
 @pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_cleanly(tmp_path: Path, number: signal.Signals, exit_code: int) -> None:
     """P06: Ctrl-C and SIGTERM end within 5 s with their code, no half-written folder, no orphan."""
-    for i in range(60):
-        write_log(tmp_path / f"logs/{i}.h5", small_log(samples=20_000, seed=i))
+    for i in range(30):
+        write_log(tmp_path / f"logs/{i}.h5", small_log(samples=5_000, seed=i))
     environment = os.environ | {"PYTHONPATH": str(REPO)}
     with subprocess.Popen([*RRRID, "convert", "logs", "--to", "csv", "-v"], cwd=tmp_path, env=environment, text=True,
                           stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True) as process:
