@@ -9,13 +9,17 @@ import json
 
 import pytest
 
-__all__ = ["BEGINS"]
+__all__ = ["BEGINS", "rows_of"]
 
 BEGINS = "rows: "
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """After slow tests were left out: a row whose only test is a campaign, is skipped, or may fail, is not tested."""
+    print(BEGINS + json.dumps(rows_of(session)))
+
+
+def rows_of(session: pytest.Session) -> dict[str, list[str]]:
+    """row -> tests, after slow ones were left out: a row whose only test is a campaign, is skipped, or may fail, is not tested."""
     rows: dict[str, list[str]] = {}
     for item in session.items:
         if any(item.iter_markers("skip")) or any(item.iter_markers("xfail")):
@@ -23,4 +27,4 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         for mark in item.iter_markers("row"):
             for code in mark.args:
                 rows.setdefault(code, []).append(item.nodeid)
-    print(BEGINS + json.dumps(rows))
+    return rows
