@@ -123,7 +123,7 @@ def test_an_interruption_keeps_the_best() -> None:
     def value(self: object, x: np.ndarray, sharpness: float, weight: float) -> tuple[float, np.ndarray, float]:
         nonlocal count
         count += 1
-        if count == 300:
+        if count == 1000:
             raise Interrupted(2)
         return original(self, x, sharpness, weight)  # type: ignore[arg-type]
 
@@ -131,7 +131,7 @@ def test_an_interruption_keeps_the_best() -> None:
         patch.setattr(landscape(task).__class__, "value", value)
         stopped = design(task, Effort(evaluations=10**6), 5)
     assert stopped.stopped == 130
-    whole = design(task, Effort(evaluations=299), 5)
+    whole = design(task, Effort(evaluations=999), 5)
     assert not whole.stopped
     assert stopped.trajectory.series.cosine.tobytes() == whole.trajectory.series.cosine.tobytes()
 
