@@ -154,8 +154,9 @@ class GravityModel:
             np.zeros(p),
         )
         weights, theta = self.effective / fit.variance, self._equilibrated(fit)
-        together = bool((groups == groups[:, :1]).all() and (fit.gravity == fit.gravity[0]).all())
-        transforms, grams = self._transforms(fit.gravity, together), self._weighted(weights, together)
+        same = [(one == one[..., :1, :]).all() for one in (groups, fit.gravity)]
+        transforms = self._transforms(fit.gravity, all(same))
+        grams = self._weighted(weights, all(same))
         for j, (transform, gram) in enumerate(zip(transforms, grams, strict=True)):
             change = np.zeros((p + 3 * m, len(groups)))
             for k in range(3):
