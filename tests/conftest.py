@@ -19,7 +19,9 @@ _FIRST = ("test_mutation.py", "test_hidden_effects.py")
 
 
 def pytest_configure() -> None:
-    """One processor for each worker: what shares its work out among two has the other one's in its way, and forks for nothing."""
+    """One processor for each worker: what shares its work out among two has the other one's in its way, and forks for nothing.
+    Nobody waits for the disk: no test ends by a loss of power."""
+    os.fsync = lambda handle: None
     worker = os.environ.get("PYTEST_XDIST_WORKER", "")
     if worker and hasattr(os, "sched_setaffinity"):
         there = sorted(os.sched_getaffinity(0))

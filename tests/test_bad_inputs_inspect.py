@@ -90,7 +90,7 @@ def test_a_late_torque_is_told_before_a_missing_digest(tmp_path: Path, command: 
     checks = [Check(**c) for c in command("inspect", "log.h5", "--no-report", "--out", "out").object["checks"]]
     found = sorted((c for c in checks if c.level != "ok"), key=first_to_read)
     assert [found[0].code, found[-1].code] == ["RRID-T06", "RRID-F05"]
-    done = run_stage(inspect.STAGE, Request((tmp_path / "log.h5",), tmp_path / "out"), inspect.Settings())
+    done = run_stage(inspect.STAGE, Request((tmp_path / "log.h5",), tmp_path / "out", no_report=True), inspect.Settings())
     assert "First of all: torque lies" in done.report.verdict
 
 

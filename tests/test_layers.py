@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 REPO = Path(__file__).resolve().parents[1]
@@ -65,6 +66,7 @@ def _named(call: ast.Call) -> str | None:
     return first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else "?"
 
 
+@cache
 def _imports(path: Path) -> set[str]:
     """Every module that `path` imports, anywhere in it, in full; "?" for one whose name is put together."""
     found = set()

@@ -36,8 +36,8 @@ def two_arms(tmp_path: Path, samples: Path) -> Path:
     return tmp_path / "logs"
 
 
-@pytest.mark.parametrize("other", [{"robot_name": "arm-b"}, {"recorded": "2026-05-18T09:00:00Z"}])
-@pytest.mark.parametrize("module", READING)
+@pytest.mark.parametrize(("module", "other"), [*((module, {"robot_name": "arm-b"}) for module in READING),
+                                               ("run", {"recorded": "2026-05-18T09:00:00Z"})])
 def test_every_command_refuses_two_sessions(module: str, other: dict[str, str], samples: Path, tmp_path: Path) -> None:
     """Two machines of one description, or two days: each command names both before it computes anything."""
     _put(tmp_path / "logs", "", ("hold-1",), samples / "rrr-healthy")

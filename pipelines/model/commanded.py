@@ -68,7 +68,7 @@ def commanded(log: ExperimentLog) -> Array | None:
         return None
     law = Controlling(experiment, 1)
     with np.errstate(all="ignore"):  # a filter that was described for another sample time may run away
-        wanted = np.array([law.command(k, log.q[k][:, None])[:, 0] for k in range(count)])
+        wanted = law.commanded(log.q[:count])
     return wanted if np.isfinite(wanted).all() else None
 
 

@@ -70,7 +70,7 @@ def test_a_cluster_gives_the_same_bytes_and_bears_the_same_misfortunes(lay: Lay,
 
 
 @pytest.mark.row("P06", "P07")
-@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)])
 def test_a_signal_ends_a_batch_and_leaves_the_cluster_free(lay: Lay, tmp_path: Path, cluster: Cluster, number: signal.Signals,
                                                            exit_code: int) -> None:
     """P06: a summary within 5 s while both workers are at long items, which are dropped; the next batch has the workers at once."""

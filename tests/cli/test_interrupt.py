@@ -18,7 +18,7 @@ from pipelines.log.guard import Answer, guarded
 from tests.cli.commands import REPO, RRRID
 from tests.log.logs import small_log
 
-RUNS = 5
+RUNS = 3
 ENDED = "rrrid: RRID-P06 interrupted. Run the same command again; nothing was half written."
 
 

@@ -5,24 +5,23 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from pipelines import convert
 from pipelines.log.files import write_log
 from tests.cli.commands import REPO, RRRID, rrrid
 from tests.log.logs import small_log
 
 
-def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path) -> None:
+def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What nobody foresaw ends in 70, one line, and a file to report; --debug shows the traceback."""
-    code = ("import sys, pipelines.convert as c; from rrrid_cli import main; from dataclasses import replace\n"
-            "c.STAGE = replace(c.STAGE, compute=lambda inputs, settings: 1 / 0)\nsys.argv = ['rrrid', *sys.argv[1:]]\nmain.entry()")
-    environment = os.environ | {"PYTHONPATH": str(REPO), "TMPDIR": str(logs)}
-    done = subprocess.run([sys.executable, "-c", code, "convert", "logs"], capture_output=True, text=True, cwd=logs,
-                          env=environment, check=False)
+    monkeypatch.setattr(convert, "STAGE", replace(convert.STAGE, compute=lambda inputs, settings: 1 / 0))
+    monkeypatch.setattr("tempfile.tempdir", str(logs))
+    done = rrrid("convert", "logs", cwd=logs)
     assert done.returncode == 70
     assert done.stderr.count("\n") == 1
     (crash,) = logs.glob("rrrid-crash-*.txt")
@@ -35,8 +34,8 @@ def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path) -> None:
 @pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_cleanly(tmp_path: Path, number: signal.Signals, exit_code: int) -> None:
     """P06: Ctrl-C and SIGTERM end within 5 s with their code, no half-written folder, no orphan."""
-    for i in range(60):
-        write_log(tmp_path / f"logs/{i}.h5", small_log(samples=20_000, seed=i))
+    for i in range(30):
+        write_log(tmp_path / f"logs/{i}.h5", small_log(samples=5_000, seed=i))
     environment = os.environ | {"PYTHONPATH": str(REPO)}
     with subprocess.Popen([*RRRID, "convert", "logs", "--to", "csv", "-v"], cwd=tmp_path, env=environment, text=True,
                           stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True) as process:
@@ -94,16 +93,11 @@ def test_no_home_no_terminal_no_display(logs: Path) -> None:
         assert (done.returncode, done.stderr) == (0, "")
 
 
-def test_an_unreadable_log_is_exit_6(logs: Path) -> None:
+def test_an_unreadable_log_is_exit_6(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """F13: the parser leaves it to rrrid to say what may not be read. The superuser, who may all, is told he may not."""
-    code = ("import os, runpy, sys\n"
-            "import rrrid_cli.main, pipelines.convert, h5py, pipelines.log.hdf5\n"
-            "may = os.access\n"
-            "os.access = lambda path, mode: (mode != os.R_OK or not str(path).endswith('a.h5')) and may(path, mode)\n"
-            "sys.argv = ['rrrid', 'convert', 'logs/a.h5']\n"
-            "rrrid_cli.main.entry()")
-    done = subprocess.run([sys.executable, "-c", code], cwd=logs, env=os.environ | {"PYTHONPATH": str(REPO)}, text=True,
-                          capture_output=True, check=False, timeout=60)
+    may = os.access
+    monkeypatch.setattr(os, "access", lambda path, mode: (mode != os.R_OK or not str(path).endswith("a.h5")) and may(path, mode))
+    done = rrrid("convert", "logs/a.h5", cwd=logs)
     assert done.returncode == 6
     assert done.stderr == "rrrid: RRID-F13 logs/a.h5: permission denied. Change its permissions.\n"
 

@@ -30,8 +30,12 @@ def estimated(*logs: ExperimentLog, **settings: object) -> Result:
     return compute(Inputs(opened), replace(SYMMETRIC, **settings))  # type: ignore[arg-type]
 
 
-@lru_cache(maxsize=16)
 def of_periods(seed: int, periods: int, encoder: float = 3e-6, average: bool = True) -> Result:
+    return _of_periods(seed, periods, encoder, average)
+
+
+@lru_cache(maxsize=16)
+def _of_periods(seed: int, periods: int, encoder: float, average: bool) -> Result:
     return estimated(periodic(seed, periods, encoder), average=average)
 
 

@@ -17,7 +17,7 @@ from pipelines.fit.statistics import gather
 from tests.fit.problems import CHANNELS, SIGMA, Problem, autoregressive, problem, white
 
 PERIODS, PHASES = 4, 2500
-SEEDS, MORE = 50, 200  # of every run; of the long campaigns
+SEEDS, MORE = 25, 200  # of every run; of the long campaigns
 
 
 def turned(blocks: list[Block], phase: Array | None = None, phases: int = PHASES) -> Contrasted:
@@ -178,7 +178,7 @@ def test_what_repeats_nothing_passes_as_it_is() -> None:
 
 
 @pytest.mark.parametrize(("way", "seeds"), [
-    ("mean", SEEDS // 2), *(pytest.param(way, MORE // 2, marks=pytest.mark.slow) for way in ("mean", "every sample"))])
+    ("mean", SEEDS), *(pytest.param(way, MORE // 2, marks=pytest.mark.slow) for way in ("mean", "every sample"))])
 def test_logs_of_one_period_beside_one_of_several(way: str, seeds: int) -> None:
     """An error in each: what is told of both together holds, as it does where the log of several gives its mean alone.
 

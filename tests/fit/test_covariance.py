@@ -13,7 +13,7 @@ from pipelines.fit.least_squares import fit, solve
 from pipelines.fit.statistics import gather
 from tests.fit.problems import CHANNELS, SIGMA, Problem, autoregressive, correlated, low_passed, problem, white
 
-SEEDS = 200
+SEEDS = 80
 
 Noise = Callable[[np.random.Generator, int], Array]
 NEARLY_INTEGRATED: Noise = lambda rng, n: autoregressive(rng, n, 0.99)  # noqa: E731

@@ -37,10 +37,10 @@ def _noisy(truth: np.ndarray, relative: float, rng: np.random.Generator) -> tupl
 
 
 def test_four_modes_a_delay_and_two_plateaus_are_found() -> None:
-    """6 seeds of 2 % noise: every number within four deviations, mean square deviation about one, and no mode that is not there."""
+    """3 seeds of 2 % noise: every number within four deviations, mean square deviation about one, and no mode that is not there."""
     deviations = []
     known = [("antiresonance", 26.5, 0.06), ("resonance", 28.0, 0.07), ("antiresonance", 60.0, 0.03), ("resonance", 85.0, 0.025)]
-    for seed in range(6):
+    for seed in range(3):
         found = fit_rational(FREQUENCY, *_noisy(_truth(), 0.02, np.random.default_rng(seed)), integrators=2)
         modes = found.modes()
         assert [m.kind for m in modes] == [kind for kind, _, _ in known]
@@ -101,7 +101,7 @@ def test_the_fit_says_what_its_response_is() -> None:
 def test_a_variance_that_is_estimated_adds_no_modes() -> None:
     """Variances with four degrees of freedom: taken for known they fake pairs of poles, taken for what they are hardly any."""
     known, estimated = [], []
-    for seed in range(5):
+    for seed in range(3):
         rng = np.random.default_rng(seed)
         response, variance = _noisy(_truth(), 0.05, rng)
         variance = variance * rng.gamma(4.0, 0.25, len(variance))
@@ -109,7 +109,7 @@ def test_a_variance_that_is_estimated_adds_no_modes() -> None:
         estimated.append(fit_rational(FREQUENCY, response, variance, integrators=2, freedom=4.0).poles - 2)
     assert min(estimated) == 0
     assert sum(estimated) <= 1
-    assert sum(known) >= 4
+    assert sum(known) >= 3
 
 
 def _nearest(found: Rational, kind: str, hertz: float) -> tuple[float, float, float, float]:
@@ -149,7 +149,7 @@ def _campaign(seeds: range) -> tuple[np.ndarray, np.ndarray]:
 
 def test_modes_of_plants_in_a_loop() -> None:
     """Four machines: frequencies within 1 %, damping within 15 %, none beyond four deviations."""
-    errors, deviations = _campaign(range(4))
+    errors, deviations = _campaign(range(2))
     assert (errors < np.array([0.01, 0.15])).all()
     assert np.abs(deviations).max() < 4.0
 

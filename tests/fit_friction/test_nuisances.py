@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from tests.model.friction.closed_loop import draw, logs_of
 def fitted(shared: Path, folder: Path, case: str, law: str | None) -> dict[str, Any]:
     """The first joint of a recorded case, imported by its recipe, and the checks."""
     recipe = next((shared / "cases").glob(f"{case}-*")) / "r.toml"
-    made = rrrid("import", str(recipe), "--out", "imp", cwd=folder)
+    made = rrrid("import", str(recipe), "--out", "imp", "--no-report", cwd=folder)
     assert made.returncode == 0, made.stderr
     options = () if law is None else ("--law", law)
     made = rrrid("fit-friction", "imp", *options, "--out", "o", "--no-report", "--json", cwd=folder)
@@ -84,14 +85,16 @@ MACHINES = {
 }
 
 
-@pytest.fixture(scope="module")
+@cache
 def logs() -> dict[str, ExperimentLog]:
     """Logs of all machines, integrated side by side."""
     return dict(zip(MACHINES, logs_of(list(MACHINES.values())).values(), strict=True))
 
 
-def computed(log: ExperimentLog, law: str | None) -> tuple[JointResult, Result]:
-    result = fit_friction.compute(Inputs((Opened(Path("a.h5"), "", log, ()),), label="logs"), Settings(law=law))
+@cache
+def computed(name: str, law: str | None) -> tuple[JointResult, Result]:
+    opened = Opened(Path("a.h5"), "", logs()[name], ())
+    result = fit_friction.compute(Inputs((opened,), label="logs"), Settings(law=law))
     return result.joints[0], result
 
 
@@ -100,10 +103,10 @@ def sure(value: Value, truth: float) -> bool:
     return abs(value.value - truth) <= max(3.0 * value.std, 0.002 * abs(truth))
 
 
-def test_constant_speeds_under_a_loop_and_gravity(logs: dict[str, ExperimentLog]) -> None:
+def test_constant_speeds_under_a_loop_and_gravity() -> None:
     """Inertia, both sides of gravity and the curve, to three standard deviations or 0.2 %."""
     machine = MACHINES["rests"]
-    joint, result = computed(logs["rests"], "asymmetric_friction")
+    joint, result = computed("rests", "asymmetric_friction")
     assert sure(joint.inertia, machine.inertia)
     assert sure(joint.gravity["sine"], machine.weight * np.cos(machine.hanging))
     assert sure(joint.gravity["cosine"], -machine.weight * np.sin(machine.hanging))
@@ -113,18 +116,18 @@ def test_constant_speeds_under_a_loop_and_gravity(logs: dict[str, ExperimentLog]
     assert not any(check.code in ("RRID-D26", "RRID-D08", "RRID-S14") for check in result.checks)
 
 
-def test_viscous_friction_below_zero_is_named(logs: dict[str, ExperimentLog]) -> None:
+def test_viscous_friction_below_zero_is_named() -> None:
     """It is reported with the possible reasons."""
-    _, result = computed(logs["regenerating"], "coulomb+viscous")
+    _, result = computed("regenerating", "coulomb+viscous")
     (check,) = [check for check in result.checks if check.code == "RRID-S14"]
     assert "viscous friction" in check.message
     assert "regenerat" in check.remedy
 
 
-def test_friction_that_jumps_is_named_with_its_instant(logs: dict[str, ExperimentLog]) -> None:
+def test_friction_that_jumps_is_named_with_its_instant() -> None:
     """Friction rises by 30 % at 9 s: instant to a rest's length, size to 2 %; inertia and curve are those before the step."""
     machine = MACHINES["step"]
-    joint, _ = computed(logs["step"], "asymmetric_friction+stribeck")
+    joint, _ = computed("step", "asymmetric_friction+stribeck")
     assert joint.drift is not None
     assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
     assert joint.drift.when == pytest.approx(9.0, abs=machine.rests)
@@ -135,10 +138,10 @@ def test_friction_that_jumps_is_named_with_its_instant(logs: dict[str, Experimen
     assert np.all(apart <= 0.01 * np.abs(machine.friction(speed)))
 
 
-def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve(logs: dict[str, ExperimentLog]) -> None:
+def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve() -> None:
     """A free choice of laws finds the step, and the curve before it beyond the speeds that were driven before."""
     machine = MACHINES["ordered"]
-    joint, _ = computed(logs["ordered"], None)
+    joint, _ = computed("ordered", None)
     assert joint.drift is not None
     assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
     assert joint.drift.change.value == pytest.approx(-0.3, abs=0.03)
@@ -149,19 +152,20 @@ def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve(logs: dic
     assert np.all(band <= 0.05 * np.abs(curve))
 
 
-def test_a_step_of_a_quiet_joint_is_not_taken_for_sticking(logs: dict[str, ExperimentLog]) -> None:
+@pytest.mark.slow
+def test_a_step_of_a_quiet_joint_is_not_taken_for_sticking() -> None:
     """The rows that show it, slow ones in fast ramps, are fitted: its instant within a rest, its size within .03."""
     machine = MACHINES["quiet"]
-    joint, _ = computed(logs["quiet"], None)
+    joint, _ = computed("quiet", None)
     assert joint.drift is not None
     assert (joint.drift.kind, joint.drift.form) == ("step", "whole")
     assert joint.drift.when == pytest.approx(machine.when, abs=machine.rests)
     assert joint.drift.change.value == pytest.approx(machine.drift, abs=0.03)
 
 
-def test_an_inertia_below_zero_is_remarked(logs: dict[str, ExperimentLog]) -> None:
+def test_an_inertia_below_zero_is_remarked() -> None:
     """Of a joint that was driven alone within its deviation, of one among all at any."""
-    joint, _ = computed(logs["rests"], "asymmetric_friction")
+    joint, _ = computed("rests", "asymmetric_friction")
     below = replace(joint, inertia=Value(-0.02, 0.015, "kg m^2"))
     (check,) = misfits((below,), "logs")
     assert (check.code, "these logs do not show it" in check.message) == ("RRID-S14", True)
@@ -170,9 +174,9 @@ def test_an_inertia_below_zero_is_remarked(logs: dict[str, ExperimentLog]) -> No
     assert not misfits((joint,), "logs")
 
 
-def test_a_validation_log_at_rest_judges_nothing(logs: dict[str, ExperimentLog]) -> None:
+def test_a_validation_log_at_rest_judges_nothing() -> None:
     """It is reported, and held-out blocks of the identification log judge."""
-    log = logs["rests"]
+    log = logs()["rests"]
     still = {name: replace(signal, values=signal.values[:2500].copy()) for name, signal in log.signals.items()}
     still["q"] = replace(still["q"], values=MACHINES["rests"].encoder * (np.arange(2500) % 7 == 0.0)[:, None])
     rest = replace(log, name="rest", role="validate", signals=still)
@@ -186,7 +190,8 @@ def test_a_validation_log_at_rest_judges_nothing(logs: dict[str, ExperimentLog])
 def test_a_drift_that_looks_like_a_law_is_no_part_of_the_curve() -> None:
     """Speeds rise while friction falls by a sixth: the curve holds, and the doubt is reported."""
     machine = draw("trend", 7011)
-    joint, _ = computed(logs_of([machine])["trend-7011"], None)
+    log = logs_of([machine])["trend-7011"]
+    (joint,) = fit_friction.compute(Inputs((Opened(Path("a.h5"), "", log, ()),), label="logs"), Settings()).joints
     speed = joint.driven[1] * np.array([-0.9, -0.5, -0.25, 0.25, 0.5, 0.9])
     truth = machine.friction(speed) * machine.scale(np.array([machine.seconds / 2]))
     curve = np.interp(speed, joint.series.speed, joint.series.curve)

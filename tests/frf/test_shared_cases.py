@@ -19,7 +19,7 @@ from tests.cli.commands import rrrid
 def _imported(shared: Path, tmp_path: Path, case: str) -> Path:
     for path in (shared / "cases" / case).iterdir():
         shutil.copyfile(path, tmp_path / path.name)
-    assert rrrid("import", "r.toml", "--out", "imported", cwd=tmp_path).returncode == 0
+    assert rrrid("import", "r.toml", "--out", "imported", "--no-report", cwd=tmp_path).returncode == 0
     return tmp_path
 
 

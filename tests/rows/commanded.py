@@ -1,20 +1,17 @@
-"""A command as a user gives it, run in this process: its exit code, what it prints, the error or the checks it tells.
-
-A fresh process costs half a second, and there are a few hundred cases; the start of the program has tests of its own.
-"""
+"""A command as a user gives it: its exit code, what it prints, the error or the checks it tells."""
 
 from __future__ import annotations
 
 import json
 import re
-import signal
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tests.cli.commands import rrrid
 
 __all__ = ["Command", "Done", "command"]
 
@@ -55,30 +52,15 @@ _SILENT = {"C07", "X06", "X08", "X09", "X10", "X11", "X13", "X14", "P13"}
 
 
 @pytest.fixture
-def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
-            request: pytest.FixtureRequest) -> Iterator[Command]:
+def command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest) -> Iterator[Command]:
     """`command("inspect", "a.h5")` in tmp_path, with --json. A test that bears a row has to have met its code in the end."""
-    from rrrid_cli import main
-
     met = set[str]()
 
     def run(*words: object, as_json: bool = True) -> Done:
-        monkeypatch.chdir(tmp_path)
-        monkeypatch.setattr(sys, "argv", ["rrrid", *map(str, words), *(["--json"] if as_json else [])])
-        monkeypatch.setattr(main, "economise", lambda: None)
-        before, hook = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}, sys.unraisablehook
-        capsys.readouterr()
-        try:
-            with pytest.raises(SystemExit) as ended:
-                main.entry()
-        finally:
-            for number, handler in before.items():
-                signal.signal(number, handler)
-            sys.unraisablehook = hook
-        said = capsys.readouterr()
-        assert "Traceback" not in said.err
-        met.update(re.findall(r"RRID-([A-Z]\d\d)", said.out + said.err))
-        return Done(int(ended.value.code or 0), said.out, said.err, json.loads(said.out) if as_json and said.out else {})
+        done = rrrid(*words, *(["--json"] if as_json else []), cwd=tmp_path)
+        met.update(re.findall(r"RRID-([A-Z]\d\d)", done.stdout + done.stderr))
+        told = json.loads(done.stdout) if as_json and done.stdout else {}
+        return Done(done.returncode, done.stdout, done.stderr, told)
 
     yield run
     borne = {row for mark in request.node.iter_markers("row") for row in mark.args}

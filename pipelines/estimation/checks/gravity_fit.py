@@ -104,14 +104,16 @@ class GravityModel:
         """
         each = np.broadcast_to(gravity, (self.rows.n_joints, 3))
         variance = self.alone if variance is None else variance
+        together = bool((each == each[0]).all())
+        transforms = self._transforms(each, together)
         for _ in range(_ROUNDS):
-            parts = self._parts(each, 1.0 / variance)
+            parts = list(zip(transforms, self._weighted(1.0 / variance, together), strict=True))
             normal = sum((t.T @ g[:-1, :-1] @ t for t, g in parts), np.zeros(()))
             right = sum((t.T @ g[:-1, -1] for t, g in parts), np.zeros(()))
             phi = np.linalg.solve(normal + _ridge(normal), right)
             model = np.stack([np.append(t @ phi, -1.0) for t, _ in parts])
             model = np.broadcast_to(model, (len(each), model.shape[1]))
-            left = np.einsum("jp,jpq,jq->j", model, self.gram, model, optimize=True)
+            left = np.sum((model[:, None] @ self.gram)[:, 0] * model, axis=1)
             before, variance = variance, np.maximum(left, 0.0) + self.model_error**2
             if np.abs(np.log(variance / before)).max() < _SETTLED:
                 break
@@ -120,14 +122,15 @@ class GravityModel:
         )
         return GravityFit(each, phi / self.scale, variance, np.sqrt(np.maximum(left, 0.0)), score)
 
-    def _parts(
-        self, each: Array, weights: Array, together: bool = True
-    ) -> list[tuple[Array, Array]]:
-        """Return each joint's T and weighted Gram matrix; joints of one gravity may be summed."""
-        if together and (each == each[0]).all():
-            return [(self._transform(each[0]), np.tensordot(weights, self.gram, 1))]
-        transforms = map(self._transform, each)
-        return list(zip(transforms, weights[:, None, None] * self.gram, strict=True))
+    def _transforms(self, each: Array, together: bool) -> list[Array]:
+        """Return each joint's T; of joints `together`, which have one gravity, a single one."""
+        return [self._transform(gravity) for gravity in (each[:1] if together else each)]
+
+    def _weighted(self, weights: Array, together: bool) -> Array:
+        """Return the weighted Gram matrices (n, P, P), or their sum (1, P, P)."""
+        if together:
+            return np.tensordot(weights, self.gram, 1)[None]
+        return np.asarray(weights[:, None, None] * self.gram)
 
     def _equilibrated(self, fit: GravityFit) -> Array:
         """The parameters (p,) of columns at unit length."""
@@ -151,9 +154,10 @@ class GravityModel:
             np.zeros(p),
         )
         weights, theta = self.effective / fit.variance, self._equilibrated(fit)
-        together = bool((groups == groups[:, :1]).all())
-        parts = self._parts(fit.gravity, weights, together)
-        for j, (transform, gram) in enumerate(parts):
+        same = [(one == one[..., :1, :]).all() for one in (groups, fit.gravity)]
+        transforms = self._transforms(fit.gravity, all(same))
+        grams = self._weighted(weights, all(same))
+        for j, (transform, gram) in enumerate(zip(transforms, grams, strict=True)):
             change = np.zeros((p + 3 * m, len(groups)))
             for k in range(3):
                 change[p + k * m : p + (k + 1) * m] = np.outer(

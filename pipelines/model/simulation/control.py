@@ -43,13 +43,22 @@ class Controlling:
 
     def command(self, k: int, q: Array) -> Array:
         """The torque [N m] that is commanded at sample k, q (joints, replicas) being what the encoders then say."""
-        torque = self._limited(self._law(k, q))
+        torque = self._limited(self._law(k, *self._fed_back(k, q)))
         if not self._experiment.controller.delay:
             return torque
         held, self._waiting = self._waiting, torque
         return held
 
-    def _law(self, k: int, q: Array) -> Array:
+    def commanded(self, q: Array) -> Array:
+        """The torque (samples, joints) [N m] that one replica is commanded from the first sample on, of encoders that say `q`."""
+        every = [np.array(self._fed_back(k, row[:, None])) for k, row in enumerate(q)]
+        torque = self._limited(self._law(slice(len(q)), *np.concatenate(every, axis=2)))
+        if self._experiment.controller.delay:
+            torque = np.concatenate([self._waiting, torque[:, :-1]], axis=1)
+        return torque.T
+
+    def _fed_back(self, k: int, q: Array) -> tuple[Array, Array, Array]:
+        """The errors of position and speed that a model is linearised about, and what is fed back, before any model of the arm."""
         experiment = self._experiment
         error = q - experiment.q_ref[k][:, None]
         e, de = self._estimate(error)
@@ -61,21 +70,22 @@ class Controlling:
         if experiment.v is not None:
             v = experiment.v[k]
             feedback += v if v.ndim == 2 else v[:, None]
-        if experiment.controller.law == "computed-torque":
-            return self._linearising(k, *(self._seen(error) if self._seen is not None else (e, de)), feedback)
-        if self._feedforward is not None:
-            feedback += self._feedforward[k][:, None]
-        if experiment.driven is not None and experiment.tau is not None:
-            feedback[experiment.driven] = experiment.tau[k, experiment.driven][:, None]
-        return feedback
+        return *(self._seen(error) if self._seen is not None else (e, de)), feedback
 
-    def _linearising(self, k: int, e: Array, de: Array, r: Array) -> Array:
+    def _law(self, k: int | slice, e: Array, de: Array, feedback: Array) -> Array:
         experiment = self._experiment
+        forward = None if self._feedforward is None else np.atleast_2d(self._feedforward[k]).T
+        if experiment.controller.law != "computed-torque":
+            if forward is not None:
+                feedback += forward
+            if experiment.driven is not None and experiment.tau is not None:
+                feedback[experiment.driven] = np.atleast_2d(experiment.tau[k, experiment.driven]).T
+            return feedback
         assert experiment.feedforward_arm is not None  # Experiment.of_log refuses the law without it
         body, p = experiment.feedforward_arm.body, experiment.feedforward_arm.p
-        parts = body.torque_parts(experiment.q_ref[k] + e.T, experiment.dq_ref[k] + de.T, r.T, p)
+        parts = body.torque_parts(experiment.q_ref[k] + e.T, experiment.dq_ref[k] + de.T, feedback.T, p)
         torque = sum((getattr(parts, name) for name in self._rigid), np.zeros(e.T.shape)).T
-        return np.ascontiguousarray(torque if self._feedforward is None else torque + self._feedforward[k][:, None])
+        return np.ascontiguousarray(torque if forward is None else torque + forward)
 
     def _limited(self, torque: Array) -> Array:
         """After the controller's own quantisation and limit, as the log has it."""

@@ -28,7 +28,7 @@ def _task(wishes: Wishes, robot: RobotDescription | None = None) -> Task:
 @pytest.fixture(scope="module")
 def default() -> tuple[Task, Design]:
     task = _task(Wishes())
-    return task, design(task, Effort(evaluations=3000), 1)
+    return task, design(task, Effort(evaluations=1200), 1)
 
 
 def test_the_default_design(default: tuple[Task, Design]) -> None:
@@ -80,7 +80,7 @@ def test_a_box_and_a_speed_for_the_tip() -> None:
     """The tip, by the closed form (A2), stays in its box and below its speed, the speed by differences of its place."""
     box = (-0.65, 0.65, -0.65, 0.65, 0.2, 1.1)
     task = _task(replace(Wishes(), harmonics=(20,), tip_speed=1.5, tip_box=box, home=(0.0, 0.6, 0.4)))
-    found = design(task, Effort(evaluations=1500), 2)
+    found = design(task, Effort(evaluations=600), 2)
     t = np.arange(0.0, 10.0, GRID)
     place = tip(rrr_geometry(task.robot), found.trajectory.at(t)[0].T)
     for k in range(3):
@@ -92,7 +92,7 @@ def test_a_box_and_a_speed_for_the_tip() -> None:
 def test_a_run_in_keeps_the_limits() -> None:
     """Not at rest at the ends: it is reached and left by polynomials, continuous to the acceleration, within the limits."""
     task = _task(replace(Wishes(), criterion="condition", rest=False, harmonics=(20,)))
-    found = design(task, Effort(evaluations=800), 3)
+    found = design(task, Effort(evaluations=400), 3)
     one = found.trajectory
     assert 0.1 < one.run_in < 2.0
     t = np.arange(round(one.duration / GRID) + 1) * GRID
@@ -123,7 +123,7 @@ def test_an_interruption_keeps_the_best() -> None:
     def value(self: object, x: np.ndarray, sharpness: float, weight: float) -> tuple[float, np.ndarray, float]:
         nonlocal count
         count += 1
-        if count == 2500:
+        if count == 1000:
             raise Interrupted(2)
         return original(self, x, sharpness, weight)  # type: ignore[arg-type]
 
@@ -131,7 +131,7 @@ def test_an_interruption_keeps_the_best() -> None:
         patch.setattr(landscape(task).__class__, "value", value)
         stopped = design(task, Effort(evaluations=10**6), 5)
     assert stopped.stopped == 130
-    whole = design(task, Effort(evaluations=2499), 5)
+    whole = design(task, Effort(evaluations=999), 5)
     assert not whole.stopped
     assert stopped.trajectory.series.cosine.tobytes() == whole.trajectory.series.cosine.tobytes()
 
@@ -155,7 +155,7 @@ def test_what_is_impossible_is_named(changes: dict[str, float], wishes: dict[str
 def test_a_ceiling_out_of_reach_names_the_limit_in_the_way() -> None:
     """Hardly any room to move: the condition number stays above 3, the dearest limit is the narrow one."""
     task = _task(replace(Wishes(), harmonics=(8,), home=(0.0, 0.5, 0.5)), rrr(position=(-0.05, 0.55)))
-    found = design(task, Effort(evaluations=1500), 1)
+    found = design(task, Effort(evaluations=600), 1)
     assert not found.reached
     assert max(found.peaks, key=lambda peak: peak.cost).quantity == "position"
 
@@ -194,7 +194,7 @@ def test_the_certificate_holds_for_random_motions() -> None:
 def test_any_serial_arm() -> None:
     """Six axes with friction: better than random motions within the same limits, which hold by an arm of Pinocchio's kind."""
     task = _task(replace(Wishes(), criterion="condition", harmonics=(5,)), six_axes())
-    found = design(task, Effort(evaluations=700), 1)
+    found = design(task, Effort(evaluations=300), 1)
     judged = excitation(task, found, 1)
     assert len(judged.singular_values) == len(task.problem.columns.names)
     assert judged.condition_number < judged.random.condition_best

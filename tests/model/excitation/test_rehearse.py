@@ -32,7 +32,7 @@ def plain(task: Task, found: Design) -> Rehearsal:
     return rehearse(task.arm, task.sample_time, motion, task.problem.goal.noise, 1, np.inf)
 
 
-@pytest.mark.parametrize("rest", [True, False])
+@pytest.mark.parametrize("rest", [pytest.param(True, marks=pytest.mark.slow), False])
 def test_a_plan_at_its_speed_limit_is_made_as_small_as_its_rehearsal_asks(rest: bool) -> None:
     """Without a reserve the loop overshoots by some per cent; so much smaller the motion is, and no more."""
     task, found = designed(replace(SHORT, speed_share=1.0, rest=rest), rrr())
@@ -48,7 +48,7 @@ def test_a_plan_at_its_speed_limit_is_made_as_small_as_its_rehearsal_asks(rest: 
     assert all(peak.share <= 1.0 for peak in kept.peaks)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 def test_the_reserve_is_what_an_overshoot_takes(seed: int) -> None:
     """A plan to 95 % of the speed limit, which it uses to the full, is followed within the limit: nothing is made smaller."""
     task, found = designed(SHORT, rrr(), seed)
@@ -96,7 +96,7 @@ def test_a_range_open_on_one_side_is_kept_by_as_little_less() -> None:
     assert kept.shrunk / found.shrunk == pytest.approx(1.0 - past.by / 0.1, abs=0.03)
 
 
-@pytest.mark.parametrize("rest", [True, False])
+@pytest.mark.parametrize("rest", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_what_no_smaller_motion_mends_stays_as_large_as_it_is(rest: bool) -> None:
     """Torque noise of the size of the limits saturates the drives at a standstill as well: two rehearsals show that, not six."""
     task, found = designed(replace(SHORT, noise=(60.0, 60.0, 20.0), rest=rest), rrr())

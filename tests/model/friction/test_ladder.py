@@ -20,7 +20,7 @@ def judged(law: str, seed: int = 1) -> JointFit:
     return fit_joint(JointLogs(JOINT, *seen), 0.02)
 
 
-@pytest.mark.parametrize("law", [law if law in ("coulomb+viscous", "quadratic_drag") else pytest.param(law, marks=pytest.mark.slow)
+@pytest.mark.parametrize("law", [law if law == "quadratic_drag" else pytest.param(law, marks=pytest.mark.slow)
                                  for law in TRUTHS])
 def test_six_machines_with_six_laws(law: str) -> None:
     """The chosen law is the true one, and its curve the true one to 1.2 %: a joint jumps over the falling side of a hump in no
