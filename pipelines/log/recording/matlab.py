@@ -99,9 +99,11 @@ def _opened(name: str, value: Any, depth: int) -> list[tuple[str, npt.NDArray[np
         own = described({field: str(item[field].squeeze()) for field in value.dtype.names if item[field].dtype.kind == "U"})
         if value.size > 1 and not own:
             return []
-        for field in value.dtype.names[:_MOST_MEMBERS]:
-            samples = own and item[field].dtype.kind in "fiu" and item[field].size > 1
-            found += _opened(own if samples else f"{name}.{field}", item[field], depth - 1)
+        fields = value.dtype.names[:_MOST_MEMBERS]
+        series = [field for field in fields if own and item[field].dtype.kind in "fiu" and item[field].size > 1]
+        for field in fields:
+            named = own if series == [field] else f"{field} {own.partition(' [')[0]}" if field in series else f"{name}.{field}"
+            found += _opened(named, item[field], depth - 1)
     return found
 
 
