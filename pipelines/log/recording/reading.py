@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +93,7 @@ class Reading:
 
     @property
     def in_si(self) -> bool:
-        """Tell whether the positions have the symbol of mechanics, or stand beside efforts as in ROS, whose units are SI."""
+        """Tell whether the positions have the symbol of mechanics, or come with efforts as in ROS, whose units are SI."""
         q, tau = self.q.group, self.tau.group
         ros = tau is not None and bool({"effort", "efforts", "eff"} & set(tau.words.split()))
         return q is not None and (ros or q.in_si)
@@ -137,7 +138,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     n = arm.robot.n_joints if arm.robot else None
     groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
     groups = [g for g in groups if g.quantity != "position" or np.ptp(matrix(table, g.columns), axis=0).any()]
-    groups = _parts_and_plans(groups, path, used)
+    groups = _derivatives(table, _parts_and_plans(groups, path, used), clock)
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
         q = _unnamed_positions(table, groups, n, q)
@@ -152,7 +153,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     if q.group and tau.group and _equal(
         matrix(table, tau.group.columns), matrix(table, q.group.columns)
     ):
-        # Numbers that equal the positions are their targets, whatever their name says: tq_0, tq_1, …
+        # Numbers that equal the positions are their targets by any name: tq_0, tq_1, …
         tau = Choice(None, tau.others)
     commanded = tau.group is not None and tau.group.origin == "commanded"
     if unnamed and (commanded or (q.group and not tau.group)):
@@ -226,6 +227,18 @@ def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> l
         replace(g, partial=g.partial or (g.quantity == "torque" and bool(words & _FEEDBACK)))
         for g, words in zip(groups, said, strict=True)
     ]
+
+
+def _derivatives(table: RawTable, groups: list[Group], clock: Clock | None) -> list[Group]:
+    """Name by evidence what names leave open: the slope of a position is its velocity, that of a velocity an acceleration."""
+    known = [g for g in groups if g.quantity in ("position", "") and len(g.columns) <= _MOST_JOINTS]
+    values = {g: matrix(table, g.columns) for g in sorted(known, key=lambda g: g.rank)[:_MOST_BLOCKS]}
+    source: dict[Group, Group] = {}  # derivative -> what it is the slope of
+    for a, b in permutations(values, 2):
+        if slope_of(values[a], values[b], clock.values if clock else None, every=True) is not None:
+            source.setdefault(b, a)
+    named = {g: "acceleration" if a in source else "velocity" for g, a in source.items()}
+    return [replace(g, quantity=named[g], origin=source[g].origin) if g in named else g for g in groups]
 
 
 def _is_orientation(table: RawTable, group: Group) -> bool:
