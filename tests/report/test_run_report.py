@@ -152,6 +152,16 @@ def test_what_is_not_in_order_is_told_where_nothing_was_refused() -> None:
     assert run_report(Result(steps)).verdict == "All should be looked at."
 
 
+def test_a_log_that_cannot_be_used_is_named_before_the_answer() -> None:
+    """Nothing is wrong, as far as the other logs say."""
+    check = Check.of("T01", "reject", "its clock runs backwards", where="a.h5", remedy="record again")
+    empty = {field.name: None for field in fields(Diagnosis)} | {"findings": (), "residual_rms": ResidualRms(*[NOMINAL] * 3)}
+    bare = Diagnosis(**empty)  # type: ignore[arg-type]
+    steps = (Step("inspect", 3, object(), Report("Log doctor", "The log cannot be used.", "bad"), (check,)),
+             Step("diagnose", 0, bare, Report("Diagnosis", "Nothing is wrong.", "good"), ()))
+    assert run_report(Result(steps)).verdict.startswith("Left out as unusable: a.h5 (its clock runs backwards). Nothing is wrong.")
+
+
 @pytest.mark.parametrize(("stages", "said"), [
     ({"inspect": "attention"}, "With remarks: inspect; see the stages."),
     ({"inspect": "attention", "fit-friction": "bad", "frf": "attention"},
