@@ -103,7 +103,7 @@ def _shared_path(table: RawTable) -> str:
 
 
 def _common_path(names: Sequence[str]) -> str:
-    folders = zip(*(re.findall(r"[^./]*[./]", name) for name in names), strict=False)
+    folders = zip(*(re.split(r"(?<=[./])", name)[:-1] for name in names), strict=False)
     return "".join(same[0] for same in takewhile(lambda parts: len(set(parts)) == 1 < len(parts), folders))
 
 

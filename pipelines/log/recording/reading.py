@@ -29,6 +29,7 @@ from pipelines.log.recording.column_roles import (
 )
 from pipelines.log.recording.evidence import Slope, crossed, slope_of
 from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.vocabulary import WORDS
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
 
@@ -238,7 +239,8 @@ def _derivatives(table: RawTable, groups: list[Group], clock: Clock | None) -> l
         if slope_of(values[a], values[b], clock.values if clock else None, every=True) is not None:
             source.setdefault(b, a)
     named = {g: "acceleration" if a in source else "velocity" for g, a in source.items()}
-    return [replace(g, quantity=named[g], origin=source[g].origin) if g in named else g for g in groups]
+    return [replace(g, quantity=named[g], origin=g.origin if WORDS["commanded"] & set(g.words.split()) else source[g].origin)
+            if g in named else g for g in groups]
 
 
 def _is_orientation(table: RawTable, group: Group) -> bool:

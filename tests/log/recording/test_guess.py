@@ -415,7 +415,7 @@ def test_a_header_that_comes_again_is_left_out(tmp_path: Path) -> None:
 
 
 def test_letters_that_may_mean_desired_or_derivative_are_decided_by_slopes(tmp_path: Path) -> None:
-    """q1, q1d, q1dd: velocity and acceleration here, set points there."""
+    """q1, q1d, q1dd: velocity and acceleration here, set points there; a commanded velocity is not measured."""
     def columns(run: Run) -> dict[str, Array]:
         return _block("q#", run.q) | _block("q#d", run.dq) | _block("q#dd", run.ddq) | _block("tau#", run.tau)
 
@@ -424,6 +424,7 @@ def test_letters_that_may_mean_desired_or_derivative_are_decided_by_slopes(tmp_p
     assert 'dq = { columns = "q{j}d", unit = "rad/s" }' in draft
     draft = _arm(tmp_path, lambda run: columns(run) | _block("q#d", run.q_ref))
     assert 'dq = {' not in draft
+    assert 'dq = {' not in _arm(tmp_path, lambda run: _block("q#", run.q) | _block("q#d_cmd", run.dq) | _block("tau#", run.tau))
 
 
 def test_several_columns_of_each_joint_are_one_signal_each(tmp_path: Path) -> None:
