@@ -46,7 +46,7 @@ def _title(steps: Iterable[Step]) -> str:
 
 def _verdicts(steps: Sequence[Step]) -> list[str]:
     """Return the logs left out, the answer of the diagnosis, that of the extended model. Then the refusals, each reason once;
-    without any, the stages with remarks, or their verdicts where there is no answer. Without all that, the verdict of the last stage.
+    without any, the stages with remarks, or their verdicts where there is no answer. Without all that, the last verdict.
     """
     done = [step for step in steps if step.result is not None]
     answers = [step for kind in (Diagnosis, Extension) for step in done if isinstance(step.result, kind)]
