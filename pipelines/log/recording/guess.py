@@ -33,7 +33,7 @@ from pipelines.log.recording.evidence import (
     torque_unit,
     velocity_unit,
 )
-from pipelines.log.recording.link_evidence import LinkFit, fits_by_unit
+from pipelines.log.recording.link_evidence import LinkFit, fits_by_unit, unlike_links
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.reading import (
     BY_FILE,
@@ -463,8 +463,11 @@ class _Drafting:
 
     @property
     def _followed(self) -> bool:
-        """Tell whether the robot's links confirm torque and motion as those of the joints."""
-        return self.links is not None and self.links.followed
+        """Tell whether the robot's links confirm torque and motion as those of the joints, in size as well."""
+        group = self.reading.tau.group
+        named = unit_of_group(group.columns, self.reading.torque_table)[0] if group else None
+        unit, links = UNITS.get(named or "N m"), self.links
+        return links is not None and unit is not None and links.followed and not unlike_links(links, unit.factor, named=False)
 
     @property
     def _noted_motor(self) -> bool:

@@ -29,7 +29,7 @@ _ENGLISH = {
     "gripper finger fingers status mode error errors err deviation lag limit limits flag digital analog io quat "
     "quaternion orientation rpy euler translation rotation dtau dtauj dτ jacobian power energy pwm duty safety imu gyro "
     "camera reward done success rate bus supply battery rel relative delta temp_core protective payload mass "
-    "elbow_config distance",
+    "elbow_config distance trial trials repetition attempt",
     "commanded": "cmd command commanded commands des desired ref reference references target targets tgt set setpoint "
     "setpoints sp goal goals demand demanded nominal plan planned action actions traj trajectory input output request "
     "requested cmds as",

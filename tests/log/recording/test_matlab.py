@@ -65,8 +65,8 @@ def test_an_array_of_structures_has_a_column_for_each_series_of_each_joint(tmp_p
         joint[0, j] = (f"axis {j + 1}", good()[f"q_{j + 1}"][:, None], good()[f"tau_{j + 1}"][:, None])
     scipy.io.savemat(tmp_path / "run.mat", {"joint": joint, "tout": good()["t"][:, None]})
     table = read_table(tmp_path / "run.mat")
-    assert np.array_equal(table.columns["pos axis 2"], good()["q_2"])
-    assert np.array_equal(table.columns["trq axis 3"], good()["tau_3"])
+    assert np.array_equal(table.columns["axis 2.pos"], good()["q_2"])
+    assert np.array_equal(table.columns["axis 3.trq"], good()["tau_3"])
 
 
 def test_a_structure_is_opened_one_level(tmp_path: Path) -> None:
