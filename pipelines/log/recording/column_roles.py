@@ -53,8 +53,11 @@ class Group:
         """Return the side of the gear that the names state: q is a joint's by convention; learning may scale its data."""
         if {"observation", "action", "norm", "normalized", "normalised", "scaled"} & set(self.words.split()):
             return "scaled"
-        joint = self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
-        return "motor" if self.motor else "joint" if joint else ""
+        return "motor" if self.motor else "joint" if self.names_joints else ""
+
+    @property
+    def names_joints(self) -> bool:
+        return self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
 
     @property
     def rank(self) -> tuple[int, bool, bool]:

@@ -380,6 +380,7 @@ class _Drafting:
 
     def _torque_unit(self, tau: Array, group: Group, named: str | None) -> Guess:
         """Return the unit of the torques, "" where columns, file or positions leave it open."""
+        q = self.reading.q.group
         guess, peak = torque_unit(tau, named, self.current, self.links, group.in_si), f"up to {np.abs(tau).max():.4g}"
         if group.words == WITHOUT_NAME:
             return Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
@@ -387,7 +388,7 @@ class _Drafting:
             if self._noted_motor or (group.motor and not self.current and not self._followed):
                 return replace(guess, confidence="unsure", why=f"{guess.why}: at the joint, or on the motor's shaft?")
             return guess
-        if guess.value == "N m" and self._inside_limits() is False:
+        if guess.value == "N m" and self.joints and q is not None and "" in self._position_units(q)[0]:  # outside their limits
             return Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
         if group.words == BY_FILE:
             file = clean(self.reading.torque_table.source, 60)
@@ -473,11 +474,6 @@ class _Drafting:
     def _noted_motor(self) -> bool:
         """Tell whether a line above the table says that its numbers are the motors', and the robot's links do not deny it."""
         return not self._followed and any(_MOTOR_SIDE.search(note) for note in self.reading.table.notes)
-
-    def _inside_limits(self) -> bool | None:
-        """Tell whether the positions are inside the limits of the robot's joints in some unit, None without either."""
-        group = self.reading.q.group
-        return "" not in self._position_units(group)[0] if self.joints and group is not None else None
 
     def _missing(self) -> list[str]:
         """Return [missing] with the numbers that mark a lost sample; nothing where none does."""

@@ -51,9 +51,6 @@ _FEEDFORWARD, _FEEDBACK = frozenset({"ff", "feedforward"}), frozenset({"fb", "fe
 _MOST_JOINTS = 16
 _UNIT_NORM = 1e-3  # error of a quaternion's norm, written with four digits or more
 _MOST_BLOCKS = 6
-_JOINT_WORDS = frozenset(
-    {"joint", "joints", "jnt", "axis", "axes", "achse", "gelenk", "j", "a", "link"}
-)
 
 
 @dataclass(frozen=True)
@@ -202,7 +199,7 @@ def _with_file_name(groups: list[Group], path: Path) -> list[Group]:
     unnamed = [g for g in groups if not g.quantity]
     named = {g.quantity for g in groups}
     quantity = file_quantity(path)
-    if len(unnamed) != 1 or not quantity or quantity in named or not _names_joints(unnamed[0]):
+    if len(unnamed) != 1 or not quantity or quantity in named or not unnamed[0].names_joints:
         return groups
     known = "position" if quantity == "position" else "torque"
     return [replace(g, quantity=known, words=BY_FILE) if g is unnamed[0] else g for g in groups]
@@ -266,10 +263,6 @@ def _undisputed(table: RawTable, q: Choice) -> Choice:
     return q
 
 
-def _names_joints(group: Group) -> bool:
-    return group.order == "robot" or bool(set(group.words.split()) & _JOINT_WORDS)
-
-
 def _unnamed_positions(
     table: RawTable, groups: Sequence[Group], n: int | None, found: Choice
 ) -> Choice:
@@ -279,7 +272,7 @@ def _unnamed_positions(
     """
     beside = [g for g in groups if g.quantity in ("torque", "current", "velocity")]
     named = [
-        g for g in groups if not g.quantity and _names_joints(g) and n in (None, len(g.columns))
+        g for g in groups if not g.quantity and g.names_joints and n in (None, len(g.columns))
     ]
     if len(named) != 1 or not any(len(g.columns) == len(named[0].columns) for g in beside):
         return found if not found.others else Choice(None, (*found.others, *named))
