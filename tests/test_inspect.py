@@ -35,7 +35,7 @@ def doctor(folder: Path, *logs: ExperimentLog, check: bool = False, strict: bool
 @pytest.mark.parametrize(("row", "plain", "checked"), [
     ("", 0, 0),  # nothing wrong
     ("T03", 0, 0),  # a warning alone is not a failed check
-    ("T01", 0, 1),  # mended
+    ("T01", 0, 1),  # repaired
     ("S14", 0, 1),  # a gate
     ("S09", 3, 3),  # not usable
 ])
@@ -249,7 +249,7 @@ def test_what_cannot_be_judged_has_not_passed(tmp_path: Path) -> None:
 
 
 def test_a_channel_used_twice_is_seen(tmp_path: Path) -> None:
-    """S13: torque 1 in the place of torque 2, sample for sample, whatever the model would say of it."""
+    """S13: torque 1 in the place of torque 2, sample for sample, independent of the model."""
     log = good_log()
     outcome = doctor(tmp_path, with_signal(log, tau=log.tau[:, [0, 0, 2]]), check=True)
     (twice,) = [c for c in outcome.result.checks if "sample for sample" in c.message]
