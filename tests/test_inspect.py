@@ -35,7 +35,7 @@ def doctor(folder: Path, *logs: ExperimentLog, check: bool = False, strict: bool
 @pytest.mark.parametrize(("row", "plain", "checked"), [
     ("", 0, 0),  # nothing wrong
     ("T03", 0, 0),  # a warning alone is not a failed check
-    ("T01", 0, 1),  # mended
+    ("T01", 0, 1),  # repaired
     ("S14", 0, 1),  # a gate
     ("S09", 3, 3),  # not usable
 ])
@@ -54,12 +54,14 @@ def test_strict_does_not_mend(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_file_that_cannot_be_opened_is_a_finding(tmp_path: Path) -> None:
-    """The doctor looks at what others refuse; the healthy log beside it is still examined."""
+@pytest.mark.parametrize("check", [False, True])
+def test_a_file_that_cannot_be_opened_is_a_finding(check: bool, tmp_path: Path) -> None:
+    """The doctor examines the healthy log all the same; what is rejected is exit 3, with --check as well (bad-inputs.md, F02)."""
     write_log(tmp_path / "whole.h5", good_log())
     (tmp_path / "cut.h5").write_bytes((tmp_path / "whole.h5").read_bytes()[:5000])
     (tmp_path / "empty.h5").write_bytes(b"")
-    outcome = run_stage(inspect.STAGE, Request((tmp_path,), out=tmp_path.parent / "out", no_report=True), inspect.Settings())
+    request = Request((tmp_path,), out=tmp_path.parent / "out", check=check, no_report=True)
+    outcome = run_stage(inspect.STAGE, request, inspect.Settings())
     assert outcome.exit_code == 3
     rejected = [c for c in outcome.json["checks"] if c["level"] == "reject"]
     assert {c["code"] for c in rejected} >= {"RRID-F01"}
@@ -247,7 +249,7 @@ def test_what_cannot_be_judged_has_not_passed(tmp_path: Path) -> None:
 
 
 def test_a_channel_used_twice_is_seen(tmp_path: Path) -> None:
-    """S13: torque 1 in the place of torque 2, sample for sample, whatever the model would say of it."""
+    """S13: torque 1 in the place of torque 2, sample for sample, independent of the model."""
     log = good_log()
     outcome = doctor(tmp_path, with_signal(log, tau=log.tau[:, [0, 0, 2]]), check=True)
     (twice,) = [c for c in outcome.result.checks if "sample for sample" in c.message]

@@ -45,19 +45,24 @@ def _title(steps: Iterable[Step]) -> str:
 
 
 def _verdicts(steps: Sequence[Step]) -> list[str]:
-    """What diagnosis says, and the extended model. Then what was refused, each reason once; where nothing was, which stages have
-    remarks, or what these say where there is neither. Without all that, what the last stage says.
+    """Return the logs left out, the answer of the diagnosis, that of the extended model. Then the refusals, each reason once;
+    without any, the stages with remarks, or their verdicts where there is no answer. Without all that, the last verdict.
     """
     done = [step for step in steps if step.result is not None]
     answers = [step for kind in (Diagnosis, Extension) for step in done if isinstance(step.result, kind)]
     refused = _refusals(steps)
     others = [step for step in steps if step not in answers and step.report.tone in ("attention", "bad")]
+    bad = [f"{check.where} ({check.message})" for step in steps if step.name == "inspect" and answers
+           for check in step.checks if check.level == "reject"]
+    more = f" and {len(bad) - 3} more" if len(bad) > 3 else ""
+    left_out = [f"Left out as unusable: {'; '.join(bad[:3])}{more}."] if bad else []
     told = _look_at(others) if answers else [step.report.verdict for step in others]
-    return [*(step.report.verdict for step in answers), *(refused or told)] or [step.report.verdict for step in done[-1:]]
+    said = [*left_out, *(step.report.verdict for step in answers), *(refused or told)]
+    return said or [step.report.verdict for step in done[-1:]]
 
 
 def _look_at(steps: Sequence[Step]) -> list[str]:
-    """Their names, by how grave it is: what they say stands with the stages, and is about the logs more than about the arm."""
+    """Return their names by gravity: their verdicts are in the table of stages, and concern the logs more than the arm."""
     found = []
     for tone, words in (("bad", "Not in order"), ("attention", "With remarks")):
         names = [step.name for step in steps if step.report.tone == tone]
@@ -103,7 +108,7 @@ def _stages(steps: Iterable[Step]) -> Section:
 
 
 def _lacking(steps: Iterable[Step]) -> Section | None:
-    """What was passed over for want of a recording, and which one would bring it."""
+    """Return the stages that lack a recording, and the recording that each needs."""
     rows = tuple((step.name, check.message, check.remedy) for step in steps
                  if step.exit == NothingMatched.exit_code for check in step.checks)
     if not rows:
@@ -130,7 +135,7 @@ def _these(section: Section) -> str:
 
 
 def _titled(sections: Iterable[Section], prefix: str) -> list[Section]:
-    """`sections`, their titles and figures told apart from those of other stages."""
+    """`sections`, with titles and figures named after their stage."""
     return [dataclasses.replace(
         section, title=f"{prefix}: {section.title}",
         figures=tuple(dataclasses.replace(f, name=f"{slug(prefix)}-{f.name}") for f in section.figures))

@@ -1,4 +1,4 @@
-"""The report of a run can be read to its end: it draws a few logs, tells of all, and counts each gain from a line that is shown."""
+"""The report of a run can be read to its end: it draws a few logs, lists all, and counts each gain from a line that is shown."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ LOAD = finding("payload", None, "base parameters", BARE, CARRYING)
 
 
 def test_every_gain_counts_from_a_line_above_it() -> None:
-    """A load's is that over the arm of the reference logs, not over a rigid body that holds it already; whatever is strongest."""
+    """A load's is that over the arm of the reference logs, not over a rigid body that holds it already, in any order."""
     for findings, was in (((RIPPLE,), NOMINAL), ((LOAD,), BARE), ((LOAD, RIPPLE), BARE), ((RIPPLE, DRAG), NOMINAL),
                           ((DRAG, RIPPLE), NOMINAL), ((RIPPLE, LOAD), 2.0 * BARE)):
         lines = ledger_lines(told(*findings, was=was))
@@ -86,7 +86,7 @@ def test_every_gain_counts_from_a_line_above_it() -> None:
 
 
 def test_a_load_alone_is_told_beside_the_arm_without_it() -> None:
-    """The model fitted to the loaded arm is no step towards the load: it does not stand in the ledger."""
+    """The model fitted to the loaded arm is no step towards the load: it is no line of the ledger."""
     bare, load, extended = ledger_lines(told(LOAD, was=BARE))
     assert bare.step.endswith("without payload at the tip")
     assert (bare.rms, load.before, extended.before) == (tuple(BARE),) * 3
@@ -152,12 +152,22 @@ def test_what_is_not_in_order_is_told_where_nothing_was_refused() -> None:
     assert run_report(Result(steps)).verdict == "All should be looked at."
 
 
+def test_a_log_that_cannot_be_used_is_named_before_the_answer() -> None:
+    """Nothing is wrong, as far as the other logs say."""
+    check = Check.of("T01", "reject", "its clock runs backwards", where="a.h5", remedy="record again")
+    empty = {field.name: None for field in fields(Diagnosis)} | {"findings": (), "residual_rms": ResidualRms(*[NOMINAL] * 3)}
+    bare = Diagnosis(**empty)  # type: ignore[arg-type]
+    steps = (Step("inspect", 3, object(), Report("Log doctor", "The log cannot be used.", "bad"), (check,)),
+             Step("diagnose", 0, bare, Report("Diagnosis", "Nothing is wrong.", "good"), ()))
+    assert run_report(Result(steps)).verdict.startswith("Left out as unusable: a.h5 (its clock runs backwards). Nothing is wrong.")
+
+
 @pytest.mark.parametrize(("stages", "said"), [
     ({"inspect": "attention"}, "With remarks: inspect; see the stages."),
     ({"inspect": "attention", "fit-friction": "bad", "frf": "attention"},
      "Not in order: fit-friction; see the stages. With remarks: inspect and frf; see the stages.")])
 def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: dict[str, Any], said: str) -> None:
-    """The headline is about the arm; what they say stands in the table of stages."""
+    """The headline is about the arm; their verdicts are in the table of stages."""
     rms = ResidualRms(NOMINAL, NOMINAL, NOMINAL)
     empty = {field.name: None for field in fields(Diagnosis)} | {"findings": (), "residual_rms": rms}
     bare = Diagnosis(**empty)  # type: ignore[arg-type]
@@ -171,7 +181,7 @@ def test_beside_a_diagnosis_the_other_stages_are_named_alone(stages: dict[str, A
 
 
 def test_the_extended_model_of_the_key_figures_is_told_from_the_file() -> None:
-    """They are those of diagnose; what the model.json of extend leaves is said beside them, where there is one."""
+    """They are those of diagnose; the residual of extend's model.json is stated below, where there is one."""
     table = Table(("joint", "torque error now [N m]", "extended [N m]"), ((1, 0.5, 0.18), (2, 0.1, 0.1)), "Of what was held out.")
     diagnosed, extended = told(RIPPLE)
     diagnosed = dataclasses.replace(diagnosed, report=Report("", "", key_figures=table))

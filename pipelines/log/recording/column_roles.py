@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Literal
 
@@ -52,8 +53,11 @@ class Group:
         """Return the side of the gear that the names state: q is a joint's by convention; learning may scale its data."""
         if {"observation", "action", "norm", "normalized", "normalised", "scaled"} & set(self.words.split()):
             return "scaled"
-        joint = self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
-        return "motor" if self.motor else "joint" if joint else ""
+        return "motor" if self.motor else "joint" if self.names_joints else ""
+
+    @property
+    def names_joints(self) -> bool:
+        return self.order == "robot" or bool(set(self.words.split()) & _JOINT_SIDE)
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
@@ -74,10 +78,7 @@ def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     texts = texts_of(table, joints)
     patterns = _patterns(table, joints)
     found: dict[tuple[object, ...], list[tuple[ColumnName, int | None]]] = {}
-    # What all names begin with is the recording's name and says nothing of a column: "payload.joints[0].pos".
-    first, last = min(table.columns), max(table.columns)
-    alike = next((k for k, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), 0)
-    shared = re.sub(r"[^./]*$", "", first[:alike])
+    shared = _shared_path(table)
     for column in table.columns:
         rest, place = _without_joint(column.removeprefix(shared), patterns)
         name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
@@ -90,6 +91,23 @@ def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
         for part in _split(members):
             groups.append(_ordered(part, joints, texts))
     return groups
+
+
+def _shared_path(table: RawTable) -> str:
+    """Return the path that all columns but the clock have, the recording's name: "payload." of "payload.joints[0].pos".
+
+    It says nothing of a column, unless that all are commanded, or apart from the clock computed: "cmd.".
+    """
+    signals = [column for column in table.columns if read_name(column).quantity not in ("time", "index")]
+    every, path = (_common_path(names) for names in (list(table.columns), signals))
+    said = read_name(path.removeprefix(every))
+    path = every if said.partial and said.origin != "measured" else path or every
+    return "" if read_name(path).origin == "commanded" else path
+
+
+def _common_path(names: Sequence[str]) -> str:
+    folders = zip(*(re.split(r"(?<=[./])", name)[:-1] for name in names), strict=False)
+    return "".join(same[0] for same in takewhile(lambda parts: len(set(parts)) == 1 < len(parts), folders))
 
 
 def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
@@ -161,7 +179,8 @@ def _split(members: list[tuple[ColumnName, int | None]]) -> list[list[tuple[Colu
 
     Where a word comes once only, the words name the joints: wrist_1, wrist_2, elbow.
     """
-    if any(place is not None for _, place in members):
+    places = [place for _, place in members if place is not None]
+    if places and len(set(places)) == len(places):
         return [members]
     parts: dict[tuple[str, ...], list[tuple[ColumnName, int | None]]] = {}
     for member in members:

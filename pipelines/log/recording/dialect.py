@@ -28,7 +28,7 @@ _WORDS = {",": "comma", ";": "semicolon", "\t": "tab", "|": "bar", " ": "blanks"
 
 @dataclass(frozen=True)
 class TextFormat:
-    """What a recipe may say of a text file; what it leaves open is found out."""
+    """The format of a text file as a recipe states it; the rest is detected."""
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012
 
@@ -149,7 +149,7 @@ def find_dialect(lines: list[tuple[int, str]], source: str, given: TextFormat) -
     """F16: the delimiter and decimal sign under which most cells are numbers and all lines have one width.
 
     Raises:
-        InputRejected: F16, the decimal comma cannot be told from the delimiter.
+        InputRejected: F16, the decimal comma is not distinguishable from the delimiter.
     """
     step = max(1, len(lines) // 200)
     sample = [line for _, line in lines[len(lines) > 1 :: step]][:240]
@@ -181,8 +181,10 @@ def _score(sample: list[str], delimiter: str, decimal: str, first: str) -> tuple
 
 def _refuse_two_commas(lines: list[tuple[int, str]], dialect: Dialect, source: str) -> None:
     names = len(cells_of(lines[0][1], ","))
-    if dialect.delimiter == "," and names > 1 and dialect.width == 2 * names and not is_number(cells_of(lines[0][1], ",")[0]):
-        number = lines[1][0] if len(lines) > 1 else lines[0][0]
+    if dialect.delimiter != "," or names < 2 or dialect.width != 2 * names:
+        return
+    number, row = next((k, cells) for k, line in lines if len(cells := cells_of(line, ",")) == dialect.width)
+    if all(map(is_number, row)):  # no names of that many columns above them
         raise InputRejected("F16", f"line {number} has {dialect.width} cells under {names} names: "
                             "comma is both delimiter and decimal sign",
                             where=source, remedy="export with a semicolon or tab between the columns, or with decimal points")

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -32,7 +33,7 @@ from pipelines.log.recording.evidence import (
     torque_unit,
     velocity_unit,
 )
-from pipelines.log.recording.link_evidence import LinkFit, fits_by_unit
+from pipelines.log.recording.link_evidence import LinkFit, fits_by_unit, unlike_links
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.reading import (
     BY_FILE,
@@ -55,6 +56,7 @@ __all__ = ["Draft", "guess_recipe"]
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _ANGLES, _NAMED = ("rad", "deg", "rev"), "as named"  # what positions may be in where no unit is named; else that
+_MOTOR_SIDE = re.compile(r"motor[ _-]*(side|shaft|seit)", re.IGNORECASE)
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
 gravity = [0.0, 0.0, -9.81]
@@ -131,6 +133,7 @@ class _Drafting:
             if factor is not None:
                 self.t = reading.clock.values * factor
                 self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
+        self.rate = self._rate_of_velocity() if reading.clock is None else math.nan
         self.current = tau is not None and tau.quantity == "current"
         self.fits: dict[str, LinkFit] = {}  # by the unit of the positions
         self.fits = self._fits()
@@ -218,17 +221,21 @@ class _Drafting:
 
     def _rate(self) -> list[str]:
         """Return [time] without a column: the rate, which a recorded velocity may show."""
-        slope = self.reading.slope if self._one_unit_of_angle() else None
-        rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
-        near = round_rate(1.005 * rate) if math.isfinite(rate) else math.nan
-        if abs(rate / near - 1.0) < 5e-3:  # recorders are set to round rates
-            guess = Guess(f"{near:g} Hz", "likely", f"the recorded velocity is {rate:.5g} times the step of the position from "
-                          "sample to sample, if both are in one unit of angle")
-            return ["[time]", f"rate = {near:g}   {self.note('rate', guess)}", ""]
+        if math.isfinite(self.rate):
+            guess = Guess(f"{self.rate:g} Hz", "likely", "the recorded velocity is that often the step of the position "
+                          "from sample to sample, if both are in one unit of angle")
+            return ["[time]", f"rate = {self.rate:g}   {self.note('rate', guess)}", ""]
         self.evidence.append("rate: no column of time")
         self.blanks.append("time.rate")
         return ["[time]", f'rate = "{BLANK}"                        # Hz; no column rises steadily, so only you know it',
                 *self._map_hint(), ""]
+
+    def _rate_of_velocity(self) -> float:
+        """Return the rate [Hz] that a recorded velocity shows; nan where none does, or no round one, as recorders are set to."""
+        slope = self.reading.slope if self._one_unit_of_angle() else None
+        rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
+        near = round_rate(1.005 * rate) if math.isfinite(rate) else math.nan
+        return near if abs(rate / near - 1.0) < 5e-3 else math.nan
 
     def _one_unit_of_angle(self) -> bool:
         """Tell whether a velocity without a clock is in the positions' unit: both name it, or are in SI units."""
@@ -373,12 +380,15 @@ class _Drafting:
 
     def _torque_unit(self, tau: Array, group: Group, named: str | None) -> Guess:
         """Return the unit of the torques, "" where columns, file or positions leave it open."""
+        q = self.reading.q.group
         guess, peak = torque_unit(tau, named, self.current, self.links, group.in_si), f"up to {np.abs(tau).max():.4g}"
         if group.words == WITHOUT_NAME:
             return Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
         if guess.confidence == "sure":
+            if self._noted_motor or (group.motor and not self.current and not self._followed):
+                return replace(guess, confidence="unsure", why=f"{guess.why}: at the joint, or on the motor's shaft?")
             return guess
-        if guess.value == "N m" and self._inside_limits() is False:
+        if guess.value == "N m" and self.joints and q is not None and "" in self._position_units(q)[0]:  # outside their limits
             return Guess("", "unsure", f"{peak}: N m of the joint, or of the motor's shaft, as the positions may be?")
         if group.words == BY_FILE:
             file = clean(self.reading.torque_table.source, 60)
@@ -388,10 +398,11 @@ class _Drafting:
     def _fits(self) -> dict[str, LinkFit]:
         """Return how the torque follows from the motion by the robot's links, for each unit the positions may be in."""
         q, robot, group = self.q, self.reading.arm.robot, self.reading.q.group
-        if self.model is None or robot is None or group is None or q is None or self.tau is None or self.t is None:
+        if self.model is None or robot is None or group is None or q is None or self.tau is None:
             return {}
+        t = self.reading.table.rows / self.rate if self.t is None else self.t
         turning = all(joint.revolute for joint in robot.joints)
-        if not turning or self.tau.shape != q.shape or np.median(np.diff(self.t)) <= 0.0:
+        if not turning or self.tau.shape != q.shape or not np.median(np.diff(t)) > 0.0:
             return {}
         named = self._position_units(group)[0]
         units = {unit: [unit] * self.n for unit in _ANGLES}
@@ -399,7 +410,7 @@ class _Drafting:
         if not {unit for each in units.values() for unit in each} <= UNITS.keys():
             return {}
         factors = {key: np.array([UNITS[unit].factor for unit in each]) for key, each in units.items()}
-        return fits_by_unit(partial(self.model, robot), q, self.tau, self.t, factors)
+        return fits_by_unit(partial(self.model, robot), q, self.tau, t, factors)
 
     def _links(self) -> LinkFit | None:
         """Return the fit by links in the unit of the positions, where that is open the best; None where the links say nothing."""
@@ -439,8 +450,8 @@ class _Drafting:
                 unknown = f"; those marked {self.blank('drive.transmission')} were near zero: from the data sheet"
             lines = ["[drive]                  # check: likely, positions start at these numbers of quarter turns: motor side",
                      f"transmission = [{ratios}]   # check: sign, + where motor and joint turn alike{unknown}"]
-        elif group and group.motor and "theta" not in group.words and not self._inside_limits():
-            lines = ["[drive]                  # positions are named the motor's: q_motor = N q_joint, tau_joint = N^T tau_motor",
+        elif group and (self._noted_motor or (group.motor and "theta" not in group.words and not self._followed)):
+            lines = ["[drive]                  # of motors, by name or note: q_motor = N q_joint, tau_joint = N^T tau_motor",
                      f'transmission = "{self.blank("drive.transmission")}"   # gear ratio of each joint; '
                      "remove [drive] where they are the joints'"]
         else:
@@ -451,10 +462,18 @@ class _Drafting:
             lines.append(f'torque_constant = "{blank}"             # N m/A, motor side: from the data sheet')
         return [*lines, ""]
 
-    def _inside_limits(self) -> bool | None:
-        """Tell whether the positions are inside the limits of the robot's joints in some unit, None without either."""
-        group = self.reading.q.group
-        return "" not in self._position_units(group)[0] if self.joints and group is not None else None
+    @property
+    def _followed(self) -> bool:
+        """Tell whether the robot's links confirm torque and motion as those of the joints, in size as well."""
+        group = self.reading.tau.group
+        named = unit_of_group(group.columns, self.reading.torque_table)[0] if group else None
+        unit, links = UNITS.get(named or "N m"), self.links
+        return links is not None and unit is not None and links.followed and not unlike_links(links, unit.factor, named=False)
+
+    @property
+    def _noted_motor(self) -> bool:
+        """Tell whether a line above the table says that its numbers are the motors', and the robot's links do not deny it."""
+        return not self._followed and any(_MOTOR_SIDE.search(note) for note in self.reading.table.notes)
 
     def _missing(self) -> list[str]:
         """Return [missing] with the numbers that mark a lost sample; nothing where none does."""

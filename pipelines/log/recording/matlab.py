@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
+from pipelines.log.recording.column_names import read_name
 from pipelines.log.recording.raw import described, distinct, unit_in
 
 __all__ = ["BUDGET", "damaged", "read_mat5", "read_mat73"]
@@ -99,9 +100,12 @@ def _opened(name: str, value: Any, depth: int) -> list[tuple[str, npt.NDArray[np
         own = described({field: str(item[field].squeeze()) for field in value.dtype.names if item[field].dtype.kind == "U"})
         if value.size > 1 and not own:
             return []
-        for field in value.dtype.names[:_MOST_MEMBERS]:
-            samples = own and item[field].dtype.kind in "fiu" and item[field].size > 1
-            found += _opened(own if samples else f"{name}.{field}", item[field], depth - 1)
+        fields = value.dtype.names[:_MOST_MEMBERS]
+        series = [field for field in fields if own and item[field].dtype.kind in "fiu" and item[field].size > 1]
+        signals = [field for field in series if read_name(field).quantity != "time"]
+        for field in fields:
+            named = own if signals == [field] else f"{own.partition(' [')[0] if field in series else name}.{field}"
+            found += _opened(named, item[field], depth - 1)
     return found
 
 

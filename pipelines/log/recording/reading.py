@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from pipelines.log.recording.column_roles import (
 )
 from pipelines.log.recording.evidence import Slope, crossed, slope_of
 from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.vocabulary import WORDS
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
 
@@ -49,9 +51,6 @@ _FEEDFORWARD, _FEEDBACK = frozenset({"ff", "feedforward"}), frozenset({"fb", "fe
 _MOST_JOINTS = 16
 _UNIT_NORM = 1e-3  # error of a quaternion's norm, written with four digits or more
 _MOST_BLOCKS = 6
-_JOINT_WORDS = frozenset(
-    {"joint", "joints", "jnt", "axis", "axes", "achse", "gelenk", "j", "a", "link"}
-)
 
 
 @dataclass(frozen=True)
@@ -92,7 +91,7 @@ class Reading:
 
     @property
     def in_si(self) -> bool:
-        """Tell whether the positions have the symbol of mechanics, or stand beside efforts as in ROS, whose units are SI."""
+        """Tell whether the positions have the symbol of mechanics, or come with efforts as in ROS, whose units are SI."""
         q, tau = self.q.group, self.tau.group
         ros = tau is not None and bool({"effort", "efforts", "eff"} & set(tau.words.split()))
         return q is not None and (ros or q.in_si)
@@ -137,7 +136,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     n = arm.robot.n_joints if arm.robot else None
     groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
     groups = [g for g in groups if g.quantity != "position" or np.ptp(matrix(table, g.columns), axis=0).any()]
-    groups = _parts_and_plans(groups, path, used)
+    groups = _derivatives(table, _parts_and_plans(groups, path, used), clock)
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
         q = _unnamed_positions(table, groups, n, q)
@@ -152,7 +151,7 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     if q.group and tau.group and _equal(
         matrix(table, tau.group.columns), matrix(table, q.group.columns)
     ):
-        # Numbers that equal the positions are their targets, whatever their name says: tq_0, tq_1, …
+        # Numbers that equal the positions are their targets by any name: tq_0, tq_1, …
         tau = Choice(None, tau.others)
     commanded = tau.group is not None and tau.group.origin == "commanded"
     if unnamed and (commanded or (q.group and not tau.group)):
@@ -200,7 +199,7 @@ def _with_file_name(groups: list[Group], path: Path) -> list[Group]:
     unnamed = [g for g in groups if not g.quantity]
     named = {g.quantity for g in groups}
     quantity = file_quantity(path)
-    if len(unnamed) != 1 or not quantity or quantity in named or not _names_joints(unnamed[0]):
+    if len(unnamed) != 1 or not quantity or quantity in named or not unnamed[0].names_joints:
         return groups
     known = "position" if quantity == "position" else "torque"
     return [replace(g, quantity=known, words=BY_FILE) if g is unnamed[0] else g for g in groups]
@@ -228,6 +227,19 @@ def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> l
     ]
 
 
+def _derivatives(table: RawTable, groups: list[Group], clock: Clock | None) -> list[Group]:
+    """Name by evidence what names leave open: the slope of a position is its velocity, that of a velocity an acceleration."""
+    known = [g for g in groups if g.quantity in ("position", "") and len(g.columns) <= _MOST_JOINTS]
+    values = {g: matrix(table, g.columns) for g in sorted(known, key=lambda g: g.rank)[:_MOST_BLOCKS]}
+    source: dict[Group, Group] = {}  # derivative -> what it is the slope of
+    for a, b in permutations(values, 2):
+        if slope_of(values[a], values[b], clock.values if clock else None, every=True) is not None:
+            source.setdefault(b, a)
+    named = {g: "acceleration" if a in source else "velocity" for g, a in source.items()}
+    return [replace(g, quantity=named[g], origin=g.origin if WORDS["commanded"] & set(g.words.split()) else source[g].origin)
+            if g in named else g for g in groups]
+
+
 def _is_orientation(table: RawTable, group: Group) -> bool:
     """Tell whether four columns are a unit quaternion by any name: their squares add up to one."""
     if len(group.columns) != 4:
@@ -251,10 +263,6 @@ def _undisputed(table: RawTable, q: Choice) -> Choice:
     return q
 
 
-def _names_joints(group: Group) -> bool:
-    return group.order == "robot" or bool(set(group.words.split()) & _JOINT_WORDS)
-
-
 def _unnamed_positions(
     table: RawTable, groups: Sequence[Group], n: int | None, found: Choice
 ) -> Choice:
@@ -264,7 +272,7 @@ def _unnamed_positions(
     """
     beside = [g for g in groups if g.quantity in ("torque", "current", "velocity")]
     named = [
-        g for g in groups if not g.quantity and _names_joints(g) and n in (None, len(g.columns))
+        g for g in groups if not g.quantity and g.names_joints and n in (None, len(g.columns))
     ]
     if len(named) != 1 or not any(len(g.columns) == len(named[0].columns) for g in beside):
         return found if not found.others else Choice(None, (*found.others, *named))

@@ -1,6 +1,6 @@
 """Words that name the columns of recordings, by meaning and language; case and accents are left out.
 
-A word belongs to one meaning only, whatever the language: what is ambiguous ("temps" is a time in
+A word belongs to one meaning only, in all languages: what is ambiguous ("temps" is a time in
 French, temperatures in English) stands where the more frequent meaning is, and a unit in the
 header decides against it.
 """
@@ -18,9 +18,9 @@ _ENGLISH = {
     "position": "q qpos pos position positions posn angle angles theta enc encoder jpos qs joint_angle ang phi φ θ ϕ",
     "velocity": "dq qd qdot dqdt qvel vel vels velo velocity velocities speed speeds omega dtheta jvel spd ω dφ dθ dϕ",
     "acceleration": "ddq qdd qddot acc accel acceleration accelerations ddtheta qacc jacc ddφ ddθ",
-    "torque": "tau torque torques trq tq moment moments effort efforts eff mom qfrc jtau tauj jtrq τ",
+    "torque": "tau torque torques trq tq moment moments effort efforts eff mom tor qfrc jtau tauj jtrq τ",
     "current": "i iq isq curr current currents cur amp amps ampere",
-    "time": "t time times timestamp timestamps stamp clock sec secs second seconds nsec nsecs nanosec nanosecs "
+    "time": "t time times tout timestamp timestamps stamp clock sec secs second seconds nsec nsecs nanosec nanosecs "
     "nanosecond nanoseconds usec usecs microsec microseconds msec millisec milliseconds millis micros nanos elapsed "
     "ts uptime datetime date",
     "index": "idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id cycle",
@@ -29,7 +29,7 @@ _ENGLISH = {
     "gripper finger fingers status mode error errors err deviation lag limit limits flag digital analog io quat "
     "quaternion orientation rpy euler translation rotation dtau dtauj dτ jacobian power energy pwm duty safety imu gyro "
     "camera reward done success rate bus supply battery rel relative delta temp_core protective payload mass "
-    "elbow_config distance",
+    "elbow_config distance trial trials repetition attempt",
     "commanded": "cmd command commanded commands des desired ref reference references target targets tgt set setpoint "
     "setpoints sp goal goals demand demanded nominal plan planned action actions traj trajectory input output request "
     "requested cmds as",
@@ -98,7 +98,7 @@ _SPANISH = {
     "variant": "filtrado filtrada",
     "motor": "motores",
     "joint": "eje ejes articulacion articulaciones junta",
-    "noise": "del la el y valor",
+    "noise": "del la el valor",
 }
 _ITALIAN = {
     "position": "posizione posizioni angolo angoli",

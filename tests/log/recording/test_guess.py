@@ -412,3 +412,61 @@ def test_a_header_that_comes_again_is_left_out(tmp_path: Path) -> None:
     draft = drafted(tmp_path, "\n".join([*rows[:600], rows[0], *rows[600:]]) + "\n")
     assert "the header comes again in 1 lines" in draft
     assert "1200 samples" in draft
+
+
+def test_letters_that_may_mean_desired_or_derivative_are_decided_by_slopes(tmp_path: Path) -> None:
+    """q1, q1d, q1dd: velocity and acceleration here, set points there; a commanded velocity is not measured."""
+    def columns(run: Run) -> dict[str, Array]:
+        return _block("q#", run.q) | _block("q#d", run.dq) | _block("q#dd", run.ddq) | _block("tau#", run.tau)
+
+    draft = _arm(tmp_path, columns)
+    assert 'q = { columns = "q{j}", unit = "rad" }' in draft
+    assert 'dq = { columns = "q{j}d", unit = "rad/s" }' in draft
+    draft = _arm(tmp_path, lambda run: columns(run) | _block("q#d", run.q_ref))
+    assert 'dq = {' not in draft
+    assert 'dq = {' not in _arm(tmp_path, lambda run: _block("q#", run.q) | _block("q#d_cmd", run.dq) | _block("tau#", run.tau))
+
+
+def test_several_columns_of_each_joint_are_one_signal_each(tmp_path: Path) -> None:
+    """waist, waist_u and waist_moment of a motion file in degrees: positions, their slopes and torques."""
+    def columns(run: Run) -> dict[str, Array]:
+        parts = (("", np.degrees(run.q)), ("_u", np.degrees(run.dq)), ("_moment", run.tau))
+        return {joint + end: values[:, j] for end, values in parts for j, joint in enumerate(THREE.joints)}
+
+    draft = _arm(tmp_path, columns)
+    assert 'q = { columns = ["waist", "shoulder", "elbow"], unit = "deg" }' in draft
+    assert 'tau = { columns = ["waist_moment", "shoulder_moment", "elbow_moment"], unit = "N m" }' in draft
+
+
+@pytest.mark.parametrize(("path", "open_"), [("/model/meas/", False), ("cmd.", True), ("/model/", True)])
+def test_a_path_of_all_signals_counts_where_it_says_commanded_or_computed(tmp_path: Path, path: str, open_: bool) -> None:
+    draft = drafted(tmp_path, text({(path + key if key != "t" else key): values for key, values in good().items()}))
+    assert ('columns = "FILL IN"' in draft) is open_
+
+
+def test_the_rate_that_a_velocity_shows_lets_the_links_prove_the_torque(tmp_path: Path) -> None:
+    moved = simulate(THREE, seed=3, rate=125.0)
+    (tmp_path / "arm.urdf").write_text(THREE.urdf())
+    columns = _block("position #", moved.q) | _block("velocity #", moved.dq) | _block("effort #", moved.tau)
+    draft = draft_recipe(write(tmp_path, text(columns))).text
+    assert "rate = 125 " in draft
+    assert 'tau = { columns = "effort {j}", unit = "N m" }' in draft
+
+
+@pytest.mark.parametrize(("head", "name"), [("# motor side; gear 50\n", "torque # [Nm]"), ("", "motor torque # [Nm]")])
+def test_torques_of_a_motor_are_not_sure_to_be_the_joints(tmp_path: Path, head: str, name: str) -> None:
+    """By a line above the table, or by their names, where no links are known to weigh a joint's torque."""
+    named = {(name.replace("#", key[-1]) if "tau" in key else key): values for key, values in good().items()}
+    draft = drafted(tmp_path, head + text(named))
+    assert "# check: unsure, named so" in draft.partition("tau =")[2]
+    assert ('transmission = "FILL IN"' in draft) is bool(head)
+
+
+def test_settings_above_a_table_with_a_line_of_units_are_skipped(tmp_path: Path) -> None:
+    """As oscilloscopes write them: two cells a setting, then a unit for each channel, then names."""
+    moved = simulate(Arm("pendulum", ("joint",), "y", (30,)), seed=3)
+    head = "Model,MSO58\nFirmware Version,1.38.5\n\nVertical Units,deg,deg/s,Nm\nLabels,angle,speed,torque\n"
+    columns = {"TIME": moved.t - 6.0, "CH1": np.degrees(moved.q[:, 0]), "CH2": np.degrees(moved.dq[:, 0]), "CH3": moved.tau[:, 0]}
+    draft = drafted(tmp_path, head + text(columns))
+    assert 'q = { column = "CH1", unit = "deg" }' in draft
+    assert 'tau = { column = "CH3", unit = "N m" }' in draft

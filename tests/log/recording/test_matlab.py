@@ -58,6 +58,17 @@ def test_mat5_is_read_exactly(tmp_path: Path, compressed: bool) -> None:
     assert_good(mat5(tmp_path / "run.mat", signals(), do_compression=compressed))
 
 
+def test_an_array_of_structures_has_a_column_for_each_series_of_each_joint(tmp_path: Path) -> None:
+    """joint(k) with a name, positions and torques: none takes the place of another."""
+    joint = np.empty((1, 3), dtype=[(field, object) for field in ("name", "pos", "trq")])
+    for j in range(3):
+        joint[0, j] = (f"axis {j + 1}", good()[f"q_{j + 1}"][:, None], good()[f"tau_{j + 1}"][:, None])
+    scipy.io.savemat(tmp_path / "run.mat", {"joint": joint, "tout": good()["t"][:, None]})
+    table = read_table(tmp_path / "run.mat")
+    assert np.array_equal(table.columns["axis 2.pos"], good()["q_2"])
+    assert np.array_equal(table.columns["axis 3.trq"], good()["tau_3"])
+
+
 def test_a_structure_is_opened_one_level(tmp_path: Path) -> None:
     table = read_table(mat5(tmp_path / "run.mat", {"data": signals(), "note": "hello"}))
     assert np.array_equal(table.columns["data.q_2"], good()["q_2"])
