@@ -20,6 +20,7 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.config import DiagnosisConfig
@@ -41,15 +42,10 @@ _SEED = 1
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What predicts each block of rows from all others, by the numbers of some columns.
-
-    I - J_bᵀ P⁻¹ J_b = D - Uᵀ U: D of each joint and its own numbers, U (s, rows) of the shared
-    ones; its inverse is D⁻¹ + D⁻¹Uᵀ (I - U D⁻¹Uᵀ)⁻¹ U D⁻¹ (Woodbury).
-    """
+    """What predicts each block of rows from all others, by the numbers of some columns."""
 
     rows: tuple[tuple[Indices, ...], ...]  # of each block, of each joint
-    own: tuple[tuple[Array, ...], ...]  # D⁻¹
-    shared: tuple[Array, ...]  # U, of each joint
+    inverse: tuple[npt.NDArray[np.float32], ...]  # of each block, (I - J_bᵀ P⁻¹ J_b)⁻¹
 
     @classmethod
     def of(cls, columns: Table, info: Arrow, block: Sequence[Indices]) -> Blocks:
@@ -61,36 +57,45 @@ class Blocks:
             block: number of the block, of each joint's rows.
         """
         count = 1 + max(int(b.max()) for b in block if len(b))
-        rows, inverse, shared = [], [], []
-        for j, b in enumerate(block):
+        rows = []
+        for b in block:
             order = np.argsort(b, kind="stable")
             edges = np.searchsorted(b[order], np.arange(count + 1))
             rows.append(tuple(order[slice(*e)] for e in pairwise(edges)))
-            own, among = info.whitened(columns, j)
-            parts = (own[:, at] for at in rows[-1])
-            inverse.append(tuple(np.linalg.inv(np.eye(w.shape[1]) - w.T @ w) for w in parts))
-            shared.append(among)
-        return cls(tuple(zip(*rows, strict=True)), tuple(zip(*inverse, strict=True)), tuple(shared))
+        whitened = [info.whitened(columns, j) for j in range(len(block))]
+        inverse = []
+        for here in zip(*rows, strict=True):
+            shared = np.concatenate(
+                [w[:, at] for (_, w), at in zip(whitened, here, strict=True)], axis=1
+            )
+            left, first = np.eye(shared.shape[1]) - shared.T @ shared, 0
+            for (own, _), at in zip(whitened, here, strict=True):
+                part = slice(first, first + len(at))
+                left[part, part] -= own[:, at].T @ own[:, at]
+                first += len(at)
+            inverse.append(np.linalg.inv(left).astype(np.float32))
+        return cls(tuple(zip(*rows, strict=True)), tuple(inverse))
 
     def losses(self, residual: Sequence[Array], more: Sequence[Array] | None = None) -> Array:
         """Return the squared error (blocks,) of each block, predicted from all other blocks.
 
+        With V of further numbers, (A - Vᵀ V)⁻¹ = G + G Vᵀ (I - V G Vᵀ)⁻¹ V G, G = A⁻¹ (Woodbury).
+
         Args:
             residual: of each joint's rows.
-            more: (m, rows of each joint) further rows of U.
+            more: V (m, rows of each joint).
         """
-        both = self.shared
-        if more is not None:
-            both = tuple(np.concatenate(one) for one in zip(both, more, strict=True))
         out = np.zeros(len(self.rows))
-        for b, (rows, inverse) in enumerate(zip(self.rows, self.own, strict=True)):
-            u = [w[:, at] for w, at in zip(both, rows, strict=True)]
-            plain = [d @ r[at] for d, r, at in zip(inverse, residual, rows, strict=True)]
-            through = [w @ d for w, d in zip(u, inverse, strict=True)]
-            inner = np.eye(len(u[0])) - sum(t @ w.T for t, w in zip(through, u, strict=True))
-            c = np.linalg.solve(inner, sum(w @ p for w, p in zip(u, plain, strict=True)))
-            error = [p + c @ t for p, t in zip(plain, through, strict=True)]
-            out[b] = sum(float(e @ e) for e in error)
+        for b, (rows, inverse) in enumerate(zip(self.rows, self.inverse, strict=True)):
+            left = np.concatenate([r[at] for r, at in zip(residual, rows, strict=True)])
+            if more is None:
+                error = inverse @ left
+            else:
+                v = np.concatenate([w[:, at] for w, at in zip(more, rows, strict=True)], axis=1)
+                both = inverse @ np.column_stack([left, v.T])
+                error, through = both[:, 0], both[:, 1:]
+                error = error + through @ np.linalg.solve(np.eye(len(v)) - v @ through, v @ error)
+            out[b] = float(error @ error)
         return out
 
 
