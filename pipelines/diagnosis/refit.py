@@ -183,7 +183,37 @@ class Later:
         left = state.factor.solve(state.slope)  # zero where the fit has settled
         moments = self.candidates.moments(state.residual) - cross.T @ left
         found = screen(self.dictionary.groups, state.factor, cross, self.squares, moments)
+        if self.dataset.reference is not None:  # else base parameters are free anyway
+            found = [self._freely(state, one) for one in found]
         return [self._charged(one) if one.group.reads_torque else one for one in found]
+
+    def _freely(self, state: State, one: Screened) -> Screened:
+        """Return the candidate beside base parameters that it moves by unknown numbers, free."""
+        belief = self._free.get(one.group)
+        if belief is None:
+            return one
+        if state.belief is not self.belief:
+            belief = self.freed(state.belief, self._effect(one.group))
+        columns = self.candidates.take(one.group.columns)
+        size = _unit(columns.norms)
+        more = Table.stacked([state.effects, columns.scaled(1.0 / size)])
+        slope = np.r_[belief.slope(state.theta, state.residual), more.moments(state.residual)]
+        step = belief.beside(more).solve(slope)
+        before = state.belief.cost(state.theta, state.residual)
+        gain = before - belief.cost(state.theta, state.residual) + float(slope @ step)
+        nuisance = self._effect(one.group).nuisance(self.dataset.arm)
+        freedom = one.freedom + (0 if nuisance is None else nuisance.shape[1])
+        return replace(one, gain=gain, freedom=freedom, amplitudes=step[-len(size) :] / size)
+
+    @cached_property
+    def _free(self) -> dict[Group, Belief]:
+        """What is known beside each candidate that moves base parameters by unknown numbers."""
+        named = (g for g in self.dictionary.groups if g.kind == "named")
+        every = {g: self.freed(self.belief, self._effect(g)) for g in named}
+        return {g: belief for g, belief in every.items() if belief is not self.belief}
+
+    def _effect(self, group: Group) -> Effect:
+        return self.dictionary.families[group.key].shapes[group.shape]
 
     def _charged(self, one: Screened) -> Screened:
         """Return the candidate less the price of the rows that it reads off the log."""
