@@ -33,7 +33,7 @@ __all__ = ["Data", "LogData", "gather"]
 
 Indices = npt.NDArray[np.intp]
 
-_AMPLE = 12.0  # samples a period of the cut-off, at which columns are worked out at least
+_AMPLE = 24.0  # samples a period of the cut-off, at which columns are worked out at least
 
 
 @dataclass(frozen=True, eq=False)
