@@ -61,6 +61,9 @@ _UNIT_WORDS = {
     "mA": "ma",
     "N m": "nm",
     "mN m": "mnm",
+    "kN m": "knm",
+    "N mm": "nmm",
+    "N cm": "ncm",
     "rpm": "rpm",
     "rad/s": "rads radps",
     "deg/s": "degs degps dps",
@@ -96,7 +99,8 @@ def words_of(name: str) -> list[str]:
     name = _whole_words(plain_letters(name))
     for part in re.findall(r"\d+|[^\W\d_]+", name):
         pieces = re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[^A-Z]+", part)
-        for piece in pieces if len(pieces) > 1 else [part]:
+        whole = len(pieces) < 2 or canonical_unit(part) in UNITS  # mNm is a unit, not m and Nm
+        for piece in [part] if whole else pieces:
             words += _parts(piece.lower())
     # "q_dot" and "q_ddot" are one word, and so is "d_q".
     for dots, joined in (
@@ -254,19 +258,17 @@ def _unit_in_name(column: str, quantity: str) -> tuple[str, frozenset[str]]:
         "mm/s",
     ):
         return ratio, frozenset(parts[-2:])
+    within = (re.findall(r"[A-Z]?[a-z]+", part) for part in parts)
     pieces = [
-        *parts,
-        *(
-            piece
-            for part in parts
-            for piece in re.findall(r"[A-Z]?[a-z]+", part)
-            if 1 < len(piece) < len(part)
-        ),
+        piece
+        for part, own in zip(parts, within, strict=True)
+        for piece in own
+        if 1 < len(piece) < len(part)
     ]
-    for piece in reversed(pieces):
+    for piece in (*reversed(parts), *reversed(pieces)):  # mNm before Nm
         word = piece.lower()
         unit = _SUFFIX_UNITS.get(word, "")
-        if not unit or (len(pieces) == 1 and quantity != "time") or piece == "a":
+        if not unit or (len(parts) + len(pieces) == 1 and quantity != "time") or piece == "a":
             continue
         relative = unit in ("%", "‰", "LSB")  # of a rated value that only the drive knows
         if relative or _quantity_of(unit) == quantity or (not quantity and len(word) > 1):

@@ -13,6 +13,7 @@ from benchmarks.recorded_arm import THREE, Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
 from pipelines.log.files import open_log
+from pipelines.log.recording.column_names import read_name
 from pipelines.log.recording.evidence import rollover, sign_of
 from pipelines.log.recording.guess import guess_recipe
 from pipelines.log.recording.recipe_reader import parse_recipe
@@ -470,3 +471,9 @@ def test_settings_above_a_table_with_a_line_of_units_are_skipped(tmp_path: Path)
     draft = drafted(tmp_path, head + text(columns))
     assert 'q = { column = "CH1", unit = "deg" }' in draft
     assert 'tau = { column = "CH3", unit = "N m" }' in draft
+
+
+@pytest.mark.parametrize(("name", "unit"), [("torque_mNm", "mN m"), ("Moment_kNm", "kN m"), ("current_mA", "mA"), ("tau_Nm", "N m")])
+def test_a_unit_with_its_prefix_is_one_word(name: str, unit: str) -> None:
+    """Read as N m, a bench's torques would be a thousand times too large."""
+    assert read_name(name).unit == unit
