@@ -473,7 +473,7 @@ def test_settings_above_a_table_with_a_line_of_units_are_skipped(tmp_path: Path)
     assert 'tau = { column = "CH3", unit = "N m" }' in draft
 
 
-@pytest.mark.parametrize(("name", "unit"), [("torque_mNm", "mN m"), ("Moment_kNm", "kN m"), ("current_mA", "mA"), ("tau_Nm", "N m")])
+@pytest.mark.parametrize(("name", "unit"), [("torque_mNm", "mN m"), ("Moment_kNm", "kN m"), ("i_mA", "mA"), ("tau_Nm", "N m")])
 def test_a_unit_with_its_prefix_is_one_word(name: str, unit: str) -> None:
     """Read as N m, a bench's torques would be a thousand times too large."""
     assert read_name(name).unit == unit
