@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import pytest
 
-from pipelines.diagnosis.engine import Diagnosis, diagnose
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.engine import Diagnosis, diagnose, pose
+from pipelines.diagnosis.screening import best_of
+from pipelines.model.diagnosis.asked.inputs import Logs, prepare
+from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
 from tests.diagnose.sessions import healthy_again, session
 
 
@@ -19,6 +23,18 @@ def test_what_moves_base_parameters_as_well_is_no_payload(cause: str, joint: int
     """A drive that pulls less looks there as if links had grown lighter; masses beyond a longer link sit elsewhere."""
     found = since(cause, joint)
     assert [one.key for one in found.decision.causes] == [(cause, joint)]
+
+
+def test_a_longer_link_is_screened_beside_the_masses_that_it_moves() -> None:
+    """What screening says that it saves is what a fit saves, in which how heavy each link is stays free."""
+    config, logs = DiagnosisConfig(), (*healthy_again(session()), *session("link_length"))
+    later = pose(prepare(Logs.by_role(logs), DiagnosisSettings(cutoff_hz=config.cutoff_hz)), config)
+    start = later.start()
+    seen = best_of(later.screened(start))["link_length", None]
+    effect = later.dictionary.families[seen.group.key].shapes[seen.group.shape]
+    longer = start.model.with_effect(effect, seen.amplitudes)
+    found = later.fit(longer, start.theta, later.freed(start.belief, effect))
+    assert seen.gain == pytest.approx(start.cost - found.cost, rel=0.05)
 
 
 @pytest.mark.slow
