@@ -46,7 +46,6 @@ class State:
     lasting: (
         Indices  # of these, numbers that hold for all time; those of an event hold for its moment
     )
-    losses: Array  # (blocks,) squared error of each block, predicted from all others
     read_off: float = 0.0  # price of rows that effects take from the log itself
 
     @property
@@ -57,6 +56,15 @@ class State:
     def cost(self) -> float:
         """‖r‖² + (θ - m)ᵀ A (θ - m), and the price of rows that are read off."""
         return self.belief.cost(self.theta, self.residual) + self.read_off
+
+    @cached_property
+    def losses(self) -> Array:
+        """(blocks,) squared error of each block, predicted from all the others.
+
+        The numbers of an event cannot be predicted from other times: they are taken as known, and
+        the selection charges them.
+        """
+        return self.belief.losses(self.effects.take(self.lasting), self.residual)
 
     @property
     def slope(self) -> Array:
@@ -173,9 +181,7 @@ class Later:
         lasting = np.flatnonzero(
             [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
         )
-        price = self._read_off(model)
-        state = State(model, theta, belief, residual, effects, lasting, np.zeros(0), price)
-        return replace(state, losses=self.losses(state))
+        return State(model, theta, belief, residual, effects, lasting, self._read_off(model))
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
@@ -355,22 +361,13 @@ class Later:
         torque = Table.stacked([self.base, more]).times(step)
         residual = tuple(r - t for r, t in zip(state.residual, torque, strict=True))
         lasting = np.append(state.lasting, np.arange(state.effects.width, more.width))
-        there = replace(
+        return replace(
             state,
             theta=state.theta + step[: len(state.theta)],
             residual=residual,
             effects=more,
             lasting=lasting,
         )
-        return replace(there, losses=self.losses(there))
-
-    def losses(self, state: State) -> Array:
-        """Return the squared error (blocks,) of each block, predicted from all the others.
-
-        The numbers of an event cannot be predicted from other times: they are taken as known, and
-        the selection charges them.
-        """
-        return state.belief.losses(state.effects.take(state.lasting), state.residual)
 
     def unchanged(self, state: State, key: Key) -> State:
         """Return the state refitted with a cause's standing numbers held at their prior mean."""

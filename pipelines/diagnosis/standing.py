@@ -31,7 +31,7 @@ from pipelines.model.effects.base import adds
 
 __all__ = ["standing_of"]
 
-_REFITS = 2  # numerics: candidates that are refitted in a round, for one is taken
+_REFITS = 2  # numerics: candidates that are refitted in a round, at most
 
 
 def standing_of(prepared: Data | None, later: Later, config: DiagnosisConfig) -> Standing:
@@ -90,10 +90,9 @@ def _reference(later: Later, config: DiagnosisConfig) -> Later:
 def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Candidate | None:
     """Return the cause that predicts best, None where none pays."""
     every = best_of(own.screened(state))
-    tried = _tried(own, state, every, later, config)
-    if not tried:
+    best = _first(own, state, every, later, config)
+    if best is None:
         return None
-    best = min(tried, key=lambda one: float(one.state.losses.sum()))
     plain = max(
         (one for one in every.values() if one.group.kind == "unnamed"),
         key=lambda one: one.gain - one.freedom * np.log(own.rows.count),
@@ -105,14 +104,13 @@ def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Can
     return best if "with" in kept and "without" not in kept else None
 
 
-def _tried(
+def _first(
     own: Later, state: State, every: dict[Key, Screened], later: Rows, config: DiagnosisConfig
-) -> list[Candidate]:
-    """Return the causes that a joint leaves too much without, and that hold where later logs go."""
+) -> Candidate | None:
+    """Return the first cause that a joint leaves too much without, and holds for later logs."""
     taken = {(one.effect.name, one.effect.joint) for one in state.model.effects}
     seen = [s for key, s in every.items() if s.group.kind == "named" and key not in taken]
     known, motions = ([one.motion for one in rows.data.logs] for rows in (own.rows, later))
-    tried = []
     for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
         effect = own.dictionary.families[one.group.key].shapes[one.group.shape].forms()[0]
         done = refit(own, state, one.group.key, effect, one.amplitudes, config)
@@ -122,5 +120,5 @@ def _tried(
         effect = done.state.model.effects[-1].effect
         beyond = any(q.seen for q in effect.parameters) and effect.goes_beyond(motions, known)
         if without.max() > config.excess and not beyond:
-            tried.append(done)
-    return tried
+            return done
+    return None
