@@ -91,8 +91,6 @@ def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(tmp_path: Path) -
     assert "Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run" in told
     assert "--set diagnose.model=FILE" in told
     assert "Thresholds: " in told
-    told = rrrid(*words, "--model", "rrr", cwd=tmp_path).stdout
-    assert "Friction laws: those of rrr, as asked for" in told
 
 
 def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path: Path) -> None:

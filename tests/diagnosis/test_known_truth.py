@@ -111,9 +111,7 @@ def pushed(motion: Motion) -> Array:
 @pytest.mark.slow
 def test_a_push_belongs_to_its_log() -> None:
     """In the second of two logs it is found there, at its time."""
-    found = diagnosed(
-        hidden(1), hidden(2, pushed), hidden(3, None, "validate"), exclude=but(*FEW, "contact")
-    )
+    found = diagnosed(hidden(1), hidden(2, pushed), hidden(3, None, "validate"), exclude=but(*FEW, "contact"))
     assert causes(found) == [("contact", None)]
     push = found.look.selection.end.model.effects[0]
     assert push.log == 1
@@ -132,10 +130,8 @@ def one_sided(motion: Motion) -> Array:
 def test_friction_that_differs_by_direction_is_no_offset() -> None:
     """Beside a drag, which an offset does not tell from it."""
     few = but("torque_offset", "asymmetric_friction", "quadratic_drag")
-    assert set(causes(diagnosed(*logs(one_sided), exclude=few))) == {
-        ("asymmetric_friction", 1),
-        ("quadratic_drag", 1),
-    }
+    found = set(causes(diagnosed(*logs(one_sided), exclude=few)))
+    assert found == {("asymmetric_friction", 1), ("quadratic_drag", 1)}
 
 
 @pytest.mark.slow
@@ -163,9 +159,7 @@ def test_every_joint_of_three_sigmoids_has_its_hump(samples: Path) -> None:
 def rotor(waves: dict[float, float], mean: float = 0.65) -> list[float]:
     """Return the first orders that are found of a rotor with these amplitudes [N m] of each order."""
     few = but("cogging", "spring", "torque_offset")
-    found = diagnosed(
-        turned(1, waves, 0.0, mean), turned(2, waves, 0.0, mean), exclude=few, cutoff_hz=40.0
-    )
+    found = diagnosed(*(turned(seed, waves, 0.0, mean) for seed in (1, 2)), exclude=few, cutoff_hz=40.0)
     return sorted(one.values["order"] for one in effects(found))
 
 
