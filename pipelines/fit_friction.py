@@ -33,6 +33,7 @@ from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.methods import METHODS, by_method
 from pipelines.model.friction.misfit import misfits
 from pipelines.model.friction.nuisances import nuisance_findings
+from pipelines.model.friction.polish import refuse_unpolished
 from pipelines.model.friction.result import JointResult, Result, joint_result, several_results
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
@@ -130,7 +131,10 @@ def _law(settings: Settings) -> Law | None:
     if unknown := [part for part in parts if part not in known]:
         raise UsageError("C02", f"'{unknown[0]}' is no friction law{did_you_mean(unknown[0], known)}", where="--law",
                          remedy=f"one of {', '.join(names)}, or several joined by +")
-    return law_named(settings.law) or Law(settings.law, tuple(dict.fromkeys(parts)))
+    law = law_named(settings.law) or Law(settings.law, tuple(dict.fromkeys(parts)))
+    if settings.method == "output-error":
+        refuse_unpolished(law)
+    return law
 
 
 def _examined(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[list[Seen], tuple[Check, ...]]:

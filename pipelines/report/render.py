@@ -171,7 +171,7 @@ def _draw(figure: Figure, salt: str) -> tuple[str, bytes]:
         drawing.set_layout_engine(None)  # already laid out: both shall be the same picture, with no trial drawing before them
         svg, png = io.BytesIO(), io.BytesIO()
         drawing.savefig(svg, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-        drawing.savefig(png, format="png", metadata={"Software": None})
+        drawing.savefig(png, format="png", metadata={"Software": None}, pil_kwargs={"compress_level": 3})
     return _without_ballast(svg.getvalue().decode()), png.getvalue()
 
 

@@ -11,12 +11,12 @@ import pytest
 
 from pipelines import diagnose
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.files import open_log, write_log
+from pipelines.log.files import open_log
 from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
-from pipelines.stage import Request, run_stage
-from tests.diagnose.sessions import but, session
+from pipelines.stage import Request
+from tests.diagnose.sessions import but, session, written
 from tests.faulty import dropped
 from tests.healthy import with_signal
 from tests.model.diagnosis.arms import arm, hidden, wave
@@ -55,12 +55,9 @@ def both(motion: Motion) -> Array:
 
 def test_the_largest_number_of_causes_hides_none(tmp_path: Path) -> None:
     """Of two causes one is named, and the result says that the search ended before the other."""
-    (tmp_path / "logs").mkdir()
-    for log in logs(both):
-        write_log(tmp_path / "logs" / f"{log.name}.h5", replace(log, period=None))
-    settings = diagnose.Settings(exclude=but(*FEW), max_causes=1, skip_sanity_checks=True)
-    request = Request((tmp_path / "logs",), out=tmp_path / "out", no_report=True)
-    found = run_stage(diagnose.STAGE, request, settings).result
+    folder = written(tmp_path, [replace(log, period=None) for log in logs(both)])
+    settings = diagnose.Settings(exclude=but("cogging", "quadratic_drag"), max_causes=1, skip_sanity_checks=True)
+    found = diagnose.compute(diagnose.read(Request((folder,)), settings), settings, whole=False)
     assert [(one.cause, one.joint) for one in found.findings] == [("quadratic_drag", 1)]
     for said in (found.reason, found.summary):
         assert "he search ended at 1 cause (--max-causes 1); still significant: cogging:2" in said
@@ -114,9 +111,7 @@ def pushed(motion: Motion) -> Array:
 @pytest.mark.slow
 def test_a_push_belongs_to_its_log() -> None:
     """In the second of two logs it is found there, at its time."""
-    found = diagnosed(
-        hidden(1), hidden(2, pushed), hidden(3, None, "validate"), exclude=but(*FEW, "contact")
-    )
+    found = diagnosed(hidden(1), hidden(2, pushed), hidden(3, None, "validate"), exclude=but(*FEW, "contact"))
     assert causes(found) == [("contact", None)]
     push = found.look.selection.end.model.effects[0]
     assert push.log == 1
@@ -135,10 +130,8 @@ def one_sided(motion: Motion) -> Array:
 def test_friction_that_differs_by_direction_is_no_offset() -> None:
     """Beside a drag, which an offset does not tell from it."""
     few = but("torque_offset", "asymmetric_friction", "quadratic_drag")
-    assert set(causes(diagnosed(*logs(one_sided), exclude=few))) == {
-        ("asymmetric_friction", 1),
-        ("quadratic_drag", 1),
-    }
+    found = set(causes(diagnosed(*logs(one_sided), exclude=few)))
+    assert found == {("asymmetric_friction", 1), ("quadratic_drag", 1)}
 
 
 @pytest.mark.slow
@@ -166,13 +159,12 @@ def test_every_joint_of_three_sigmoids_has_its_hump(samples: Path) -> None:
 def rotor(waves: dict[float, float], mean: float = 0.65) -> list[float]:
     """Return the first orders that are found of a rotor with these amplitudes [N m] of each order."""
     few = but("cogging", "spring", "torque_offset")
-    found = diagnosed(
-        turned(1, waves, 0.0, mean), turned(2, waves, 0.0, mean), exclude=few, cutoff_hz=40.0
-    )
+    found = diagnosed(*(turned(seed, waves, 0.0, mean) for seed in (1, 2)), exclude=few, cutoff_hz=40.0)
     return sorted(one.values["order"] for one in effects(found))
 
 
-@pytest.mark.parametrize("mean", [0.65, pytest.param(0.575, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("mean", [0.65, 0.575])
 @pytest.mark.xfail(strict=True, reason="a second order at the same joint is not looked for")
 def test_waves_of_a_rotor_have_whole_orders(mean: float) -> None:
     """Seven waves to a turn and what is four times that, and twelve of another kind; stops at 330° as well."""

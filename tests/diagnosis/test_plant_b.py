@@ -16,19 +16,8 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.log.hdf5 import read_parts
 from tests.healthy import with_signal
 
-_ALONE = (
-    "01",
-    "03",
-    "05",
-    "06",
-    "07",
-    "08",
-    "09",
-    "10",
-    "12",
-    "15",
-    "16",
-)  # one cause, not to be mistaken
+# one cause, not to be mistaken
+_ALONE = ("01", "03", "05", "06", "07", "08", "09", "10", "12", "15", "16")
 
 
 def _found(shared: Path, arm: str) -> tuple[Diagnosis, dict[str, Any]]:

@@ -10,8 +10,8 @@ does: logarithms of the ratio of their squared errors, in closed form by leverag
 constant of a trend is fitted once more with the law (joint.py).
 
 Logs that visit every speed once, one after the other, show a drift as a part of the friction
-curve. A trend that the rows neither show nor exclude is not named; it takes part where no law
-without it is as good (joint.py).
+curve. A trend that the rows neither show nor exclude is not named; it takes part where the law
+chosen without it is better with it (joint.py).
 """
 
 from __future__ import annotations

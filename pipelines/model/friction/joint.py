@@ -132,9 +132,9 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: Sl
     course = found if found is not None and found.named else None
     choice = _chosen(stretches, rows.fitted, course, fit, arm, law)
     if found is not course:
-        other = _chosen(stretches, rows.fitted, found, fit, arm, law)
+        other = _chosen(stretches, rows.fitted, found, fit, arm, choice.ladder.chosen.law)
         if not no_worse(choice.ladder.chosen.residual, other.ladder.chosen.residual):
-            choice = other
+            choice = _chosen(stretches, rows.fitted, found, fit, arm, law)
     identify, validate, ladder, course = choice.identify, choice.validate, choice.ladder, choice.course
     sticks = any(stretch.sticks is not None for stretch in identify)
     chosen = ladder.chosen.fit
@@ -253,7 +253,7 @@ def _with_course(stretches: tuple[Stretch, ...], fitted: int, course: Course | N
     """The stretches along `course`, its time constant fitted, and the flexible law fitted to these very stretches."""
     stretches = _along(stretches, course, fit)
     for k in range(_CONFIG.courses if course is not None else 0):
-        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, None if k == 0 else [fit.theta])
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, [fit.theta])
         if k + 1 < _CONFIG.courses:
             course = _next(course, fit)
             stretches = _along(stretches, course, fit)

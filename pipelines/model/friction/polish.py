@@ -19,12 +19,13 @@ from pipelines.fit.varpro import SeparableFit
 from pipelines.model.effects.base import Effect
 from pipelines.model.friction.equations import LawEquations
 from pipelines.model.friction.law_fit import LawFit
+from pipelines.model.friction.laws import Law
 from pipelines.model.friction.one_joint import gravity_names
 from pipelines.model.friction.postures import nearest
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["polished"]
+__all__ = ["polished", "refuse_unpolished"]
 
 _WINDOW = 0.1  # [s]: noise of the torque moves the output less than the law does
 _ROUNDS = 10
@@ -46,15 +47,16 @@ class _Windows:
     posture: Array  # (windows,) which one
 
 
-def polished(stretches: Sequence[Stretch], fit: LawFit) -> LawFit:
-    """`fit` with the numbers of least output error.
-
-    Raises:
-        UsageError: C02, a law with memory or load, whose simulation is not of this form.
-    """
-    if not fit.law.pointwise or fit.law.sees_load:
-        raise UsageError("C02", f"{fit.law.name} cannot be polished: it depends on more than position and speed", where="--method",
+def refuse_unpolished(law: Law) -> None:
+    """UsageError C02: a law with memory or load, whose simulation is not of this form."""
+    if not law.pointwise or law.sees_load:
+        raise UsageError("C02", f"{law.name} cannot be polished: it depends on more than position and speed", where="--method",
                          remedy="take --method varpro, or another law")
+
+
+def polished(stretches: Sequence[Stretch], fit: LawFit) -> LawFit:
+    """`fit` with the numbers of least output error."""
+    refuse_unpolished(fit.law)
     windows = _windows(stretches, fit)
     numbers = np.concatenate([fit.found.beta, fit.theta])
     starts, cost = windows.start, np.inf

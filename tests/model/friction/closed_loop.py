@@ -18,7 +18,7 @@ from pipelines.log.robot import Joint, RobotDescription, format_robot
 
 RATES = (250, 500, 1000, 2000)  # [Hz]
 KINDS = ("rests", "closed-loop", "vertical", "12-bit", "trend", "step", "stick-slip")
-_INTEGRATION = 8000  # [Hz]
+_INTEGRATION = 4000  # [Hz]
 _SPEEDS = np.geomspace(0.05, 2.0, 6)  # [rad/s] of the reference
 
 
