@@ -48,6 +48,8 @@ def decide(
         if explained < config.share:
             reason = f"{causes[0].key[0]} explains {explained:.0%} of the excess residual"
             return Decision("unknown", reason, ())
+        if confused := _confused(later, end, config):
+            return Decision("unknown", confused, ())
         if causes[0].alternatives:
             return Decision("unknown", "several causes explain it", causes)
         return Decision("cause", rest, causes)
@@ -103,10 +105,12 @@ def _rest(
     if selection.moment:
         return selection.moment
     slow = _wandering(later)
-    if slow.max() > config.misfit:
-        joint = int(slow.argmax()) + 1
-        return f"{slow.max():.1%} of the torque of joint {joint} wanders, whatever the motion is"
-    return ""
+    return _wanders(slow) if slow.max() > config.misfit else ""
+
+
+def _wanders(slow: Array) -> str:
+    joint = int(slow.argmax()) + 1
+    return f"{slow.max():.1%} of the torque of joint {joint} wanders, whatever the motion is"
 
 
 def _too_large(left: Array, bound: float) -> str:
@@ -155,6 +159,23 @@ def _wandering(later: Later) -> Array:
     measured = np.concatenate([one.unwhitened for one in rows.data.logs], axis=1)
     lasting = later.dataset.noise_power / (each * whitening.weights[:, -1].sum(axis=1) ** 2)
     return np.asarray(np.sqrt(lasting / np.maximum(np.mean(measured**2, axis=1), 1e-300)))
+
+
+def _confused(later: Later, end: State, config: DiagnosisConfig) -> str:
+    """Return why torque that wanders may look like a cause; "" where it cannot.
+
+    In closed loop the drive answers such a torque a moment later, and so do the motion and its
+    record (Ljung 1999, 13.4): only a load that comes again with the motion is told from it.
+    """
+    others = [
+        one.effect.joint
+        for one in end.model.effects
+        if one.log is not None or one.effect.acts_on not in ("load", "body")
+    ]
+    slow = _wandering(later)
+    at = [j for j in range(len(slow)) if None in others or j + 1 in others]
+    slow = np.where(np.isin(np.arange(len(slow)), at), slow, 0.0)
+    return _wanders(slow) if slow.max() > config.misfit else ""
 
 
 def _followed(

@@ -122,10 +122,12 @@ def _typical(
 
     What a family has in common is in units of the noise of the joints on which it acts; of a family
     of one place it is that of the other families. What healthy machines have in small is no more
-    than the part of a joint's torque that is a fault where no cause explains it.
+    than the part of a joint's torque that is a fault where no cause explains it, and than the
+    tolerance that a cause states.
     """
     torque = np.array([float(np.mean(y**2)) for y in dataset.later.y])
-    small = [np.inf if _any(g) else _of_joint(g, torque) * config.misfit**2 for g in of]
+    each = zip(of, found.mean_square, strict=True)
+    small = [_most(group, square, torque, config) for group, square in each]
     largest: dict[str, dict[int, float]] = {}  # of each family and joint
     for group, value in zip(of, found.variance, strict=True):
         at = largest.setdefault(group.family, {})
@@ -137,17 +139,19 @@ def _typical(
     return replace(found, variance=np.minimum(found.variance, np.minimum(usual, small)))
 
 
-def _any(group: Group) -> bool:
-    """Return whether a healthy machine may have any amount of it: the form of friction."""
-    if group.kind == "unnamed":
-        return group.key[0] == FORM
-    known = find_effect(group.key[0]).parameters.healthy
-    return known is not None and not np.isfinite(known)
+def _most(group: Group, square: float, torque: Array, config: DiagnosisConfig) -> float:
+    """Return the largest variance that a standing number of a healthy machine has, of a row.
 
-
-def _of_joint(group: Group, x: Array) -> float:
-    """Return x (joints,) of the joint of a group; of the whole arm, the largest."""
-    return float(x.max() if group.key[1] is None else x[group.key[1] - 1])
+    Of the form of friction any, of what effects state a tolerance for that, else a part of the
+    torque (joints,) of its joint, or of the joint that has most.
+    """
+    unnamed = group.kind == "unnamed"
+    healthy = None if unnamed else find_effect(group.key[0]).parameters.healthy
+    if group.key[0] == FORM or healthy == np.inf:
+        return np.inf
+    own = float(torque.max() if group.key[1] is None else torque[group.key[1] - 1])
+    small = config.misfit**2 * own
+    return min(small, healthy**2 * square) if healthy else small
 
 
 def _lower_median(values: Iterable[float]) -> float:

@@ -18,7 +18,8 @@ class DriveLag(Effect):
     """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt: earlier than the arm feels it."""
 
     name = "drive_lag"
-    parameters = Parameters(Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command"))
+    parameters = Parameters(
+        Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command", healthy=2e-4))  # a current loop of 800 Hz
     words = Words("Drive lag", size="time_constant",
         signature="The logged torque leads the torque that the arm feels, on one joint; more so the faster the torque changes.",
         explanation="The current loop is slow, or the amplifier filters its command.",

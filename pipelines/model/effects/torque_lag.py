@@ -20,7 +20,9 @@ class TorqueLag(Effect):
     """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once."""
 
     name = "torque_lag"
-    parameters = Parameters(Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one"))
+    parameters = Parameters(
+        Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one",
+                 healthy=2e-4))  # a current that is measured within 800 Hz
     words = Words("Torque logging delay", size="time_constant",
         signature="The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative.",
         explanation="The recorder, or the current measurement, filters the torque before it is logged.",
