@@ -18,13 +18,12 @@ import numpy as np
 
 from pipelines import diagnose
 from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.decision import facts, nominal_estimate
 from pipelines.errors import RrridError
-from pipelines.model.diagnosis.answered.judgeable import facts, nominal_estimate
-from pipelines.model.diagnosis.asked.gates import logs_of_roles
-from pipelines.model.diagnosis.asked.inputs import prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
+from pipelines.estimation.checks.gates import logs_of_roles
 from pipelines.model.estimation.judgeable import Facts, JudgeableConfig, cannot_judge
+from pipelines.model.rows.friction_terms import with_terms_told_apart
+from pipelines.model.rows.prepare import DiagnosisSettings, prepare
 from pipelines.stage import Request
 
 __all__ = ["asked", "decided", "main"]

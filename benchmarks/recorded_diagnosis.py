@@ -27,9 +27,8 @@ from pipelines.diagnosis.trained import Standing, train
 from pipelines.import_log import STAGE, Settings
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.rows.data import Data
+from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
 from pipelines.stage import Request, run_stage
 
 __all__ = ["TX40", "Judged", "Step", "fold", "imported", "judged_odrive", "judged_tx40", "main", "searched"]

@@ -17,18 +17,15 @@ from pathlib import Path
 from pipelines.diagnosis.answer import answer
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
+from pipelines.diagnosis.result import Diagnosis, Extended, Result
 from pipelines.errors import Check, UsageError
+from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.answered.outcome import Result
-from pipelines.model.diagnosis.asked.gates import examined, logs_of_roles
-from pipelines.model.diagnosis.asked.inputs import Logs, prepare
-from pipelines.model.diagnosis.asked.settings import BLOCKS, DiagnosisSettings
-from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
-from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.named_cause import refuse_unknown
+from pipelines.model.rows.friction_terms import with_terms_told_apart
+from pipelines.model.rows.prepare import BLOCKS, DiagnosisSettings, Logs, prepare
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role

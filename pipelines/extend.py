@@ -21,21 +21,16 @@ from pathlib import Path
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.extension import extend
+from pipelines.diagnosis.result import Extended, Extension
+from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.errors import NothingMatched, UsageError
+from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.log.canonical import digest_of
 from pipelines.log.derive import derive, recording
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.asked.gates import examined, logs_of_roles
-from pipelines.model.diagnosis.asked.inputs import prepare
-from pipelines.model.diagnosis.asked.settings import BLOCKS, DiagnosisSettings
-from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
-from pipelines.model.diagnosis.screened.wanted import Wanted
-from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
@@ -43,6 +38,9 @@ from pipelines.model.estimation.logs import Motions
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
 from pipelines.model.named_cause import refuse_unknown, wanted_cause
+from pipelines.model.rows.families import Wanted
+from pipelines.model.rows.friction_terms import with_terms_told_apart
+from pipelines.model.rows.prepare import BLOCKS, DiagnosisSettings, prepare
 from pipelines.report.extension_report import extension_report
 from pipelines.report.model_words import fewer_words
 from pipelines.report.report import Report

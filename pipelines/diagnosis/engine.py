@@ -9,6 +9,7 @@ import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline, baseline
 from pipelines.diagnosis.candidates import Dictionary
+from pipelines.diagnosis.compliance import Compliance, compliance, new_causes
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows, load
 from pipelines.diagnosis.decision import Decision, decide
@@ -19,10 +20,8 @@ from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.fitted.exact import Exact
-from pipelines.model.diagnosis.given.compliance import Compliance, compliance, new_causes
+from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 

@@ -7,8 +7,7 @@ import pytest
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import Diagnosis, diagnose, pose
 from pipelines.diagnosis.screening import best_of
-from pipelines.model.diagnosis.asked.inputs import Logs, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
+from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
 from tests.diagnose.sessions import healthy_again, session
 
 

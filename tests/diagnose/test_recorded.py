@@ -13,9 +13,8 @@ import pytest
 from benchmarks.recorded_diagnosis import Judged, imported, judged_odrive, judged_tx40, nested_error, payoff, searched
 from pipelines.diagnosis.selection import Selection
 from pipelines.log.hdf5 import read_parts
-from pipelines.model.diagnosis.asked.inputs import Logs, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from tests.model.diagnosis.asking import answered
+from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from tests.diagnosis.asking import answered
 
 _FOLDS = 5
 _TORQUE_CONSTANT = 0.0551  # N m/A

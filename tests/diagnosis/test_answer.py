@@ -13,13 +13,11 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.limits import Limits, limits_of
+from pipelines.diagnosis.result import Diagnosis, Extended, Finding
 from pipelines.log.hdf5 import read_parts
-from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.result import Diagnosis, Finding
-from pipelines.model.diagnosis.screened.wanted import Wanted
-from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
+from pipelines.model.rows.families import Wanted
+from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
 
 _BLOCKS = 10
 
