@@ -12,7 +12,7 @@ shapes of the effects. Slopes by what is linear are columns; all others are diff
 from __future__ import annotations
 
 from collections.abc import Container, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -45,9 +45,6 @@ def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
     return table
 
 
-_ARMS: list[tuple[Columns, Array, Arm]] = []  # the nominal ones made last
-_STANDING: list[tuple[tuple[object, ...], Array]] = []  # what stands beside them over a motion
-_KEEP = 8
 _FARTHEST = 0.5  # of ln shape, a step
 
 
@@ -85,6 +82,18 @@ class Named:
 
 
 @dataclass(frozen=True, eq=False)
+class NominalArm:
+    """Base parameters and laws of all models that differ in their effects alone."""
+
+    columns: Columns
+    beta: Array
+
+    @cached_property
+    def arm(self) -> Arm:
+        return nominal_arm(self.columns, self.beta)
+
+
+@dataclass(frozen=True, eq=False)
 class Exact:
     """A model with all its numbers."""
 
@@ -92,6 +101,11 @@ class Exact:
     beta: Array  # of the rigid body and the laws
     effects: tuple[Named, ...]
     standing: tuple[Acting, ...] = ()  # that just add; their torque was subtracted from the rows, over the motion as it was read
+    of: NominalArm | None = field(default=None, repr=False)  # handed on by `replace`
+
+    def __post_init__(self) -> None:
+        if self.of is None or self.of.columns is not self.columns or self.of.beta is not self.beta:
+            object.__setattr__(self, "of", NominalArm(self.columns, self.beta))
 
     @classmethod
     def start(cls, columns: Columns, fit: Fit) -> Exact:
@@ -106,16 +120,11 @@ class Exact:
     def without(self, place: int) -> Exact:
         return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
 
-    @cached_property
+    @property
     def nominal(self) -> Arm:
-        """One and the same for models that differ in their effects: what it has worked out serves all of them."""
-        for columns, beta, arm in tuple(_ARMS):
-            if columns is self.columns and beta is self.beta:
-                return arm
-        made = nominal_arm(self.columns, self.beta)
-        _ARMS.append((self.columns, self.beta, made))
-        del _ARMS[:-_KEEP]
-        return made
+        """The arm without effects: one and the same object for models that differ in these alone."""
+        assert self.of is not None
+        return self.of.arm
 
     @cached_property
     def arm(self) -> Arm:
@@ -143,15 +152,9 @@ class Exact:
         return np.asarray(arm.torque(motion, inside) - known)
 
     def _standing_torque(self, motion: Motion) -> Array:
-        """(samples, joints) [N m] of what stands beside it; kept for models that differ in their effects, as `nominal` is."""
-        key = (self.standing, self.nominal, motion)
-        for same, found in tuple(_STANDING):
-            if all(a is b for a, b in zip(key, same, strict=True)):
-                return found
-        made = _added(self.standing, motion, self.nominal)
-        _STANDING.append((key, made))
-        del _STANDING[:-_KEEP]
-        return made
+        """(samples, joints) [N m] of the standing effects, kept with the motion."""
+        key = ("standing", self.standing, self.nominal)
+        return motion.kept(key, lambda: _added(self.standing, motion, self.nominal))
 
     @property
     def core(self) -> int:
