@@ -122,17 +122,25 @@ def amplitudes(q: Array, x: Array, orders: Array) -> Array:
     """Return the amplitude (orders,) of each wave over the angle q (rows,) in x (rows,).
 
     Zero of a joint that stood still.
+
+    Args:
+        orders: evenly spaced.
     """
     if not np.isfinite(least_order(q)):
         return np.zeros(len(orders))
-    weight, out = _weights(q, float(np.max(orders))), np.empty(len(orders))
-    for k, order in enumerate(orders):
-        columns = np.stack([np.ones_like(q), np.cos(order * q), np.sin(order * q)])
-        normal = (columns * weight) @ columns.T
-        inverse = np.linalg.pinv(normal, rcond=_ALIKE, hermitian=True)
-        _, c, s = inverse @ (columns @ (weight * x))
-        out[k] = np.hypot(c, s)
-    return out
+    weight, spacing = _weights(q, float(np.max(orders))), np.ptp(orders) / max(len(orders) - 1, 1)
+    wave, step, sums = np.exp(1j * orders[0] * q), np.exp(1j * spacing * q), []
+    for _ in orders:  # of w e^(jkq), w e^(2jkq) and w x e^(jkq)
+        weighted = weight * wave
+        sums.append((weighted.sum(), weighted @ wave, weighted @ x))
+        wave = wave * step
+    one, two, own = np.transpose(sums)
+    whole, level = np.full(len(orders), weight.sum()), np.full(len(orders), weight @ x)
+    cc, cs, ss = 0.5 * (whole + two.real), 0.5 * two.imag, 0.5 * (whole - two.real)
+    normal = np.array([[whole, one.real, one.imag], [one.real, cc, cs], [one.imag, cs, ss]])
+    inverse = np.linalg.pinv(np.moveaxis(normal, -1, 0), rcond=_ALIKE, hermitian=True)
+    fitted = np.einsum("kij,jk->ki", inverse, np.array([level, own.real, own.imag]))
+    return np.asarray(np.hypot(fitted[:, 1], fitted[:, 2]))
 
 
 def _weights(q: Array, highest: float) -> Array:

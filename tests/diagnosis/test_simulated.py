@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.diagnosis import figures as simulated
+from pipelines.diagnosis.figures import with_simulation
 from pipelines.model.simulation.comparison import Strayed
 
 
@@ -22,19 +22,8 @@ class Evidence:
 
 
 @dataclass(frozen=True)
-class Told:
+class Result:
     evidence: tuple[Evidence, ...]
-    nominal: str | None = "nominal"
-    extended: str | None = "extended"
-    findings: tuple[str, ...] = ("one",)
-
-
-def test_without_a_simulation_nothing_is_shown() -> None:
-    """What an earlier simulation has shown is none of this model's then."""
-    told: Any = Told((Evidence(np.zeros(1), np.ones((1, 3)), "old", np.ones((1, 3))), Evidence("kept")))
-    assert simulated.with_simulation(told, None).evidence == (Evidence(), Evidence("kept"))
-    nothing: Any = Told(())
-    assert simulated.with_simulation(nothing, None) is nothing
 
 
 def run(samples: int, error: float) -> Any:
@@ -45,16 +34,18 @@ def run(samples: int, error: float) -> Any:
 @pytest.mark.parametrize(("samples", "shown"), [(5000, 3.0), (1000, 1.0)])
 def test_what_was_simulated_is_shown_as_far_as_it_is_long(samples: int, shown: float) -> None:
     """At most three seconds, of both arms the same."""
-    found = simulated.as_simulated((run(samples, 2.0), run(samples, 1.0)))
-    assert found is not None
-    assert found.log == "free-1"
-    assert found.t[0] == 0.0
-    assert found.t[-1] == pytest.approx(shown, abs=0.01)
-    assert [error.shape for error in found.errors] == [(len(found.t), 2)] * 2
-    assert [float(error[0, 0]) for error in found.errors] == [2.0, 1.0]
+    result: Any = Result((Evidence(), Evidence("kept")))
+    first, second = with_simulation(result, run(samples, 2.0), run(samples, 1.0)).evidence
+    assert second == Evidence("kept")
+    assert first.simulated_log == "free-1"
+    assert first.simulated_t[0] == 0.0
+    assert first.simulated_t[-1] == pytest.approx(shown, abs=0.01)
+    assert first.simulated_position_error.shape == (len(first.simulated_t), 2)
+    assert (first.simulated_position_error[0, 0], first.extended_position_error[0, 0]) == (2.0, 1.0)
 
 
-@pytest.mark.parametrize("runs", [(), (run(1000, 1.0), SimpleNamespace(first=None))])
-def test_arms_that_were_not_all_in_a_loop_are_not_shown(runs: Any) -> None:
-    """Short windows have no error that grows with time."""
-    assert simulated.as_simulated(runs) is None
+@pytest.mark.parametrize("result", [Result((Evidence(),)), Result(())])
+def test_arms_that_were_not_all_in_a_loop_are_not_shown(result: Any) -> None:
+    """Short windows have no error that grows with time; without figures nothing is shown either."""
+    assert with_simulation(result, run(1000, 1.0), SimpleNamespace(first=None)) is result
+    assert with_simulation(Result(()), run(1000, 1.0), run(1000, 1.0)) == Result(())
