@@ -32,13 +32,20 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.rigid.body import Motion
-from pipelines.signal.filters import passed_both_ways, thinned
+from pipelines.signal.filters import fast_length, passed_both_ways, thinned
 from pipelines.signal.prediction import prediction_errors, prediction_weights
 
-__all__ = ["PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "mixable", "mixed", "quick_size", "run_of"]
+__all__ = ["PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "run_of"]
 
-KeptRows = npt.NDArray[Any]
+Indices = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
 
+PAD = 4.0  # periods of the cut-off by which a stretch is continued
+_END = 1.0  # periods of the cut-off left out at either end of a stretch
+_AT_ONCE = 8  # numerics: channels, which stay near the processor
+_AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed at least
+_ORDER = 20  # rows: as far as the noise of the low-pass reaches, and a fifth of a second
+_RIDGE = 1e-4  # of the noise's power: what the low-pass keeps back is not brought back by more
 _ROOM = 192 << 20  # [bytes]
 
 
@@ -47,9 +54,10 @@ class Kept:
 
     def __init__(self) -> None:
         self._used = 0
-        self._rows: OrderedDict[Hashable, KeptRows] = OrderedDict()
+        self._rows: OrderedDict[Hashable, npt.NDArray[Any]] = OrderedDict()
 
-    def of(self, key: Hashable, lay: Callable[[], KeptRows]) -> KeptRows:
+    def of(self, key: Hashable, lay: Callable[[], npt.NDArray[Any]]) -> npt.NDArray[Any]:
+        """Return what `lay` makes, or made before under the same key."""
         found = self._rows.pop(key, None)
         if found is None:
             found = lay()
@@ -60,10 +68,6 @@ class Kept:
             _, old = self._rows.popitem(last=False)
             self._used -= old.nbytes
         return found
-
-
-_ORDER = 20  # rows: as far as the noise of the low-pass reaches, and a fifth of a second of what is slower
-_RIDGE = 1e-4  # of the noise's power: what the low-pass keeps back is not to be brought back by more
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +105,6 @@ class Whitening:
             for stretch in stretches[joint]:
                 out[own, stretch] = prediction_errors(self.weights[joint], x[own, stretch])
         return out
-
-
-Indices = npt.NDArray[np.intp]
-
-PAD = 4.0  # periods of the cut-off a stretch is continued by
-_AT_ONCE = 8  # channels, which stay near the processor
-_END = 1.0  # periods of the cut-off left out at either end of a stretch
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,29 +151,12 @@ def run_of(equations: LogEquations, part: slice, skip: int = 1) -> Run:
     chosen = np.arange(-(-min(reach, n // 4) // every), (n - min(reach, n // 4)) // every)
     chosen = chosen[~equations.rows.out[part][chosen * every]]
     pad = every * (min(n - 2, 16 if cutoff is None else int(np.ceil(PAD * rate / cutoff))) // every)
-    size = 2 * every * quick_size(-(-(n + 2 * pad) // (2 * every)))
+    size = 2 * every * fast_length(-(-(n + 2 * pad) // (2 * every)))
     bins = np.arange(size // 2 // every + 1)
     turn = 2.0 * np.pi * bins / size
     response = np.ones(len(bins)) if cutoff is None else passed_both_ways(bins * rate / size, cutoff, rate)
     average = (114.0 + 68.0 * np.cos(turn) - 2.0 * np.cos(2.0 * turn)) / 180.0
     return Run(held, response, average, size // skip, pad // skip, every // skip, chosen)
-
-
-def quick_size(n: int) -> int:
-    """The smallest 2^a 3^b 5^c from n on: lengths of a quick Fourier transform."""
-    best = 1 << max(0, (n - 1).bit_length())
-    for five in range(8):
-        for three in range(12):
-            odd = 5**five * 3**three
-            if odd >= best:
-                break
-            size = odd << max(0, int(np.ceil(np.log2(max(n / odd, 1.0)))))
-            if n <= size < best:
-                best = size
-    return best
-
-
-_AMPLE = 24.0  # samples a period of the cut-off, at which columns are worked out at least
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,9 +165,9 @@ class LogData:
 
     log: ExperimentLog
     equations: LogEquations
-    motion: Motion  # at the kept samples of all runs, of a high rate at every so-manieth
+    motion: Motion  # at the kept samples of all runs, of a high rate at every nth
     y: Array  # [N m] (joints, rows) measured torque
-    weighed: npt.NDArray[np.bool_]  # (joints, rows) which rows count: those of a joint that is not too slow
+    weighed: Mask  # (joints, rows) which rows count: those of a joint that is not too slow
     pieces: tuple[slice, ...]  # of each run among those samples
     runs: tuple[Run, ...]
     kept: Kept  # what was laid before, of all logs gathered with it
@@ -243,10 +223,6 @@ class LogData:
             return out
         return out.reshape(table.shape[1], table.shape[2], self.rows).transpose(1, 0, 2)
 
-    def keep(self, key: Hashable, lay: Callable[[], npt.NDArray[Any]]) -> npt.NDArray[Any]:
-        """What `lay()` makes, or made before under the same key; not to be written to."""
-        return self.kept.of((self.place, key), lay)
-
     def lay_signals(self, x: npt.NDArray[Any], joints: Sequence[int] | Indices) -> npt.NDArray[Any]:
         """(channels, samples) of torques of the `joints` (channels,), from 0 -> (channels, rows)."""
         rows = np.concatenate([run.lay(np.ascontiguousarray(x[:, piece])) for piece, run in self._parts], axis=1)
@@ -285,7 +261,7 @@ class Data:
         return np.concatenate([np.tile(one.t, one.n_joints) for one in self.logs])
 
     @cached_property
-    def counts(self) -> npt.NDArray[np.bool_]:
+    def counts(self) -> Mask:
         return np.concatenate([one.weighed.ravel() for one in self.logs])
 
     @cached_property
@@ -330,7 +306,10 @@ class Data:
 
     def lay_kept(self, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
         """As `lay` of columns (samples, joints, k) that follow from the motion alone; `key` says which they are."""
-        laid = [_kept(one, key, torque) for one in self.logs]
+        def lay(one: LogData) -> Callable[[], Array]:
+            return lambda: one.lay(torque(one.motion))
+
+        laid = [one.kept.of((one.place, key), lay(one)) for one in self.logs]
         return self.clear(np.concatenate([x.reshape(len(x), -1) for x in laid], axis=-1))
 
     def blocks(self, count: int) -> Indices:
@@ -367,10 +346,6 @@ class Data:
         return x if counts.all() else np.where(counts, x, 0.0)
 
 
-def _kept(one: LogData, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
-    return one.keep(key, lambda: one.lay(torque(one.motion)))
-
-
 def gather(motions: Motions, columns: Columns, recipe: Recipe, rows: Sequence[Rows] | None = None, first: int = 0) -> Data:
     """The rows of the logs; `recipe` with its cut-off.
 
@@ -392,7 +367,9 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     skip = _skipped(equations)
     some = [(Motion(m.t[::skip], m.q[::skip], m.dq[::skip], m.ddq[::skip]), tau[::skip]) for m, tau in stretches]
     tau = np.concatenate([tau for _, tau in some])
-    t, q, dq, ddq = (_only_read(np.concatenate([getattr(m, name) for m, _ in some])) for name in ("t", "q", "dq", "ddq"))
+    t, q, dq, ddq = (np.concatenate([getattr(m, name) for m, _ in some]) for name in ("t", "q", "dq", "ddq"))
+    for x in (t, q, dq, ddq):  # what is kept with the motion depends on them
+        x.flags.writeable = False
     ends = np.cumsum([0, *(len(tau) for _, tau in some)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     runs = tuple(run_of(equations, run, skip) for run in equations.runs)
@@ -401,11 +378,6 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     since = _first_known(runs[0], pieces[0])
     logged = None if equations.held else tau[since]
     return LogData(log, equations, Motion(t, q, dq, ddq, asked, logged, since=since), y, ~slow.T, pieces, runs, kept, place)
-
-
-def _only_read(x: Array) -> Array:
-    x.flags.writeable = False
-    return x
 
 
 def _first_known(run: Run, piece: slice) -> int:
@@ -425,13 +397,3 @@ def _skipped(equations: LogEquations) -> int:
     highest = min(how.cutoff_hz, 0.5 / (step * how.decimation))  # rows further apart than the low-pass asks for show less
     most = int(1.0 / (_AMPLE * highest * step))
     return max((k for k in range(1, max(most, 1) + 1) if how.decimation % k == 0), default=1)
-
-
-def mixable(data: Data) -> bool:
-    """Not where rows of some joints do not count, or each joint's pass a whitening of its own."""
-    return bool(data.counts.all()) and all(one.whitening is None for one in data.logs)
-
-
-def mixed(data: Data, matrix: Array, rows: Array) -> Array:
-    """(rows,) of (joints, joints) `matrix` times the torque that has these `rows` (rows,)."""
-    return np.concatenate([(matrix @ one).ravel() for one in data.split(rows)])

@@ -21,10 +21,10 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
-from pipelines.model.effects.fast import from_motion, mixing
+from pipelines.model.effects.fast import from_motion
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
-from pipelines.model.rows.data import Data, mixable, mixed
+from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows, several_rows
 from pipelines.signal.first_order import lagging
 
@@ -177,25 +177,8 @@ class Exact:
         """(rows,) of the nominal model and the first `core` effects, which act on what stands beside it as well."""
         if core:
             inner = replace(self, effects=self.effects[:core])
-            rows = inner._mixed_rows(data)
-            return data.lay_each(lambda log, motion: inner.torque_in(log, motion)) if rows is None else rows
+            return data.lay_each(inner.torque_in)
         return self._nominal_rows(data)
-
-    def _mixed_rows(self, data: Data) -> Array | None:
-        """(rows,) of all effects, where those that do not just add theirs are drives that mix the torques of a moment: M times the
-        sum of all else, less what stands beside the model. None where there are others."""
-        drives = [one for one in self.effects if not adds(one.effect)]
-        matrices = [mixing(one.effect, one.values, data.n_joints) for one in drives if one.log is None]
-        known = [matrix for matrix in matrices if matrix is not None]
-        if len(known) < len(drives) or not mixable(data):
-            return None
-        stands = [one.effect.amplitudes(one.values) @ effect_rows(data, one.effect.at(one.values), self.nominal)
-                  for one in self.standing]
-        added = [one.effect.amplitudes(one.values) @ self.columns_of(data, one) for one in self.effects if adds(one.effect)]
-        rows = sum((*added, *stands), self._nominal_rows(data))
-        for matrix in known:  # the last one outermost
-            rows = mixed(data, matrix, rows)
-        return np.asarray(rows - sum(stands))
 
     def _nominal_rows(self, data: Data) -> Array:
         if not all(from_motion(law) for law in self.columns.laws):

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from pipelines.model.rigid.body import Motion
-from pipelines.model.rows.data import Data, quick_size
+from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import _orthonormal, fit_nominal, rows_of
 from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
 from tests.diagnosis.arms import arm, hidden
@@ -85,16 +85,6 @@ def test_blocks_hold_all_joints_of_a_moment(prepared: Prepared) -> None:
         np.testing.assert_array_equal(own[0], own[1])
         np.testing.assert_array_equal(own[0], own[2])
     assert not np.intersect1d(place[data.log_of == 0], place[data.log_of == 1]).size
-
-
-@pytest.mark.parametrize("n", [1, 2, 7, 97, 1000, 8191, 30011])
-def test_quick_lengths_have_small_factors(n: int) -> None:
-    size = quick_size(n)
-    assert size >= n
-    for factor in (2, 3, 5):
-        while size % factor == 0:
-            size //= factor
-    assert size == 1
 
 
 def test_friction_and_its_sharpness_are_found(prepared: Prepared) -> None:
