@@ -41,7 +41,7 @@ from pipelines.diagnosis.trained import Trained, told, train
 from pipelines.diagnosis.words import beside, how_much, taken_in, where
 from pipelines.model.arm import Acting
 from pipelines.model.rows.families import place_of
-from pipelines.model.rows.held_out import worse_log
+from pipelines.model.rows.fit import worse_log
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.words import within
 

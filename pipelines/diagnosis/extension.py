@@ -25,7 +25,7 @@ from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import train
 from pipelines.model.arm import Acting
 from pipelines.model.rows.families import Wanted, usable
-from pipelines.model.rows.held_out import worse_log
+from pipelines.model.rows.fit import worse_log
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.words import plain_number
 

@@ -31,8 +31,7 @@ from pipelines.diagnosis.selection import Round
 from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters
 from pipelines.model.arm import Acting
-from pipelines.model.rows.fit import Refined
-from pipelines.model.rows.held_out import TorqueGain, torque_gain_of
+from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.simulation.comparison import (
     Simulation,

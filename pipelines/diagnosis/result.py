@@ -16,7 +16,7 @@ from pipelines.log.model_file import ModelFile
 from pipelines.log.results import NOT_STORED
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.estimation.logs import Motions
-from pipelines.model.rows.held_out import TorqueGain
+from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.prepare import FewerTerms
 from pipelines.model.simulation.comparison import SimulatedSpan
 

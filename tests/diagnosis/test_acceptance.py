@@ -17,7 +17,7 @@ from pipelines.diagnosis.findings import gain_of
 from pipelines.log import shared_work
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.held_out import TorqueGain, worse_log
+from pipelines.model.rows.fit import TorqueGain, worse_log
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
 from pipelines.model.simulation import comparison as gains

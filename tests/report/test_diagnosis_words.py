@@ -26,7 +26,7 @@ from pipelines.diagnosis.result import (
     Value,
 )
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.rows.held_out import TorqueGain
+from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_floor import torque_errors
 from pipelines.report.diagnosis_proof import proof_figures
