@@ -12,7 +12,7 @@ from pipelines.diagnosis.compliance import Compliance, compliance, gaps_untold, 
 from pipelines.log.files import open_log
 from sample_logs.make_model import synthetic_arm
 
-SAMPLES = Path(__file__).resolve().parents[4] / "sample_logs" / "rrr-healthy"
+SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs" / "rrr-healthy"
 
 
 def test_a_soft_base_is_named_with_its_frequency() -> None:

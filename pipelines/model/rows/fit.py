@@ -27,7 +27,9 @@ from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact, Which, slopes_of
 from pipelines.model.rows.nominal import rigid_rows
 
-__all__ = ["Refined", "TorqueGain", "covariance", "dissipating", "driving", "left_out", "refine", "solved", "superfluous", "torque_gain_of", "worse_log"]
+__all__ = ["Refined", "TorqueGain", "covariance", "dissipating", "driving", "left_out", "refine",
+           "solved", "superfluous", "torque_gain_of", "worse_log"]
+
 
 def dissipating(beta: Array, laws: Sequence[Effect]) -> Array:
     """`beta`, its last numbers the amplitudes of `laws`, with those of friction not below zero where their range begins there."""
