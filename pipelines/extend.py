@@ -34,13 +34,13 @@ from pipelines.model.arm import Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
-from pipelines.model.estimation.logs import Motions
+from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
 from pipelines.model.named_cause import refuse_unknown, wanted_cause
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.friction_terms import with_terms_told_apart
-from pipelines.model.rows.prepare import BLOCKS, DiagnosisSettings, prepare
+from pipelines.model.rows.prepare import BLOCKS, prepare
 from pipelines.report.extension_report import extension_report
 from pipelines.report.model_words import fewer_words
 from pipelines.report.report import Report
@@ -123,7 +123,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     if found is None:
         usual = DiagnosisConfig()
         config = replace(usual, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
-        rows = DiagnosisSettings(config.cutoff_hz, settings.decimate, settings.min_speed)
+        rows = Recipe(cutoff_hz=config.cutoff_hz, decimation=settings.decimate, min_speed=settings.min_speed)
         prepared = with_terms_told_apart(prepare(chosen, rows, given.arm), settings.blocks)
         given.tell(f"fitting {', '.join(dict.fromkeys(one.place for one in wanted))}")
         found = extend(prepared, _each(wanted), config, settings.blocks)

@@ -20,8 +20,9 @@ from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
@@ -95,7 +96,7 @@ def diagnose(
         InputRejected: as `prepare`, logs that give no rows.
     """
     config = config or DiagnosisConfig()
-    prepared = prepare(Logs.by_role(logs), DiagnosisSettings(cutoff_hz=config.cutoff_hz))
+    prepared = prepare(Logs.by_role(logs), Recipe(cutoff_hz=config.cutoff_hz))
     return diagnose_prepared(prepared, config, exclude)
 
 

@@ -13,9 +13,10 @@ from pipelines.diagnosis.result import Diagnosis as Answer
 from pipelines.diagnosis.result import Extended
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.friction_terms import with_terms_told_apart
-from pipelines.model.rows.prepare import BLOCKS, DiagnosisSettings, Logs, Prepared, prepare
+from pipelines.model.rows.prepare import BLOCKS, Logs, Prepared, prepare
 
 __all__ = ["answered", "before", "causes", "diagnosed", "effects", "extended", "prepared_for"]
 
@@ -59,7 +60,7 @@ def prepared_for(
     logs: Logs, arm: Arm | None = None, cutoff_hz: float = _USUAL.cutoff_hz
 ) -> Prepared:
     """Return the rows of logs, with friction laws of as many terms as the logs tell apart."""
-    return with_terms_told_apart(prepare(logs, DiagnosisSettings(cutoff_hz), arm), BLOCKS)
+    return with_terms_told_apart(prepare(logs, Recipe(cutoff_hz=cutoff_hz), arm), BLOCKS)
 
 
 def extended(

@@ -15,11 +15,12 @@ from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.diagnosis.findings import gain_of
 from pipelines.log import shared_work
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import TorqueGain, worse_log
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from pipelines.model.simulation import comparison as gains
 from pipelines.model.simulation.comparison import Simulation, simulation_errors
 from pipelines.model.simulation.windows import Windows, simulate_windows
@@ -42,7 +43,7 @@ def test_a_model_that_runs_away_has_no_simulated_gain() -> None:
 def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """One window of one arm without an end: that arm has no simulated error, the other keeps its own."""
     log = replace(session()[0], controller=None)
-    prepared = prepare(Logs((log,)), DiagnosisSettings())
+    prepared = prepare(Logs((log,)), Recipe())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     arm = Exact.start(columns, fit).arm
     calls = []
@@ -62,7 +63,7 @@ def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest
 @pytest.fixture(scope="module")
 def long() -> tuple[Any, Any]:
     """Six seconds of one log, and an arm fitted to them."""
-    prepared = prepare(Logs((session(seconds=6.0, logs=1)[0],)), DiagnosisSettings())
+    prepared = prepare(Logs((session(seconds=6.0, logs=1)[0],)), Recipe())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     return prepared.motions[0], Exact.start(columns, fit).arm
 
@@ -142,7 +143,7 @@ def test_rows_of_a_joint_that_is_held_do_not_count() -> None:
     """Joint 1 to and fro, the others at rest: they stick, and no law tells their torque. In the other log all three count."""
     machine = draw_machine(7, "fault")
     (fro,) = record(machine, (), [experiments.reversal(machine, 1, 2.0)], 3)
-    data = prepare(Logs((session()[0], replace(fro, role="identify"))), DiagnosisSettings()).data
+    data = prepare(Logs((session()[0], replace(fro, role="identify"))), Recipe()).data
     counted = {(log, joint): bool(data.counts[(data.log_of == log) & (data.joint == joint)].all())
                for log in (0, 1) for joint in (0, 1, 2)}
     assert counted == {(0, 0): True, (0, 1): True, (0, 2): True, (1, 0): True, (1, 1): False, (1, 2): False}

@@ -10,8 +10,9 @@ import pytest
 from pipelines.diagnosis.dataset import load
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import but
 from tests.diagnosis.arms import hidden
 from tests.diagnosis.asking import before, causes, diagnosed, effects
@@ -100,5 +101,5 @@ def test_the_curve_is_fitted_where_nothing_else_tells_it(
     slowest: float, reference: tuple[ExperimentLog, ...], free: tuple[str, ...]
 ) -> None:
     logs = Logs((hidden(1),), reference=reference)
-    laws = load(prepare(logs, DiagnosisSettings(min_speed=(slowest,)))).model.columns.laws
+    laws = load(prepare(logs, Recipe(min_speed=(slowest,)))).model.columns.laws
     assert [law.free for law in laws if isinstance(law, Coulomb)] == [free] * 3

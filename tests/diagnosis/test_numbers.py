@@ -16,11 +16,12 @@ from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.payload import Payload
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact, Named
 from pipelines.model.rows.fit import Refined, refine
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.arms import hidden
 
 INERTIA, VISCOUS, COULOMB, SHARPNESS = 0.004, 0.03, 0.2, 90.0
@@ -36,7 +37,7 @@ def _shared(one: int, other: int, motion: Motion) -> Array:
 
 
 def _fitted(joint: int) -> Refined:
-    prepared = prepare(Logs((hidden(1, lambda motion: _shared(joint - 2, joint - 1, motion)),)), DiagnosisSettings())
+    prepared = prepare(Logs((hidden(1, lambda motion: _shared(joint - 2, joint - 1, motion)),)), Recipe())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     start = TransmissionCoupling(joint=joint, sharpness=SHARPNESS)
     model = Exact.start(columns, fit).with_effect(start, np.array([0.0, 0.0, 0.1]), held=("sharpness",))

@@ -12,10 +12,11 @@ import pytest
 
 from pipelines.diagnosis.figures import _fine_enough, binned, proof
 from pipelines.model.effects.cogging import Cogging
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from pipelines.report.diagnosis_proof import proof_figures
 from tests.diagnosis.rotor import turned
 from tests.report.test_diagnosis_words import found
@@ -25,7 +26,7 @@ _RINGS = 20.0  # [Hz]
 
 def test_a_wave_of_the_angle_is_shown_over_the_angle() -> None:
     """A rotor that turns once, one way, tells the same over time; what it does then is what it does there."""
-    prepared = prepare(Logs((turned(1, {7.0: 0.04, 28.0: 0.03}, 0.0),)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((turned(1, {7.0: 0.04, 28.0: 0.03}, 0.0),)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     before = refine(Exact.start(columns, fit), prepared.data, fit.weight)
     waves = before.model.with_effect(Cogging(joint=1, order=7.0, harmonics=1), np.array([0.04, 0.0]))
@@ -39,7 +40,7 @@ def test_what_rings_is_shown_over_frequency() -> None:
     strength = np.interp(log.t, np.linspace(log.t[0], log.t[-1], 200), rng.standard_normal(200))
     ringing = 0.05 * strength * np.sin(2.0 * np.pi * _RINGS * log.t)
     rung = replace(log, signals=log.signals | {"tau": replace(log.signals["tau"], values=log.tau + ringing[:, None])})
-    prepared = prepare(Logs((rung,)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((rung,)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     before = refine(Exact.start(columns, fit), prepared.data, fit.weight)
     (rows,) = prepared.data.logs
@@ -79,7 +80,7 @@ def test_what_happened_once_is_shown_over_the_time_of_its_log() -> None:
     """A blow of a tenth of a second in one of two logs, as high as it was and when it was: other logs say nothing of it, and an
     angle even less."""
     log = turned(1, {}, 0.0)
-    prepared = prepare(Logs((log, replace(log, name="again"))), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((log, replace(log, name="again"))), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     before = refine(Exact.start(columns, fit), prepared.data, fit.weight)
     first, second = prepared.data.logs

@@ -9,8 +9,9 @@ import pytest
 
 from pipelines.diagnosis.decision import Repeated
 from pipelines.log.experiment import Array
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.data import Data
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.arms import hidden
 
 NOISE = 0.05
@@ -19,7 +20,7 @@ NOISE = 0.05
 @pytest.fixture(scope="module")
 def twice() -> Data:
     """One motion in two logs, neither of which declares a period."""
-    return prepare(Logs((hidden(1), replace(hidden(1), name="again"))), DiagnosisSettings()).data
+    return prepare(Logs((hidden(1), replace(hidden(1), name="again"))), Recipe()).data
 
 
 def wrong(data: Data, size: float) -> Array:
@@ -49,7 +50,7 @@ def test_no_row_is_in_two_pairs_and_none_beside_its_partner(twice: Data) -> None
 
 
 def test_where_nothing_comes_again_nobody_knows_the_noise() -> None:
-    data = prepare(Logs((hidden(1), hidden(2))), DiagnosisSettings()).data
+    data = prepare(Logs((hidden(1), hidden(2))), Recipe()).data
     assert np.isnan(Repeated.of(data).noise(np.ones(data.rows))).all()
 
 

@@ -1,6 +1,6 @@
 """Prepare the logs of a diagnosis: their roles, motions and rows.
 
-    prepared = prepare(logs, settings, arm)
+    prepared = prepare(logs, recipe, arm)
     prepared.data, prepared.judge, prepared.reference, prepared.columns
 
 Rests: a point-to-point motion stands for a fifth of its time, and dry friction bears whatever
@@ -42,14 +42,14 @@ from pipelines.model.estimation.logs import (
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.estimation.rests import RestConfig
-from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
+from pipelines.model.motion import Reconstructed, reconstruct
 from pipelines.model.rows.data import Data, gather
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.signal.observer import design
 from pipelines.signal.tuning import smoother_bandwidth
 
-__all__ = ["BLOCKS", "DiagnosisSettings", "FewerTerms", "Logs", "Prepared", "prepare", "rests", "sharpened", "sticking"]
+__all__ = ["BLOCKS", "FewerTerms", "Logs", "Prepared", "prepare", "rests", "sharpened", "sticking"]
 
 @dataclass(frozen=True)
 class FewerTerms:
@@ -62,15 +62,6 @@ class FewerTerms:
 
 
 BLOCKS = 10  # of time, held out in turn where no log is of role "validate"
-
-
-@dataclass(frozen=True)
-class DiagnosisSettings:
-    """Which rows of the logs are used."""
-
-    cutoff_hz: float | None = None  # low-pass over the equations; None: from the motion
-    decimation: int | None = None
-    min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its equations
 
 
 Mask = npt.NDArray[np.bool_]
@@ -202,7 +193,7 @@ class Prepared:
     fewer: tuple[FewerTerms, ...] = ()  # laws that gave way to plainer ones
 
 
-def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> Prepared:
+def prepare(logs: Logs, recipe: Recipe, arm: Arm | None = None) -> Prepared:
     """Reconstruct every log, and lay its rows; the cut-off is that of the fitted logs.
 
     Args:
@@ -215,12 +206,10 @@ def prepare(logs: Logs, settings: DiagnosisSettings, arm: Arm | None = None) -> 
     if not logs.identify:
         raise InputRejected("S01", "no log of role 'identify' in which the arm moves", remedy="record an excitation")
     columns = _columns(logs, arm)
-    how = Reconstruction()
     parts = (logs.identify, logs.validate, logs.reference)
-    motions = motions_of([log for part in parts for log in part], how)
+    motions = motions_of([log for part in parts for log in part], recipe.how)
     judged = slice(len(logs.identify), len(logs.identify) + len(logs.validate))
-    recipe = with_cutoff(Recipe(how, settings.cutoff_hz, settings.decimation, settings.min_speed),
-                         (*motions[:judged.start], *motions[judged.stop:]))
+    recipe = with_cutoff(recipe, (*motions[:judged.start], *motions[judged.stop:]))
     sharp = iter(sharpened(motions, recipe))
     fitted, judging, referring = (tuple(islice(sharp, len(part))) for part in parts)
     prepared = _laid(logs, columns, recipe, fitted, judging, referring)

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.asking import answered
 from tests.diagnosis.slides import SLIDE
 
@@ -47,7 +48,7 @@ def slide(seed: int, role: str, held: float, dry: float = 20.0) -> ExperimentLog
 
 
 def _counting(*logs: ExperimentLog) -> float:
-    data = prepare(Logs(logs), DiagnosisSettings()).data
+    data = prepare(Logs(logs), Recipe()).data
     return float(data.counts.mean())
 
 

@@ -8,16 +8,17 @@ from scipy.optimize import lsq_linear
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.effects.viscous import Viscous
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import Refined, dissipating, driving, refine
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.rotor import turned
 
 
 def fitted(waves: dict[float, float], lag: float) -> tuple[float, Refined]:
     """Viscous friction of the linear fit, and the model that dissipates."""
-    prepared = prepare(Logs((turned(3, waves, lag),)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((turned(3, waves, lag),)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     start = Exact.start(columns, fit)
     return float(start.beta[2]), refine(start, prepared.data, fit.weight)

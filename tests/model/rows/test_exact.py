@@ -10,9 +10,10 @@ import pytest
 from pipelines.model.arm import Acting
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.effects.base import Effect, adds
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from tests.diagnosis.arms import hidden
 from tests.model.effects.test_every_effect import drawn, placed
 
@@ -22,7 +23,7 @@ STANDING = ("cogging", "stribeck", "torque_offset")
 
 @pytest.fixture(scope="module")
 def prepared() -> Prepared:
-    return prepare(Logs((hidden(1), hidden(2))), DiagnosisSettings())
+    return prepare(Logs((hidden(1), hidden(2))), Recipe())
 
 
 @pytest.fixture(scope="module")

@@ -9,8 +9,9 @@ import numpy as np
 from pipelines.log.derive import derive
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 
 
 def with_motion(log: ExperimentLog) -> ExperimentLog:
@@ -22,7 +23,7 @@ def with_motion(log: ExperimentLog) -> ExperimentLog:
 def test_motion_that_was_handed_on_is_sharpened_as_well(samples: Path) -> None:
     """Were it not, the speed would pass through zero late at every reversal, in a run alone."""
     logs = [open_log(samples / f"rrr-changed/{name}.h5").log for name in ("excitation-3", "excitation-4")]
-    bare, handed = (prepare(Logs.by_role(some), DiagnosisSettings()) for some in (logs, [with_motion(log) for log in logs]))
+    bare, handed = (prepare(Logs.by_role(some), Recipe()) for some in (logs, [with_motion(log) for log in logs]))
     plain = reconstruct(logs[0], Reconstruction()).motion
     for (_, one), (_, two) in zip((*bare.motions, *bare.judging), (*handed.motions, *handed.judging), strict=True):
         np.testing.assert_array_equal(one.motion.ddq, two.motion.ddq)

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import _orthonormal, fit_nominal, rows_of
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from tests.diagnosis.arms import arm, hidden
 
 
 @pytest.fixture(scope="module")
 def prepared() -> Prepared:
-    return prepare(Logs((hidden(1), hidden(2))), DiagnosisSettings())
+    return prepare(Logs((hidden(1), hidden(2))), Recipe())
 
 
 def test_rows_are_those_of_a_zero_phase_butterworth(prepared: Prepared) -> None:
@@ -48,7 +49,7 @@ def test_no_row_hangs_on_torque_beyond_the_limit_of_a_drive() -> None:
             load[:, 0] += 500.0 * np.exp(-0.5 * ((motion.t - at) / 0.02) ** 2)
         return load
 
-    there = prepare(Logs((hidden(1, peaks), hidden(2))), DiagnosisSettings()).data
+    there = prepare(Logs((hidden(1, peaks), hidden(2))), Recipe()).data
     truth = there.lay(lambda motion: arm().torque(motion) + peaks(motion) * (motion.t[-1] == there.logs[0].motion.t[-1]))
     own = there.counts & (there.log_of == 0)
     left = (there.y - truth)[own & (there.joint == 0)]
@@ -65,7 +66,7 @@ def test_frequent_peaks_leave_rows_of_every_joint(cutoff_hz: float) -> None:
             load[:, 0] += 300.0 * np.exp(-0.5 * ((motion.t - at) / 0.01) ** 2)
         return load
 
-    data = prepare(Logs((hidden(1, peaks), hidden(2))), DiagnosisSettings(cutoff_hz=cutoff_hz)).data
+    data = prepare(Logs((hidden(1, peaks), hidden(2))), Recipe(cutoff_hz=cutoff_hz)).data
     assert all(one.weighed.any(axis=1).all() for one in data.logs if one.rows)
     assert data.logs[0].weighed[1:].all()
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from pipelines.model.effects import find_effect
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from tests.diagnosis.arms import hidden
 
 STEP = 1e-4
@@ -26,7 +27,7 @@ def rubbing(motion: Motion) -> Array:
 
 @pytest.fixture(scope="module")
 def prepared() -> Prepared:
-    return prepare(Logs((hidden(1, rubbing),), (hidden(3, rubbing, "validate"),)), DiagnosisSettings())
+    return prepare(Logs((hidden(1, rubbing),), (hidden(3, rubbing, "validate"),)), Recipe())
 
 
 def started(prepared: Prepared) -> tuple[Exact, Array]:

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.model.effects.gravity_tilt import GravityTilt
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, slopes_of
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal, rigid_rows
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.arms import hidden
 
 ANGLE = 0.08  # [rad]
@@ -19,7 +20,7 @@ ANGLE = 0.08  # [rad]
 def test_across_a_tilt_the_slope_is_that_of_its_sine_and_has_nothing_of_the_curvature() -> None:
     """Gravity g (cos α down + sin α (x, y)/α) with α = |(x, y)|: at y = 0 its slope by y is sin α/α of a level arm's. Half the
     step's part of the curvature, 4e-6 of the weight, would be all there is for an arm in one plane, and no number of it."""
-    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    prepared = prepare(Logs((hidden(1),)), Recipe())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     model = Exact.start(columns, fit).with_effect(GravityTilt(), np.array([ANGLE, 0.0, 0.0, 0.0]))
     slopes, names = slopes_of(model, prepared.data, rigid_rows(prepared.data, columns))
@@ -30,7 +31,7 @@ def test_across_a_tilt_the_slope_is_that_of_its_sine_and_has_nothing_of_the_curv
 
 def test_a_law_that_takes_no_torque_has_no_shape_either() -> None:
     """Joint 1 without dry friction: nothing tells how sharply that would change its sign."""
-    prepared = prepare(Logs((hidden(1),)), DiagnosisSettings())
+    prepared = prepare(Logs((hidden(1),)), Recipe())
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     model = Exact.start(columns, fit)
     place = next(

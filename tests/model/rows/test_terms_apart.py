@@ -20,19 +20,20 @@ from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from pipelines.model.effects.viscous import Viscous
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.fit import Refined, refine
 from pipelines.model.rows.friction_terms import unclear, with_terms_told_apart
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import BLOCKS, DiagnosisSettings, Logs, Prepared, prepare
+from pipelines.model.rows.prepare import BLOCKS, Logs, Prepared, prepare
 from sample_logs.make_model import synthetic_arm
 from tests.diagnosis.arms import hidden, wave
 from tests.diagnosis.asking import extended
 from tests.model.estimation.experiments import COULOMB, VISCOUS
 
-SETTINGS = DiagnosisSettings()
+SETTINGS = Recipe()
 JOINTS = (1, 2, 3)
 DIP = np.array([-1.5, -0.8, -0.4])  # [N m]
 

@@ -16,11 +16,12 @@ from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.effects.torque_lag import TorqueLag
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact, slopes_of
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal, rigid_rows
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from pipelines.signal.first_order import lagging
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import diagnosed, effects
@@ -44,7 +45,7 @@ def test_lag_and_ripple_are_named_and_the_inertia_comes_out() -> None:
 
 def test_slopes_of_a_model_behind_a_lag_are_those_of_its_torque() -> None:
     """Every number moved by a little and the whole torque worked out again."""
-    prepared = prepare(Logs((turned(1),)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((turned(1),)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     rippled = Exact.start(columns, fit).with_effect(Cogging(joint=1, order=ORDER, harmonics=1), np.array([0.04, 0.0]))
     model, data = rippled.with_effect(TorqueLag(joint=1), np.array([LAG])), prepared.data
@@ -65,7 +66,7 @@ def test_sharpness_of_each_joint_is_found_behind_a_lag() -> None:
     joint = ROTOR[ROTOR.index("[[joint]]"):]
     robot = ROTOR.replace("alpha = 0.0", "alpha = 1.5707963267948966") + joint.replace("rotor", "other")
     log = replace(first, signals=signals, robot_text=robot)
-    prepared = prepare(Logs((log,)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((log,)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     done = refine(Exact.start(columns, fit).with_effect(TorqueLag(joint=2), np.array([LAG])), prepared.data, fit.weight, steps=30)
     assert done.model.effects[0].values["time_constant"] == pytest.approx(LAG, rel=0.005)
@@ -77,7 +78,7 @@ def test_sharpness_of_each_joint_is_found_behind_a_lag() -> None:
                                                     (DriveLag(joint=1), [0.004])], ids=["misread", "late", "slow drive"])
 def test_how_sharply_friction_turns_over_is_sloped_as_the_whole_torque_is(effect: Effect, amplitudes: list[float]) -> None:
     """Friction is felt where the joint truly is, and comes late: a slope at the measured speed is off by a third and more."""
-    prepared = prepare(Logs((turned(1, {}, lag=0.0, mean=0.1),)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((turned(1, {}, lag=0.0, mean=0.1),)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     done = refine(Exact.start(columns, fit).with_effect(effect, np.array(amplitudes)), prepared.data, fit.weight, steps=0)
     k = len(done.model.beta) + done.names.index((0, 0, "sharpness"))
@@ -90,7 +91,7 @@ def test_how_sharply_friction_turns_over_is_sloped_as_the_whole_torque_is(effect
 
 def test_slopes_of_a_ripple_behind_a_lag_are_taken_where_the_joint_truly_is() -> None:
     """A disc 0.02 rad beside its axis turns the phase of thirty waves a turn by more than half a radian."""
-    prepared = prepare(Logs((turned(1),)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((turned(1),)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     wave = Cogging(joint=1, order=30.0, harmonics=1)
     model = (Exact.start(columns, fit).with_effect(TorqueLag(joint=1), np.array([0.1])).with_effect(wave, np.array([0.04, 0.0]))
@@ -108,7 +109,7 @@ def test_slopes_of_a_ripple_behind_a_lag_are_taken_where_the_joint_truly_is() ->
 def test_what_changes_the_record_stays_outermost() -> None:
     """Cogging that was found after the lag is logged late like everything else."""
     log = turned(1)
-    prepared = prepare(Logs((log,)), DiagnosisSettings(cutoff_hz=40.0))
+    prepared = prepare(Logs((log,)), Recipe(cutoff_hz=40.0))
     columns, fit = fit_nominal(prepared.data, prepared.columns)
     arm: Arm = Exact.start(columns, fit).arm
     lag = Acting.of(TorqueLag(joint=1), {"time_constant": 0.1})

@@ -10,9 +10,10 @@ import pytest
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.signal import lfilter
 
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.data import Data, Whitening
 from pipelines.model.rows.families import families, lay_family, whole_motion
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, prepare
+from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.arms import arm, hidden
 
 ROWS = 4000
@@ -94,7 +95,7 @@ def test_a_joint_without_noise_stays_as_it_is() -> None:
 @pytest.fixture(scope="module", params=[0.0, 0.3])
 def data(request: pytest.FixtureRequest) -> Data:
     """Of all rows, and of those of a joint that is not slow."""
-    return prepare(Logs((hidden(1),)), DiagnosisSettings(min_speed=(request.param,))).data
+    return prepare(Logs((hidden(1),)), Recipe(min_speed=(request.param,))).data
 
 
 def test_rows_that_do_not_count_are_no_neighbours(data: Data) -> None:

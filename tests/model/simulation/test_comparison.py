@@ -11,9 +11,10 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.drive_lag import DriveLag
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
-from pipelines.model.rows.prepare import DiagnosisSettings, Logs, Prepared, prepare
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from pipelines.model.simulation import Experiment, Plant, choose_step, simulate
 from pipelines.model.simulation.comparison import in_loop, in_loops
 from tests.diagnose.sessions import session
@@ -23,7 +24,7 @@ SECONDS = 0.4
 
 @pytest.fixture(scope="module")
 def prepared() -> Prepared:
-    return prepare(Logs(session()), DiagnosisSettings())
+    return prepare(Logs(session()), Recipe())
 
 
 @pytest.fixture(scope="module")
