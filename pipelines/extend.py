@@ -38,7 +38,7 @@ from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
 from pipelines.model.named_cause import refuse_unknown, wanted_cause
-from pipelines.model.rows.families import Wanted
+from pipelines.model.rows.families import Wanted, place_of
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, prepare
 from pipelines.report.extension_report import extension_report
@@ -130,7 +130,7 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),
-        notes=(f"fitted by rrrid extend, with {', '.join(_place(one.cause, one.joint) for one in found.findings)}",
+        notes=(f"fitted by rrrid extend, with {', '.join(place_of(one.cause, one.joint) for one in found.findings)}",
                *fewer_words(found.fewer)))
     return Extension(
         accepted=not found.rejected, causes=tuple(dict.fromkeys(one.place for one in wanted)), findings=found.findings,
@@ -145,10 +145,6 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
 def _each(wanted: Sequence[Wanted]) -> tuple[Wanted, ...]:
     """Each once; a place has all the starts that were given there, of the model before and of the user."""
     return tuple({(one.place, *sorted(one.start.items())): one for one in wanted}.values())
-
-
-def _place(cause: str, joint: int | None) -> str:
-    return cause if joint is None else f"{cause}:{joint}"
 
 
 def _kept(arm: Arm | None) -> list[Wanted]:
@@ -222,11 +218,11 @@ def _other_model(result: Extension, folder: Path) -> tuple[str, ...]:
     What was asked for and refused is in neither of the two, and does not count.
     """
     try:
-        earlier = tuple(_place(one["cause"], one["joint"])
+        earlier = tuple(place_of(one["cause"], one["joint"])
                         for one in json.loads((folder / "result.json").read_text(encoding="utf-8"))["findings"])
     except (OSError, ValueError, KeyError, TypeError):
         return ()
-    now = (_place(one.cause, one.joint) for one in result.findings)
+    now = (place_of(one.cause, one.joint) for one in result.findings)
     anew = result.model is not None and sorted(earlier) == sorted(now)
     return () if anew or not (folder / "model.json").is_file() else earlier
 

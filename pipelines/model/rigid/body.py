@@ -37,16 +37,15 @@ class Motion:
 
         It is not to be written to. Slopes by differences ask for the same torque once a number.
         """
-        for entry in tuple(self._kept):
-            if len(entry[0]) == len(key) and all(a is b for a, b in zip(key, entry[0], strict=True)):
-                self._kept.remove(entry)
-                break
-        else:
-            entry = key, work()
-            entry[1].flags.writeable = False
-        self._kept.insert(0, entry)
+        for place, (known, torque) in enumerate(self._kept):
+            if len(known) == len(key) and all(a is b for a, b in zip(key, known, strict=True)):
+                self._kept.insert(0, self._kept.pop(place))
+                return torque
+        torque = work()
+        torque.flags.writeable = False
+        self._kept.insert(0, (key, torque))
         del self._kept[_KEPT:]
-        return entry[1]
+        return torque
 
 
 @dataclass(frozen=True)
