@@ -17,6 +17,7 @@ from pipelines.log.robot import LinkParameters, RobotDescription
 from pipelines.model.rigid import rrr_kinematics
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, BaseParameter, TorqueParts, refuse_other_length, refuse_other_shapes
+from pipelines.model.rigid.chain import regressor
 
 __all__ = ["ACTING", "RRR", "fits"]
 
@@ -77,9 +78,10 @@ class RRR:
         general = BaseArm(self.robot)
         rng = np.random.default_rng(_SEED)
         states = rng.uniform(-3.0, 3.0, (_STATES, 3)), *rng.normal(size=(2, _STATES, 3))
-        ours, theirs = (body.regressor(*states).reshape(-1, 15) for body in (self, general))
-        chosen = np.linalg.lstsq(ours, theirs, rcond=None)[0]
-        chosen[np.abs(chosen) < _TINY] = 0.0
+        ours, links = self.regressor(*states), regressor(general.chain, *states)
+        found = np.linalg.lstsq(ours.reshape(-1, 15), links.reshape(-1, 30), rcond=None)[0]
+        found[np.abs(found) < _TINY] = 0.0
+        chosen = found[:, list(general.base.chosen)]
         return np.asarray(general.links_behind @ np.linalg.inv(chosen))
 
     def tip(self, q: Array) -> Array:
