@@ -18,13 +18,13 @@ import numpy as np
 
 from pipelines import diagnose
 from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.decision import facts, nominal_estimate
 from pipelines.errors import RrridError
-from pipelines.model.diagnosis.answered.judgeable import facts, nominal_estimate
-from pipelines.model.diagnosis.asked.gates import logs_of_roles
-from pipelines.model.diagnosis.asked.inputs import prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
+from pipelines.estimation.checks.gates import logs_of_roles
 from pipelines.model.estimation.judgeable import Facts, JudgeableConfig, cannot_judge
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.rows.friction_terms import with_terms_told_apart
+from pipelines.model.rows.prepare import prepare
 from pipelines.stage import Request
 
 __all__ = ["asked", "decided", "main"]
@@ -58,7 +58,7 @@ def asked(folder: Path) -> dict[str, Any]:
     except RrridError as refused:
         return {"refused": f"{refused.code}: {refused.message}"}
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
-    rows = DiagnosisSettings(cutoff_hz=DiagnosisConfig.cutoff_hz)
+    rows = Recipe(cutoff_hz=DiagnosisConfig.cutoff_hz)
     prepared = with_terms_told_apart(prepare(chosen, rows), settings.blocks)
     known = facts(found, prepared, nominal_estimate(prepared))
     return {"verdict": found.verdict, "origin": found.noise_floor_origin,

@@ -27,16 +27,16 @@ from pipelines.diagnosis.trained import Standing, train
 from pipelines.import_log import STAGE, Settings
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.rows.data import Data
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.rows.data import Data
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from pipelines.stage import Request, run_stage
 
 __all__ = ["TX40", "Judged", "Step", "fold", "imported", "judged_odrive", "judged_tx40", "main", "searched"]
 
-TX40 = DiagnosisSettings(cutoff_hz=100.0, decimation=100, min_speed=(0.05, 0.05, 0.05, 0.12, 0.12, 0.12))
+TX40 = Recipe(cutoff_hz=100.0, decimation=100, min_speed=(0.05, 0.05, 0.05, 0.12, 0.12, 0.12))
 _TX40_CAUSES = 8  # at most
-_ODRIVE = DiagnosisSettings(cutoff_hz=40.0)
+_ODRIVE = Recipe(cutoff_hz=40.0)
 _ODRIVE_CAUSES = 9
 _FOLDS = 10  # unused where other rows judge
 _GUARD = 1  # rows to either side of a held-out block: the low-pass reaches half a row
@@ -84,7 +84,7 @@ def fold(data: Data, number: int, count: int) -> tuple[Data, Data]:
 
 
 def searched(
-    prepared: Prepared, settings: DiagnosisSettings, most: int, exclude: Sequence[str] = ()
+    prepared: Prepared, settings: Recipe, most: int, exclude: Sequence[str] = ()
 ) -> Look:
     """Return what `diagnose` finds without reference logs, `most` causes at most."""
     usual = DiagnosisConfig()
@@ -110,7 +110,7 @@ def place(cause: str, joint: int | None) -> str:
     return cause if joint is None else f"{cause}:{joint}"
 
 
-def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: DiagnosisSettings = TX40) -> list[Judged]:
+def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: Recipe = TX40) -> list[Judged]:
     """Blocks `numbers` of `count`, each judged by a search that never saw it."""
     prepared = prepare(Logs.by_role(tuple(imported("tx40", data).values())), settings)
     out = []
@@ -126,7 +126,7 @@ def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: Diagno
     return out
 
 
-def judged_odrive(data: Path, settings: DiagnosisSettings = _ODRIVE) -> tuple[Look, list[Judged]]:
+def judged_odrive(data: Path, settings: Recipe = _ODRIVE) -> tuple[Look, list[Judged]]:
     """The search on two runs, judged on the others, none of which it saw."""
     logs = imported("odrive", data)
     begin = time.process_time()

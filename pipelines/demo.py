@@ -13,11 +13,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from pipelines.diagnosis.result import Diagnosis, NotIdentifiable
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.results import NOT_STORED
-from pipelines.model.diagnosis.result import Diagnosis, NotIdentifiable
 from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
 from pipelines.report.diagnosis_words import in_order, named, spoken, told_values, without_keys

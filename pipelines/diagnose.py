@@ -17,18 +17,16 @@ from pathlib import Path
 from pipelines.diagnosis.answer import answer
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
+from pipelines.diagnosis.result import Diagnosis, Extended, Result
 from pipelines.errors import Check, UsageError
+from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.answered.outcome import Result
-from pipelines.model.diagnosis.asked.gates import examined, logs_of_roles
-from pipelines.model.diagnosis.asked.inputs import Logs, prepare
-from pipelines.model.diagnosis.asked.settings import BLOCKS, DiagnosisSettings
-from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
-from pipelines.model.diagnosis.result import Diagnosis
-from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
+from pipelines.model.estimation.logs import Recipe
 from pipelines.model.named_cause import refuse_unknown
+from pipelines.model.rows.friction_terms import with_terms_told_apart
+from pipelines.model.rows.prepare import BLOCKS, Logs, prepare
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
@@ -132,7 +130,7 @@ def _diagnosed(logs: Logs, settings: Settings, given: Material, whole: bool) -> 
     """Return the causes, each joint and cause in one Gaussian model of reference logs and later ones."""
     usual = DiagnosisConfig()
     config = replace(usual, causes=settings.max_causes, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
-    rows = DiagnosisSettings(config.cutoff_hz, settings.decimate, settings.min_speed)
+    rows = Recipe(cutoff_hz=config.cutoff_hz, decimation=settings.decimate, min_speed=settings.min_speed)
     prepared = with_terms_told_apart(prepare(logs, rows, given.arm), settings.blocks)
     given.tell("comparing with the reference logs" if logs.reference else "looking for causes")
     found = diagnose_prepared(prepared, config, settings.exclude)

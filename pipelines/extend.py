@@ -21,28 +21,26 @@ from pathlib import Path
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.extension import extend
+from pipelines.diagnosis.result import Extended, Extension
+from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.errors import NothingMatched, UsageError
+from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.log.canonical import digest_of
 from pipelines.log.derive import derive, recording
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
 from pipelines.log.model_file import Source, read_model, write_model
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.asked.gates import examined, logs_of_roles
-from pipelines.model.diagnosis.asked.inputs import prepare
-from pipelines.model.diagnosis.asked.settings import BLOCKS, DiagnosisSettings
-from pipelines.model.diagnosis.given.terms_apart import with_terms_told_apart
-from pipelines.model.diagnosis.screened.wanted import Wanted
-from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
-from pipelines.model.estimation.logs import Motions
+from pipelines.model.estimation.logs import Motions, Recipe
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
 from pipelines.model.named_cause import refuse_unknown, wanted_cause
+from pipelines.model.rows.families import Wanted, place_of
+from pipelines.model.rows.friction_terms import with_terms_told_apart
+from pipelines.model.rows.prepare import BLOCKS, prepare
 from pipelines.report.extension_report import extension_report
 from pipelines.report.model_words import fewer_words
 from pipelines.report.report import Report
@@ -125,14 +123,14 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     if found is None:
         usual = DiagnosisConfig()
         config = replace(usual, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
-        rows = DiagnosisSettings(config.cutoff_hz, settings.decimate, settings.min_speed)
+        rows = Recipe(cutoff_hz=config.cutoff_hz, decimation=settings.decimate, min_speed=settings.min_speed)
         prepared = with_terms_told_apart(prepare(chosen, rows, given.arm), settings.blocks)
         given.tell(f"fitting {', '.join(dict.fromkeys(one.place for one in wanted))}")
         found = extend(prepared, _each(wanted), config, settings.blocks)
     name = chosen.identify[0].robot_name
     model = None if found.arm is None else replace(found.arm, name=name).to_model(
         validity=validity(found.motions[:found.fitted]), sources=_sources(found.motions),
-        notes=(f"fitted by rrrid extend, with {', '.join(_place(one.cause, one.joint) for one in found.findings)}",
+        notes=(f"fitted by rrrid extend, with {', '.join(place_of(one.cause, one.joint) for one in found.findings)}",
                *fewer_words(found.fewer)))
     return Extension(
         accepted=not found.rejected, causes=tuple(dict.fromkeys(one.place for one in wanted)), findings=found.findings,
@@ -147,10 +145,6 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
 def _each(wanted: Sequence[Wanted]) -> tuple[Wanted, ...]:
     """Each once; a place has all the starts that were given there, of the model before and of the user."""
     return tuple({(one.place, *sorted(one.start.items())): one for one in wanted}.values())
-
-
-def _place(cause: str, joint: int | None) -> str:
-    return cause if joint is None else f"{cause}:{joint}"
 
 
 def _kept(arm: Arm | None) -> list[Wanted]:
@@ -224,11 +218,11 @@ def _other_model(result: Extension, folder: Path) -> tuple[str, ...]:
     What was asked for and refused is in neither of the two, and does not count.
     """
     try:
-        earlier = tuple(_place(one["cause"], one["joint"])
+        earlier = tuple(place_of(one["cause"], one["joint"])
                         for one in json.loads((folder / "result.json").read_text(encoding="utf-8"))["findings"])
     except (OSError, ValueError, KeyError, TypeError):
         return ()
-    now = (_place(one.cause, one.joint) for one in result.findings)
+    now = (place_of(one.cause, one.joint) for one in result.findings)
     anew = result.model is not None and sorted(earlier) == sorted(now)
     return () if anew or not (folder / "model.json").is_file() else earlier
 

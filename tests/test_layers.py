@@ -19,8 +19,9 @@ LAYERS = {
     "pipelines.model.rigid": 3,
     "pipelines.model.effects": 4,
     "pipelines.model": 5,
-    "pipelines.estimation": 6,  # what is checked before any model is fitted
-    "pipelines.model.estimation.result": 7, "pipelines.model.diagnosis": 8, "pipelines.diagnosis": 9,
+    "pipelines.model.rows": 6,
+    "pipelines.estimation": 7,  # what is checked before any model is fitted
+    "pipelines.model.estimation.result": 8, "pipelines.diagnosis": 9,
     "pipelines.report": 10,
     "pipelines.stage": 11,
     "pipelines.recall": 12,  # what a run may take back of its stages
@@ -31,9 +32,6 @@ LAYERS = {
     "rrrid_cli": 15,
 }
 CALL_STAGES = {"pipelines.run"}
-WITHIN = "pipelines.model.diagnosis"
-# Its folders, and the modules beside them, from the bottom up.
-DIAGNOSIS = ("rows", "fitted", "asked", "screened", "result", "worth", "given", "answered")
 # Of the effects, all that one of them may import.
 CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".fast", ".kinds", ".placed", ".terms")}
 DOORS = {
@@ -127,35 +125,6 @@ def test_the_rule_can_be_broken() -> None:
                              ("pipelines.report.render", "pipelines.stage")):
         assert imported in MODULES
         assert _breaches(module, {imported}) == [f"{module} imports {imported}"]
-
-
-def _place(module: str) -> str:
-    """Where in the diagnosis a module is: its folder, or itself where it is in none; "" for a module of something else."""
-    return module.removeprefix(f"{WITHIN}.").partition(".")[0] if module.startswith(f"{WITHIN}.") else ""
-
-
-def _upwards(module: str, imported: set[str]) -> list[str]:
-    """What of `imported` stands higher in the diagnosis than the module, which is in it."""
-    return sorted(f"{module} imports {name}" for name in imported & set(MODULES)
-                  if _place(name) and DIAGNOSIS.index(_place(name)) > DIAGNOSIS.index(_place(module)))
-
-
-def test_the_diagnosis_stands_on_its_lower_folders() -> None:
-    """Each folder of it imports only itself and what is named before it, without exception."""
-    inside = [module for module in MODULES if _place(module)]
-    assert {_place(module) for module in inside} == set(DIAGNOSIS)
-    assert [wrong for module in inside for wrong in _upwards(module, _imports(MODULES[module]))] == []
-
-
-def test_the_order_of_the_diagnosis_can_be_broken() -> None:
-    """A folder above is seen, and a module above, from a folder and from a module; the own folder and those below are allowed."""
-    for module, imported in (("rows.data", "fitted.nominal"), ("fitted.nominal", "given.compliance"),
-                             ("fitted.nominal", "result"), ("result", "worth.gains"), ("worth.gains", "answered.words")):
-        above, below = f"{WITHIN}.{imported}", f"{WITHIN}.{module}"
-        assert {above, below} <= set(MODULES)
-        assert _upwards(below, {above}) == [f"{below} imports {above}"]
-        assert _upwards(above, {below, "pipelines.model.arm"}) == []
-    assert _upwards(f"{WITHIN}.rows.data", {f"{WITHIN}.rows.kept", WITHIN}) == []
 
 
 def test_each_library_has_one_door() -> None:

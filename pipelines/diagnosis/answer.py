@@ -12,7 +12,10 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.diagnosis.candidates import Key
+from pipelines.diagnosis.compliance import gaps_untold, untold
+from pipelines.diagnosis.decision import limited_by_estimate
 from pipelines.diagnosis.engine import Diagnosis as Found
+from pipelines.diagnosis.figures import evidence, with_simulation
 from pipelines.diagnosis.findings import (
     Worth,
     alternatives_of,
@@ -20,19 +23,10 @@ from pipelines.diagnosis.findings import (
     findings_of,
     weigh,
 )
-from pipelines.diagnosis.limits import Limits, limits_of
-from pipelines.diagnosis.screening import best_of
-from pipelines.diagnosis.selection import Candidate, Cause
-from pipelines.diagnosis.standing import standing_of
-from pipelines.diagnosis.trained import Trained, train
-from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.answered.judgeable import limited_by_estimate
-from pipelines.model.diagnosis.answered.without_limit import without_limit
-from pipelines.model.diagnosis.answered.words import beside, how_much, taken_in, where
-from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.given.compliance import gaps_untold, untold
-from pipelines.model.diagnosis.result import (
+from pipelines.diagnosis.limits import Limits, limits_of, without_limit
+from pipelines.diagnosis.result import (
     Diagnosis,
+    Extended,
     Finding,
     Rejected,
     Threshold,
@@ -40,12 +34,15 @@ from pipelines.model.diagnosis.result import (
     Value,
     Verdict,
 )
-from pipelines.model.diagnosis.screened.candidates import place_of
-from pipelines.model.diagnosis.worth.evidence import evidence
-from pipelines.model.diagnosis.worth.extended import Extended
-from pipelines.model.diagnosis.worth.gains import worse_log
-from pipelines.model.diagnosis.worth.numbers import told
-from pipelines.model.diagnosis.worth.simulated import as_simulated, with_simulation
+from pipelines.diagnosis.screening import best_of
+from pipelines.diagnosis.selection import Candidate, Cause
+from pipelines.diagnosis.standing import standing_of
+from pipelines.diagnosis.trained import Trained, told, train
+from pipelines.diagnosis.words import beside, how_much, taken_in, where
+from pipelines.model.arm import Acting
+from pipelines.model.rows.families import place_of
+from pipelines.model.rows.fit import worse_log
+from pipelines.model.rows.prepare import Prepared
 from pipelines.model.words import within
 
 __all__ = ["WEAKER", "answer"]
@@ -122,8 +119,8 @@ def answer(
         trained.arm(last),
         fewer_terms=prepared.fewer,
     )
-    followed = as_simulated((worth.simulated[0], worth.simulated[last]))
-    told_of = limited_by_estimate(with_simulation(told_of, followed), prepared)
+    told_of = with_simulation(told_of, worth.simulated[0], worth.simulated[last])
+    told_of = limited_by_estimate(told_of, prepared)
     if whole:
         unsized = without_limit(told_of, bool(prepared.logs.frf), exclude)
         told_of = replace(told_of, without_limit=unsized)

@@ -12,14 +12,13 @@ from math import comb
 
 import numpy as np
 
-from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.score import chi2_bound, upper_point
 from pipelines.diagnosis.screening import Screened, best_of, screen
-from pipelines.diagnosis.table import Array, Parts, Table
+from pipelines.diagnosis.table import Array, Arrow, Parts, Structure, Table
 
 __all__ = ["Baseline", "baseline"]
 

@@ -23,15 +23,10 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.screened.candidates import (
-    Family,
-    families,
-    lay_family,
-    whole_motion,
-)
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import everywhere
 from pipelines.model.rigid.body import Motion
+from pipelines.model.rows.families import Family, families, lay_family, whole_motion
 
 __all__ = ["FORM", "Dictionary", "Group", "Key", "Kind"]
 

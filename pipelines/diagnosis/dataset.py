@@ -20,20 +20,13 @@ from pipelines.diagnosis.table import Array, Indices, Table, by_joint
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.fitted.exact import Exact
-from pipelines.model.diagnosis.fitted.nominal import (
-    fit_columns,
-    fit_nominal,
-    rows_of,
-)
-from pipelines.model.diagnosis.fitted.slopes import further_slopes
-from pipelines.model.diagnosis.rows.data import Data
-from pipelines.model.diagnosis.rows.kept import Kept
-from pipelines.model.diagnosis.rows.whitening import Whitening
 from pipelines.model.effects.fast import mixing
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
+from pipelines.model.rows.data import Data, Kept, Whitening
+from pipelines.model.rows.exact import Exact, further_slopes
+from pipelines.model.rows.nominal import fit_columns, fit_nominal, rows_of
+from pipelines.model.rows.prepare import Prepared
 
 __all__ = ["Dataset", "Rows", "load"]
 

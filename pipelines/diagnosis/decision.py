@@ -1,20 +1,96 @@
-"""Decide: a cause, none, or unknown."""
+"""Decide: a cause, none, unknown, or that the logs cannot show it.
+
+    decision = decide(later, selection, baseline, config)
+    result = limited_by_estimate(result, prepared)         the verdict "cannot-judge"
+    common, differing = Repeated.of(data).parts(left)      what is noise, and what is not
+
+Noise is what differs between two rows of one state. With a residual r = f(q, dq, ddq) + e of a
+model error f and noise e, independent in both rows,
+
+    E ¼ (r₁ - r₂)² = ½ σ²        E ¼ (r₁ + r₂)² = ½ σ² + f²
+
+(Rice 1984, difference-based variance). Rows of periods that come again are such pairs, declared or
+not, within a log or between two. Where states differ a little, σ² is too large, not too small.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.result import Diagnosis
 from pipelines.diagnosis.selection import Cause, Selection
 from pipelines.diagnosis.table import Array
-from pipelines.model.diagnosis.rows.repeated import Repeated
+from pipelines.model.arm import Arm
+from pipelines.model.estimation.estimate import Estimate, estimate
+from pipelines.model.estimation.judgeable import Facts, cannot_judge, predicted_std, unresolved
+from pipelines.model.estimation.negative_viscous import negative_viscous
+from pipelines.model.estimation.regression import Columns, LogEquations
+from pipelines.model.rows.data import Data
+from pipelines.model.rows.nominal import fit_nominal
+from pipelines.model.rows.prepare import Prepared
+from pipelines.signal.neighbours import nearest_pairs
 
-__all__ = ["Decision", "decide"]
+__all__ = ["Decision", "Repeated", "decide", "facts", "limited_by_estimate", "nominal_estimate"]
+
+_STILL = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²; m, m/s, m/s²] less motion is noise
+_NEAR = 0.1  # of the standard deviation of each coordinate: rows of one state
+_APART = 1.0  # [s] in a log, at least: after less, what wanders is still where it was
+_OTHER_LOG = 1e9  # numerics: [s] between the clocks of two logs
+_FEWEST = 100  # numerics: pairs of a joint; fewer say little
+
+
+@dataclass(frozen=True, eq=False)
+class Repeated:
+    """Pairs of rows of one state; no row is in two of them."""
+
+    data: Data
+    first: npt.NDArray[np.intp]  # (pairs,) among the rows of all logs, one joint
+    second: npt.NDArray[np.intp]
+
+    @classmethod
+    def of(cls, data: Data) -> Repeated:
+        """Return the pairs, nearest first."""
+        logs = []
+        for one in data.logs:
+            scaled = zip((one.motion.q, one.motion.dq, one.motion.ddq), _STILL, strict=True)
+            logs.append(np.hstack([one.at_rows(x) / least for x, least in scaled]))
+        log = np.repeat(np.arange(len(logs)), [len(own) for own in logs])
+        time = np.concatenate([one.t for one in data.logs]) + _OTHER_LOG * log
+        return cls(data, *nearest_pairs(np.vstack(logs), time, _NEAR, _APART))
+
+    @property
+    def count(self) -> Array:
+        """(joints,) pairs that count."""
+        return np.asarray(self._counts.sum(axis=1), dtype=np.float64)
+
+    def parts(self, left: Array) -> tuple[Array, Array]:
+        """Return the mean squares of what pairs of a residual (rows,) share, and of the rest."""
+        one, other = (self._laid(left)[:, at] for at in (self.first, self.second))
+        counts, number = self._counts, np.where(self.count < _FEWEST, np.nan, self.count)
+        both = (one + other, one - other)
+        return tuple(np.square(0.5 * x).sum(axis=1, where=counts) / number for x in both)
+
+    def noise(self, left: Array) -> Array:
+        """Return the variance (joints,) of a residual's noise; NaN of too few pairs."""
+        return 2.0 * self.parts(left)[1]
+
+    @property
+    def _counts(self) -> npt.NDArray[np.bool_]:
+        """(joints, pairs)"""
+        weighed = np.concatenate([one.weighed for one in self.data.logs], axis=1)
+        return np.asarray(weighed[:, self.first] & weighed[:, self.second])
+
+    def _laid(self, x: Array) -> Array:
+        """(rows,) -> (joints, rows of one joint)"""
+        return np.concatenate(list(self.data.split(x)), axis=1)
 
 
 @dataclass(frozen=True)
@@ -199,3 +275,66 @@ def _followed(
             taken[joint - 1] = one.gain
             told.append(f"{share:.1%} of the torque of joint {joint} follows {name}:{joint}")
     return taken, tuple(told)
+
+
+_ABOVE = 1.6  # times the noise between rows of one state: a smaller residual is noise
+
+
+def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
+    """Return the diagnosis, "cannot-judge" where its logs cannot show that nothing is wrong.
+
+    An estimate is made only for that verdict, and where viscous friction of the nominal model is
+    negative: its check is added then.
+    """
+    nothing = found.verdict == "no-fault-found"
+    if not nothing and not _negative(found.nominal):
+        return found
+    estimated = nominal_estimate(prepared)
+    found = replace(found, checks=negative_viscous(estimated, prepared.logs.identify[0].robot_name))
+    why = cannot_judge(facts(found, prepared, estimated)) if nothing else ""
+    if not why:
+        return found
+    return replace(
+        found,
+        verdict="cannot-judge",
+        reason=why,
+        summary=f"Whether anything is wrong with this arm cannot be judged: {why}.",
+    )
+
+
+def nominal_estimate(prepared: Prepared) -> Estimate:
+    """Return the nominal model as `estimate-bps` fits it, on the rows of a diagnosis."""
+    return estimate(_equations(prepared.data, prepared.columns), prepared.columns)
+
+
+def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
+    """Return the errors of the nominal model on held-out motion, and the state of its floor."""
+    judge = prepared.data if prepared.judge is None else prepared.judge
+    left = found.residual_rms.validate
+    known = np.full(len(left), found.noise_floor_origin != "blocks")
+    if not known.all():
+        known = left <= _ABOVE * _noise(prepared)
+    return Facts(
+        left,
+        judge.rms(judge.y),
+        predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns))),
+        unresolved(estimated),
+        known,
+    )
+
+
+def _noise(prepared: Prepared) -> Array:
+    """Return the noise (joints,) [N m] of the residual by rows of one state; 0 without any."""
+    _, fit = fit_nominal(prepared.data, prepared.columns)
+    return np.sqrt(np.nan_to_num(Repeated.of(prepared.data).noise(fit.left)))
+
+
+def _equations(data: Data, columns: Columns) -> list[LogEquations]:
+    """Return the equations of each log in `columns`; rows may hold more terms of a friction law."""
+    return [replace(log.equations, columns=columns) for log in data.logs]
+
+
+def _negative(arm: Arm | None) -> bool:
+    """Return whether viscous friction of any joint is negative."""
+    laws = () if arm is None else arm.friction
+    return any(law.effect.name == "viscous" and law.values["coefficient"] < 0.0 for law in laws)

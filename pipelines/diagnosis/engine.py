@@ -9,6 +9,7 @@ import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline, baseline
 from pipelines.diagnosis.candidates import Dictionary
+from pipelines.diagnosis.compliance import Compliance, compliance, new_causes
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows, load
 from pipelines.diagnosis.decision import Decision, decide
@@ -19,10 +20,9 @@ from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.fitted.exact import Exact
-from pipelines.model.diagnosis.given.compliance import Compliance, compliance, new_causes
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
@@ -96,7 +96,7 @@ def diagnose(
         InputRejected: as `prepare`, logs that give no rows.
     """
     config = config or DiagnosisConfig()
-    prepared = prepare(Logs.by_role(logs), DiagnosisSettings(cutoff_hz=config.cutoff_hz))
+    prepared = prepare(Logs.by_role(logs), Recipe(cutoff_hz=config.cutoff_hz))
     return diagnose_prepared(prepared, config, exclude)
 
 

@@ -13,21 +13,20 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from pipelines.diagnosis.compliance import compliance
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import pose
 from pipelines.diagnosis.findings import Worth, extension_of, findings_of, weigh
 from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.result import Extended, Rejected
 from pipelines.diagnosis.screening import best_of
 from pipelines.diagnosis.selection import Candidate, refit
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import train
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.given.compliance import compliance
-from pipelines.model.diagnosis.result import Rejected
-from pipelines.model.diagnosis.screened.wanted import Wanted, usable
-from pipelines.model.diagnosis.worth.extended import Extended
-from pipelines.model.diagnosis.worth.gains import worse_log
+from pipelines.model.rows.families import Wanted, usable
+from pipelines.model.rows.fit import worse_log
+from pipelines.model.rows.prepare import Prepared
 from pipelines.model.words import plain_number
 
 __all__ = ["extend"]

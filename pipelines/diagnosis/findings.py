@@ -12,27 +12,45 @@ from typing import Literal
 
 import numpy as np
 
+from pipelines.diagnosis.compliance import Compliance
+from pipelines.diagnosis.figures import proof
 from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.result import (
+    Alternative,
+    Answer,
+    BeforeAfter,
+    Extended,
+    Finding,
+    Gain,
+    Proof,
+    ResidualRms,
+    TipError,
+)
+from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.selection import Round
 from pipelines.diagnosis.table import Array
-from pipelines.diagnosis.trained import Standing, Trained, covariance
+from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.asked.inputs import Prepared
-from pipelines.model.diagnosis.fitted.refit import Refined
-from pipelines.model.diagnosis.given.compliance import Compliance
-from pipelines.model.diagnosis.result import Alternative, Answer, Finding, Gain, Proof, ResidualRms
-from pipelines.model.diagnosis.result import Standing as Told
-from pipelines.model.diagnosis.worth.extended import Extended
-from pipelines.model.diagnosis.worth.gains import (
+from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
+from pipelines.model.rows.prepare import Prepared
+from pipelines.model.simulation.comparison import (
     Simulation,
-    gain_of,
     simulation_errors,
-    torque_gain_of,
 )
-from pipelines.model.diagnosis.worth.numbers import parameters
-from pipelines.model.diagnosis.worth.proof import proof
 
-__all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "weigh"]
+__all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "gain_of", "weigh"]
+
+
+def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
+    """Return the gain; without position and tip where one of the two was not simulated."""
+    known = "none" not in (before.how, after.how)
+    return Gain(
+        torque,
+        BeforeAfter(before.position_rms, after.position_rms) if known else None,
+        after.how if known else "none",
+        TipError(before.tip_rms, after.tip_rms) if known else None,
+        after.span if known else (),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,6 +1,7 @@
 """Compute detection limits in closed form, and list causes that are not identifiable.
 
     limits = limits_of(later, state, baseline)
+    causes = without_limit(result, frf)            those that no list of the result has
 
 A cause of amplitude a adds a² h to T_c, h its share of H_c (`screening`). It is found with
 95 % where
@@ -15,7 +16,7 @@ Of shapes that differ, an order say, the limit is that of one that a quarter of 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,11 +24,20 @@ import numpy as np
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group, Key
 from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.result import (
+    DetectionLimit,
+    Diagnosis,
+    NotIdentifiable,
+    Value,
+    WithoutLimit,
+)
 from pipelines.diagnosis.table import Array
-from pipelines.model.diagnosis.result import DetectionLimit, NotIdentifiable, Value
+from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, Quantity
+from pipelines.model.effects.kinds import FrictionLaw
+from pipelines.model.friction.laws import LADDER
 
-__all__ = ["Limits", "limits_of"]
+__all__ = ["Limits", "limits_of", "without_limit"]
 
 _SIDE = 1.65  # normal deviate of 95 %, one-sided
 _QUARTER = 0.25  # of the shapes of a cause, that may be seen worse than its limit says
@@ -170,3 +180,61 @@ def _hiding(later: Later, one: _Shape) -> str:
     return ", ".join(n for n, x in zip(names, share, strict=True) if x > _MAIN) or (
         "all base parameters together"
     )
+
+
+_NOMINAL = "it is part of the nominal model, whose friction is fitted to these logs"
+_LAW = (
+    "it is another law of friction for the nominal model, and no fault: "
+    "fit-friction chooses among the laws"
+)
+_RESPONSES = (
+    "the frequency responses show none at the joints that they are of, "
+    "below the highest frequency that they excite"
+)
+_STILL = "the base parameters are not found to have moved since the reference logs as it moves them"
+_NOT_ASKED = "it was looked for; no detection limit was computed"
+
+
+def without_limit(
+    told: Diagnosis, frf: bool, without: Collection[str] = ()
+) -> tuple[WithoutLimit, ...]:
+    """Return every cause that none of the other lists has, with what is known of it.
+
+    Without laws that are only the plainer form of another, unless the nominal model has them.
+
+    Args:
+        frf: whether there are frequency responses.
+        without: names of causes that were left out.
+    """
+    lists = (told.findings, told.baseline_effects, told.detection_limits, told.not_identifiable)
+    there = {one.cause for some in lists for one in some}
+    laws = set() if told.nominal is None else {law.effect.name for law in told.nominal.friction}
+    refused = {one.cause: one.reason for one in told.rejected}
+    return tuple(
+        WithoutLimit(
+            kind.name,
+            f"rejected: {refused[kind.name]}" if kind.name in refused else _seen(kind, laws, frf),
+        )
+        for kind in all_effects()
+        if kind.name not in there | _stand_ins() - laws and kind.name not in without
+    )
+
+
+def _stand_ins() -> set[str]:
+    """Laws that are the plainer form of another, and on no rung of the ladder of fit-friction."""
+    plainer = {
+        name
+        for kind in all_effects()
+        if issubclass(kind, FrictionLaw)
+        for names in kind.plainer
+        for name in names
+    }
+    return plainer - {name for law in LADDER for name in law.members}
+
+
+def _seen(kind: type[Effect], laws: Collection[str], frf: bool) -> str:
+    if kind.name in laws:
+        return _NOMINAL
+    if kind.evidence == "frequency responses" and frf:
+        return _RESPONSES
+    return {"none": _LAW, "base parameters": _STILL}.get(kind.evidence, _NOT_ASKED)

@@ -13,17 +13,15 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.diagnosis.arrow import Arrow
-from pipelines.diagnosis.belief import RIDGE, Belief
 from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.prior import Prior
+from pipelines.diagnosis.prior import RIDGE, Belief, Prior
 from pipelines.diagnosis.screening import Screened, price, screen
-from pipelines.diagnosis.table import Array, Indices, Table
-from pipelines.model.diagnosis.fitted.exact import Exact
+from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.rigid.orders import NEARLY
+from pipelines.model.rows.exact import Exact
 
 __all__ = ["Later", "State"]
 

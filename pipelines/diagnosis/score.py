@@ -22,9 +22,8 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.table import Array, Indices, Table
+from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 
 __all__ = [
     "Blocks",

@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.diagnosis.arrow import Arrow
 from pipelines.diagnosis.candidates import Group, Key
-from pipelines.diagnosis.table import Array
+from pipelines.diagnosis.table import Array, Arrow
 
 __all__ = ["Screened", "best_of", "price", "screen"]
 

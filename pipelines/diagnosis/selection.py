@@ -21,9 +21,9 @@ from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.fitted.exact import Exact
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
+from pipelines.model.rows.exact import Exact
 
 __all__ = ["Candidate", "Cause", "Round", "Selection", "refit", "select"]
 

@@ -16,13 +16,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.diagnosis.arrow import Arrow, Structure
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.events import best_window
 from pipelines.diagnosis.screening import best_of, screen
-from pipelines.diagnosis.table import Array, Indices, Table
+from pipelines.diagnosis.table import Array, Arrow, Indices, Structure, Table
 from pipelines.model.arm import Arm
 
 __all__ = ["Components", "components", "settle"]

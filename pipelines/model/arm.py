@@ -26,9 +26,6 @@ from pipelines.model.rigid.choose import rigid_body
 
 __all__ = ["Acting", "Arm", "ArmTorque"]
 
-# Torque without effects that was asked for last, by body, base, friction and motion: an effect's slopes ask for it once a number.
-_KEPT: list[tuple[str, tuple[object, ...], Array]] = []
-_KEEP = 16
 _ORDER = ("load", "encoder", "drive", "record")  # of `Effect.acts_on`, from the innermost to the outermost
 
 
@@ -146,18 +143,10 @@ class Arm:
         return self._kept("friction", motion, self._friction_torque)
 
     def _kept(self, kind: str, motion: Motion, work: Callable[[Motion], Array]) -> Array:
-        """What `work` makes of a motion that nobody writes to, made once as long as there is room."""
+        """Return what `work` makes of a motion, kept with it where its arrays are only read."""
         if any(x.flags.writeable for x in (motion.q, motion.dq, motion.ddq)):
             return work(motion)
-        key = (self.body, self.base, self.friction, motion)
-        for entry in tuple(_KEPT):
-            if entry[0] == kind and all(a is b for a, b in zip(key, entry[1], strict=True)):
-                return entry[2]
-        torque = work(motion)
-        torque.flags.writeable = False
-        _KEPT.append((kind, key, torque))
-        del _KEPT[:-_KEEP]
-        return torque
+        return motion.kept((kind, self.body, self.base, self.friction), lambda: work(motion))
 
     def _friction_torque(self, motion: Motion) -> Array:
         rigid = replace(self, friction=(), effects=())

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.diagnosis.result import Answer, Finding
+from pipelines.diagnosis.result import Answer, Finding
 from pipelines.report import style
 from pipelines.report.frf_figures import posture_words
 from pipelines.report.report import Figure

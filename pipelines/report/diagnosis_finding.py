@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipelines.diagnosis.result import Finding, Gain, ResidualRms
+from pipelines.diagnosis.words import of_any_size, taken_in, where
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.answered.words import of_any_size, taken_in, where
-from pipelines.model.diagnosis.result import Finding, Gain, ResidualRms
 from pipelines.model.effects import find_effect
 from pipelines.model.parameter_names import numbered
 from pipelines.report.diagnosis_answers import answer_figures

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipelines.diagnosis.result import Diagnosis, ResidualRms
 from pipelines.log.experiment import Array
-from pipelines.model.diagnosis.result import Diagnosis, ResidualRms
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Table
 from pipelines.report.style import format_number, to_one_place

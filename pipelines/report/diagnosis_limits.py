@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pipelines.model.diagnosis.result import DetectionLimit, Diagnosis, Value
+from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Value
 from pipelines.model.effects import find_effect
 from pipelines.report.diagnosis_words import spoken, title_of, told_value, unit_or_dash, without_keys
 from pipelines.report.report import Section, Table

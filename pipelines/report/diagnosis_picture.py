@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.diagnosis.result import Curve, Diagnosis, Evidence, Spectrum
+from pipelines.diagnosis.result import Curve, Diagnosis, Evidence, Spectrum
 from pipelines.report import style
 from pipelines.report.diagnosis_floor import floor_words
 from pipelines.report.figures import broken_at_gaps, draw_measured, draw_modelled, envelope, joint_axes, joint_size

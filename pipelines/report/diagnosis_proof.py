@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.diagnosis.result import Finding, Proof
+from pipelines.diagnosis.result import Finding, Proof
 from pipelines.report import style
 from pipelines.report.figures import broken_at_gaps
 from pipelines.report.joint_units import Units

@@ -8,9 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from pipelines.diagnosis.answer import WEAKER
-from pipelines.model.diagnosis.answered.outcome import Result
-from pipelines.model.diagnosis.answered.words import how_much, of_any_size, taken_in, where
-from pipelines.model.diagnosis.result import Finding, Rejected, Trial
+from pipelines.diagnosis.result import Finding, Rejected, Result, Trial
+from pipelines.diagnosis.words import how_much, of_any_size, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
 from pipelines.report.boundary_card import boundary_card

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from pipelines.model.diagnosis.answered.words import other_joint
-from pipelines.model.diagnosis.result import Finding, Rejected, Value
+from pipelines.diagnosis.result import Finding, Rejected, Value
+from pipelines.diagnosis.words import other_joint
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.parameter_names import numbered, part_of
 from pipelines.model.words import within

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from pipelines.model.diagnosis.result import RIVALS
 from pipelines.model.excitation.apart import Apart
 from pipelines.report.diagnosis_words import without_keys
 from pipelines.report.report import Section, Table
 from pipelines.report.style import format_number
 
 __all__ = ["alike_words", "apart_section", "are_rivals"]
+
+RIVALS = 0.8  # similarity from which two causes explain the same
 
 
 def are_rivals(found: Apart | None) -> bool:

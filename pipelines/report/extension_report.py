@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipelines.model.diagnosis.answered.outcome import Extension
+from pipelines.diagnosis.result import Extension
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_floor import held_out_words, judge_words, torque_errors
 from pipelines.report.diagnosis_words import named, title_of, together, without_keys

@@ -9,8 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Protocol
 
-from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.diagnosis.result import Diagnosis, Extension
 
 __all__ = ["Units", "each", "joined", "unit_of", "units_in"]
 

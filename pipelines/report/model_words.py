@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.asked.unasked import FewerTerms
+from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.model.effects import find_effect
 from pipelines.model.estimation.result import Result as Estimated
+from pipelines.model.rows.prepare import FewerTerms
 
 __all__ = ["fewer_words", "friction_words", "laws_words", "threshold_words"]
 

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain
+from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Gain
 from pipelines.model.estimation.result import Result as Estimate
 from pipelines.report import style
 from pipelines.report.diagnosis_words import together

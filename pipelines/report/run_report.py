@@ -5,11 +5,10 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterable, Sequence
 
+from pipelines.diagnosis.result import Diagnosis, Extension
+from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.errors import NothingMatched
 from pipelines.log.places import slug
-from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.answered.outcome import Result as Diagnosed
-from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.boundary_card import CARD, boundary_card
 from pipelines.report.joint_units import units_in
 from pipelines.report.report import Report, Section, Table, Tone

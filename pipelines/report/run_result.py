@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from pipelines.diagnosis.result import Diagnosis
 from pipelines.errors import Check
 from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.results import FLAT, NOT_STORED
-from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.report.report import Report
 
 __all__ = ["Result", "Step"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from pipelines.model.diagnosis.result import Finding, Gain, TipError
+from pipelines.diagnosis.result import Finding, Gain, TipError
 from pipelines.report.style import format_number
 
 __all__ = ["all_together", "span_words", "tip_change", "tip_worth"]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.blocks import impulse_toeplitz
 
-__all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "passed_both_ways",
+__all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "fast_length", "passed_both_ways",
            "thinned", "zero_phase"]
 
 Array = npt.NDArray[np.float64]
@@ -142,6 +142,13 @@ def centre_samples(x: Array) -> Array:
         # five samples minus Simpson: -1/180 of the fourth difference
         out[1:-1] -= (x[:-4] - 4.0 * x[1:-3] + 6.0 * x[2:-2] - 4.0 * x[3:-1] + x[4:]) * (1.0 / 180.0)
     return np.asarray(out)
+
+
+def fast_length(n: int) -> int:
+    """Return the smallest 2^a 3^b 5^c from n on: the length of a fast Fourier transform."""
+    from scipy.fft import next_fast_len
+
+    return int(next_fast_len(n, real=True))
 
 
 def passed_both_ways(frequency: Array, cutoff_hz: float, rate: float, order: int = 4) -> Array:

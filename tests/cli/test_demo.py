@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from pipelines import demo
+from pipelines.diagnosis.result import Diagnosis, Finding, NotIdentifiable, Value
 from pipelines.errors import InputRejected
 from pipelines.log.files import write_log
-from pipelines.model.diagnosis.result import Diagnosis, Finding, NotIdentifiable, Value
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.simulation.example import FAULT, example_arm, example_session
 from pipelines.stage import Request

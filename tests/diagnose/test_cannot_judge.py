@@ -13,14 +13,14 @@ import pytest
 
 from pipelines import diagnose
 from pipelines.diagnosis import engine
+from pipelines.diagnosis.result import Diagnosis
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import encode
-from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.rows.prepare import Logs
 from pipelines.stage import Request
 from tests.diagnose.sessions import but, healthy_again, session, written
+from tests.diagnosis.asking import answered
 from tests.healthy import fourier, make_log, with_signal
-from tests.model.diagnosis.asking import answered
 
 FEW = but("torque_offset", "torque_gain")
 

@@ -13,8 +13,8 @@ import pytest
 
 from pipelines import diagnose
 from pipelines.errors import InputRejected, NothingMatched
+from pipelines.estimation.checks.gates import examined
 from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.model.diagnosis.asked.gates import examined
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import session, written
 

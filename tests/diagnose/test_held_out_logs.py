@@ -8,13 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.diagnosis.result import Diagnosis
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.result import Diagnosis
 from pipelines.model.motion import Reconstruction, reconstruct
+from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but, session
-from tests.model.diagnosis.asking import answered
+from tests.diagnosis.asking import answered
 
 _HZ = 40.0
 

@@ -13,9 +13,9 @@ import pytest
 from benchmarks.recorded_diagnosis import Judged, imported, judged_odrive, judged_tx40, nested_error, payoff, searched
 from pipelines.diagnosis.selection import Selection
 from pipelines.log.hdf5 import read_parts
-from pipelines.model.diagnosis.asked.inputs import Logs, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from tests.model.diagnosis.asking import answered
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.rows.prepare import Logs, prepare
+from tests.diagnosis.asking import answered
 
 _FOLDS = 5
 _TORQUE_CONSTANT = 0.0551  # N m/A
@@ -115,6 +115,6 @@ def test_odrive_error_on_runs_that_chose_nothing(odrive: tuple[Selection, list[J
 def test_odrive_in_brief(shared: Path) -> None:
     """The two greatest causes, in the order of their size: the ripple of seven pole pairs, and the lag of the logged current."""
     logs = imported("odrive", shared / "real")
-    brief = DiagnosisSettings(cutoff_hz=40.0)
+    brief = Recipe(cutoff_hz=40.0)
     found = searched(prepare(Logs((logs["nocomp_0"],), ()), brief), brief, 2, ("contact", "presliding", "backlash"))
     assert names(found) == ["cogging", "torque_lag"]

@@ -12,12 +12,12 @@ from pipelines.bench import experiments
 from pipelines.bench.faults.cogging import Cogging
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
+from pipelines.diagnosis.result import Diagnosis
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
+from tests.diagnosis.asking import answered
 from tests.healthy import with_signal
-from tests.model.diagnosis.asking import answered
 
 JOINT = 2
 WANDER, FADES = 0.05, 0.1  # [N m] std, [s] in which the drive's zero forgets where it was

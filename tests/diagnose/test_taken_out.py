@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.diagnosis.result import Diagnosis
+from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but, session
-from tests.model.diagnosis.asking import answered
+from tests.diagnosis.asking import answered
 
 _LIBRARY = but("torque_offset", "stribeck")  # neither is like what is hidden here
 

@@ -10,11 +10,11 @@ import pytest
 from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.sessions import record_case
 from pipelines.diagnosis import engine
+from pipelines.diagnosis.result import Diagnosis
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.result import Diagnosis
+from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
-from tests.model.diagnosis.asking import answered
+from tests.diagnosis.asking import answered
 
 WRONG = 1.1
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.arrow import Arrow, Structure
-from pipelines.diagnosis.belief import Belief
 from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.prior import Belief
 from pipelines.diagnosis.score import Blocks, confidence_set
 from pipelines.diagnosis.screening import screen
-from pipelines.diagnosis.table import Array, Table, by_joint
+from pipelines.diagnosis.table import Array, Arrow, Structure, Table, by_joint
 
 _ROWS, _JOINTS, _KNOWN, _MORE = 240, 3, 5, 2
 

@@ -13,13 +13,12 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.limits import Limits, limits_of
+from pipelines.diagnosis.result import Diagnosis, Extended, Finding
 from pipelines.log.hdf5 import read_parts
-from pipelines.model.diagnosis.asked.inputs import Logs, Prepared, prepare
-from pipelines.model.diagnosis.asked.settings import DiagnosisSettings
-from pipelines.model.diagnosis.result import Diagnosis, Finding
-from pipelines.model.diagnosis.screened.wanted import Wanted
-from pipelines.model.diagnosis.worth.extended import Extended
 from pipelines.model.effects import find_effect
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.rows.families import Wanted
+from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
 _BLOCKS = 10
 
@@ -39,7 +38,7 @@ def _arm(shared: Path, number: str) -> _Arm:
     (truth,) = answers[f"arm-{number}"]["truth"]
     paths = sorted((shared / f"plant-b/arm-{number}").glob("*.h5"))
     config = DiagnosisConfig()
-    settings = DiagnosisSettings(cutoff_hz=config.cutoff_hz)
+    settings = Recipe(cutoff_hz=config.cutoff_hz)
     prepared = prepare(Logs.by_role([read_parts(path)[0] for path in paths]), settings)
     found = diagnose_prepared(prepared, config)
     told, extended = answer(prepared, found, lambda words: None, _BLOCKS, whole=False)

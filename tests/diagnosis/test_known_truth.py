@@ -12,16 +12,16 @@ import pytest
 from pipelines import diagnose
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.files import open_log
-from pipelines.model.diagnosis.asked.inputs import Logs
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
+from pipelines.model.rows.prepare import Logs
 from pipelines.stage import Request
 from tests.diagnose.sessions import but, session, written
+from tests.diagnosis.arms import arm, hidden, wave
+from tests.diagnosis.asking import answered, causes, diagnosed, effects
+from tests.diagnosis.rotor import turned
 from tests.faulty import dropped
 from tests.healthy import with_signal
-from tests.model.diagnosis.arms import arm, hidden, wave
-from tests.model.diagnosis.asking import answered, causes, diagnosed, effects
-from tests.model.diagnosis.rotor import turned
 
 Load = Callable[[Motion], Array]  # torque (samples, joints) [N m] that a motion costs beside
 

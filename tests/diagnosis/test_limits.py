@@ -12,15 +12,15 @@ from pipelines.bench.fault import Fault
 from pipelines.bench.faults import make
 from pipelines.bench.machine import Machine, draw_machine
 from pipelines.bench.session import record
+from pipelines.diagnosis.limits import without_limit
+from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
-from pipelines.model.diagnosis.answered.without_limit import without_limit
-from pipelines.model.diagnosis.asked.inputs import Logs
-from pipelines.model.diagnosis.result import DetectionLimit, Diagnosis, Rejected
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.two_sigmoid import TwoSigmoid
+from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
-from tests.model.diagnosis.asking import answered, causes, diagnosed
+from tests.diagnosis.asking import answered, causes, diagnosed
 
 FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
 SECONDS, NUMBER = 5.0, 7

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from pipelines import diagnose, extend, run
+from pipelines.diagnosis.result import Rejected
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.log.model_file import read_model
-from pipelines.model.diagnosis.result import Rejected
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written

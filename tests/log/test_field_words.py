@@ -63,7 +63,7 @@ def test_no_words_are_left_over() -> None:
 
 def test_words_stand_beside_their_field() -> None:
     """A comment on the field's line or right above it, of the class itself or of the one it extends; units stand in it."""
-    from pipelines.model.diagnosis.answered.outcome import Result
+    from pipelines.diagnosis.result import Result
     from pipelines.model.motion_result import LogResult
 
     assert words_of(LogResult)["predicted"].startswith("predicted: samples in which the position of some joint was not measured")

@@ -13,10 +13,10 @@ from pipelines.bench.faults import make
 from pipelines.bench.machine import draw_machine
 from pipelines.bench.session import record
 from pipelines.errors import InputRejected
+from pipelines.estimation.checks.gates import examined
 from pipelines.log.doctor.checks_subject import Subject
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.commanded import against_command, commanded
-from pipelines.model.diagnosis.asked.gates import examined
 from pipelines.model.plausibility import mismatches
 from tests.healthy import with_signal
 

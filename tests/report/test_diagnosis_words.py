@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.answered.outcome import Result
-from pipelines.model.diagnosis.result import (
+from pipelines.diagnosis.result import (
     Alternative,
     BeforeAfter,
     DetectionLimit,
@@ -21,12 +20,13 @@ from pipelines.model.diagnosis.result import (
     Proof,
     Rejected,
     ResidualRms,
+    Result,
     Threshold,
-    TorqueGain,
     Trial,
     Value,
 )
 from pipelines.model.effects import effect_names, find_effect
+from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
 from pipelines.report.diagnosis_floor import torque_errors
 from pipelines.report.diagnosis_proof import proof_figures

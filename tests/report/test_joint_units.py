@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.result import BeforeAfter, Curve, Diagnosis, Evidence, Gain, ResidualRms, TorqueGain
+from pipelines.diagnosis.result import BeforeAfter, Curve, Diagnosis, Evidence, Extension, Gain, ResidualRms
 from pipelines.model.excitation.limits import Limit
+from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.diagnosis_finding import gain_table
 from pipelines.report.diagnosis_floor import torque_errors
 from pipelines.report.joint_units import Units, each, unit_of, units_in

@@ -7,7 +7,7 @@ import io
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.result import Evidence
+from pipelines.diagnosis.result import Evidence
 from pipelines.model.friction.result import Series
 from pipelines.report import style
 from pipelines.report.bps import torque_figure

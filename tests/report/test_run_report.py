@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Drawing
 
+from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Gain, ResidualRms, TipError
 from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
-from pipelines.model.diagnosis.answered.outcome import Extension
-from pipelines.model.diagnosis.result import Diagnosis, Finding, Gain, ResidualRms, TipError, TorqueGain
+from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.run_ledger import ledger_lines, ledger_section
 from pipelines.report.run_report import run_report

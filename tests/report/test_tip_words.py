@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.diagnosis.result import BeforeAfter, Finding, SimulatedSpan, TipError
+from pipelines.diagnosis.result import BeforeAfter, Finding, TipError
+from pipelines.model.simulation.comparison import SimulatedSpan
 from pipelines.report.diagnosis_finding import gain_table
 from pipelines.report.run_ledger import Line, ledger_section
 from pipelines.report.tip_words import all_together, tip_change, tip_worth

@@ -35,8 +35,6 @@ Values = Mapping[str, float]
 LARGE = 1e5
 SHARPNESSES = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # [s/rad] at which friction may change its sign
 _MANY = 256  # samples
-_KEPT: list[tuple[ArmModel, Motion, Array]] = []  # the last few, newest first; compared by identity, for a motion is its arrays
-_KEEP = 6
 
 
 class ArmModel(Protocol):
@@ -339,13 +337,5 @@ def summed(columns: Array, amplitudes: Array) -> Array:
 
 
 def predicted(arm: ArmModel, motion: Motion) -> Array:
-    """`arm.torque(motion)`, kept; not to be written to."""
-    for place, (other, same, torque) in enumerate(_KEPT):
-        if other is arm and same is motion:
-            _KEPT.insert(0, _KEPT.pop(place))
-            return torque
-    torque = arm.torque(motion)
-    torque.flags.writeable = False
-    _KEPT.insert(0, (arm, motion, torque))
-    del _KEPT[_KEEP:]
-    return torque
+    """Return `arm.torque(motion)`, kept with the motion; not to be written to."""
+    return motion.kept(("predicted", arm), lambda: arm.torque(motion))

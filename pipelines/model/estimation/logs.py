@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -34,7 +34,7 @@ _MOSTLY = 0.01  # of the samples saturated: that is why none is left
 class Recipe:
     """What is done to a log before it becomes equations. None: found from the logs that are fitted."""
 
-    how: Reconstruction
+    how: Reconstruction = field(default_factory=Reconstruction)
     cutoff_hz: float | None = None
     decimation: int | None = None
     min_speed: tuple[float, ...] = (0.0,)

@@ -53,32 +53,9 @@ def _in_base(body: RigidBody, torque: Array) -> Array:
     return np.asarray(np.linalg.lstsq(ours.reshape(-1, ours.shape[2]), torque.reshape(-1, torque.shape[2]), rcond=None)[0])
 
 
-_KNOWN: list[tuple[RigidBody, Array]] = []  # bodies asked about last, newest first: a fit asks about the same again and again
-_KEEP = 8
-
-
-def _links_behind(body: RigidBody) -> Array:
-    """(10 · joints, parameters): standard parameters that have the torques of p; what is not in the general base set is zero."""
-    known = next((found for other, found in _KNOWN if other is body), None)
-    if known is None:
-        known = _found_behind(body)
-        known.flags.writeable = False
-        _KNOWN.insert(0, (body, known))
-        del _KNOWN[_KEEP:]
-    return known
-
-
-def _found_behind(body: RigidBody) -> Array:
-    if isinstance(body, BaseArm):
-        return np.eye(10 * body.chain.n_joints)[:, list(body.base.chosen)]
-    general = BaseArm(body.robot)
-    chosen = _standard_to_base(body)[:, list(general.base.chosen)]
-    return np.asarray(np.eye(10 * general.chain.n_joints)[:, list(general.base.chosen)] @ np.linalg.inv(chosen))
-
-
 def standard_of(body: RigidBody, p: Array) -> Array:
     """Standard parameters (10 · joints,) with the torques of p."""
-    return np.asarray(_links_behind(body) @ p)
+    return np.asarray(body.links_behind @ p)
 
 
 def with_gravity(body: RigidBody, gravity: Array) -> RigidBody:
@@ -114,7 +91,7 @@ def with_longer_link(body: RigidBody, link: int, by: float) -> RigidBody:
 
 def carry_over(body: RigidBody, other: RigidBody) -> Array:
     """(parameters of other, parameters of body): base parameters of the same links in the other arm."""
-    return np.asarray(_standard_to_base(other) @ _shifted(chain_of(body), chain_of(other)) @ _links_behind(body))
+    return np.asarray(_standard_to_base(other) @ _shifted(chain_of(body), chain_of(other)) @ body.links_behind)
 
 
 def masses_beyond(body: RigidBody, link: int) -> Array:

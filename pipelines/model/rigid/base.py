@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -136,6 +137,11 @@ class BaseArm:
         self.chain = chain or serial_chain(robot)
         self.base = base_set(self.chain, np.random.default_rng(_SEED))
         self.parameters = self.base.parameters
+
+    @cached_property
+    def links_behind(self) -> Array:
+        """(10 · joints, parameters): standard parameters that have the torques of p; zero outside the base set."""
+        return np.eye(10 * self.chain.n_joints)[:, list(self.base.chosen)]
 
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Y (samples, joints, parameters), stored with samples fastest."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -13,6 +14,8 @@ from pipelines.log.robot import RobotDescription
 __all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "refuse_other_length", "refuse_other_shapes"]
 
 Array = npt.NDArray[np.float64]
+
+_KEPT = 6  # torques of a motion
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,23 @@ class Motion:
     tau: Array | None = None  # [N m] (samples, joints) as logged, held from each sample to the next; None: not known
     logged: Array | None = None  # [N m] (joints,) measured torque at sample `since`, before which the motion is vague
     since: int = field(default=0, kw_only=True)
+    _kept: list[tuple[tuple[object, ...], Array]] = field(
+        default_factory=list, init=False, repr=False, compare=False)
+
+    def kept(self, key: tuple[object, ...], work: Callable[[], Array]) -> Array:
+        """Return what `work` makes of this motion: once for the objects of a key, of the last few.
+
+        It is not to be written to. Slopes by differences ask for the same torque once a number.
+        """
+        for place, (known, torque) in enumerate(self._kept):
+            if len(known) == len(key) and all(a is b for a, b in zip(key, known, strict=True)):
+                self._kept.insert(0, self._kept.pop(place))
+                return torque
+        torque = work()
+        torque.flags.writeable = False
+        self._kept.insert(0, (key, torque))
+        del self._kept[_KEPT:]
+        return torque
 
 
 @dataclass(frozen=True)
@@ -80,6 +100,11 @@ class RigidBody(Protocol):
 
     robot: RobotDescription
     parameters: tuple[BaseParameter, ...]
+
+    @property
+    def links_behind(self) -> Array:
+        """(10 · joints, parameters): standard parameters that have the torques of p, not to be written to."""
+        ...
 
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
         """Y (samples, joints, parameters) for q, dq, ddq (samples, joints)."""

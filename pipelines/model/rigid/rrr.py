@@ -9,16 +9,20 @@ The letters: S = q2 + q3; c, s a cosine and sine; g the gravitational accelerati
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 
 from pipelines.log.robot import LinkParameters, RobotDescription
 from pipelines.model.rigid import rrr_kinematics
+from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, BaseParameter, TorqueParts, refuse_other_length, refuse_other_shapes
+from pipelines.model.rigid.chain import regressor
 
 __all__ = ["ACTING", "RRR", "fits"]
 
 _TINY = 1e-12
+_STATES, _SEED = 40, 7  # numerics: random states at which the general arm is compared
 
 # The columns that act on each joint. Row three has four columns of row two: the one's end is the other's beginning.
 _SHARED = [4, 5, 7, 8]
@@ -67,6 +71,18 @@ class RRR:
         self._a2 = robot.joints[1].a
         self._g = -robot.gravity[2]
         self._offset = np.array(self.geometry.offset)
+
+    @cached_property
+    def links_behind(self) -> Array:
+        """(30, 15): standard parameters that have the torques of p; zero outside the base set of the general arm."""
+        general = BaseArm(self.robot)
+        rng = np.random.default_rng(_SEED)
+        states = rng.uniform(-3.0, 3.0, (_STATES, 3)), *rng.normal(size=(2, _STATES, 3))
+        ours, links = self.regressor(*states), regressor(general.chain, *states)
+        found = np.linalg.lstsq(ours.reshape(-1, 15), links.reshape(-1, 30), rcond=None)[0]
+        found[np.abs(found) < _TINY] = 0.0
+        chosen = found[:, list(general.base.chosen)]
+        return np.asarray(general.links_behind @ np.linalg.inv(chosen))
 
     def tip(self, q: Array) -> Array:
         refuse_other_shapes(3, q=q)

@@ -6,6 +6,7 @@ import numpy as np
 
 from pipelines.model.rigid import kept_torque
 from pipelines.model.rigid.base import BaseArm
+from pipelines.model.rigid.body import Motion
 from pipelines.model.rigid.chain import inverse_dynamics
 from tests.model.rigid.serial_arms import Arm
 
@@ -53,3 +54,25 @@ def test_it_is_worked_out_once_and_little_is_kept(arm: Arm) -> None:
     for k in range(40):
         kept_torque.kept(body.chain, (long + k,), lambda: long)
     assert sum(map(kept_torque._size, kept_torque._known)) < 2 * kept_torque._MOST
+
+
+def test_a_motion_keeps_the_last_torques_of_the_very_objects() -> None:
+    """Equal objects are others: what they compare by may be arrays."""
+    x = np.zeros((4, 2))
+    motion, asked = Motion(np.zeros(4), x, x, x), list[int]()
+
+    def work() -> np.ndarray:
+        asked.append(len(asked))
+        return np.full(3, float(len(asked)))
+
+    one, other = (x.copy(),), (x.copy(),)
+    first = motion.kept(("torque", one), work)
+    assert motion.kept(("torque", one), work) is first
+    assert not first.flags.writeable
+    motion.kept(("torque", other), work)
+    motion.kept(("friction", one), work)
+    assert motion.kept(("torque", one), work) is first
+    assert len(asked) == 3
+    for k in range(20):
+        motion.kept(("torque", np.full(1, k)), work)
+    assert motion.kept(("torque", one), work)[0] == 24.0

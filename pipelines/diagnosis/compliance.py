@@ -1,0 +1,141 @@
+"""Name compliance by frequency responses: rows alone do not distinguish base, joint and gap.
+
+found = compliance(logs.frf, arm)
+found.named              causes that the responses name, with their numbers
+untold(found)            causes that they leave open, with the reason
+gaps_untold(found)       causes that only responses without a spring let be named
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipelines.diagnosis.result import Answer, NotIdentifiable
+from pipelines.errors import InputRejected
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects import all_effects, find_effect
+from pipelines.model.frf import findings as frf
+from pipelines.model.frf.modes import relative_acceleration
+
+__all__ = ["Compliance", "compliance", "gaps_untold", "new_causes", "untold"]
+
+_MOVED = 3.0  # standard deviations of a frequency or stiffness, beyond which it has changed
+_SAME = 0.03  # of it, within which sessions show the same one: temperature, how the arm stood
+_NO_RESPONSES = (
+    "a gap is distinguished from a spring by frequency responses that show none, "
+    "and there is no frf log"
+)
+_GIVES_WAY = "the frequency responses show compliance, and a gap is not distinguishable from it"
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """What frequency responses show."""
+
+    named: tuple[Acting, ...]
+    open: str  # what they leave open, in words; empty where they do not
+    seen: tuple[frf.Seen, ...] = field(default=(), repr=False)
+    # place of a cause -> joints that show it
+    seen_at: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+
+    def answers(self, acting: Acting) -> tuple[Answer, ...]:
+        """Return the responses of the first joint that shows a cause."""
+        joint = min(self.seen_at.get(acting.place, (0,)))
+        return tuple(_answer(one) for one in self.seen if one.measured.joint == joint)
+
+
+def compliance(
+    logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()
+) -> Compliance | None:
+    """Return what frf logs show, None without any; causes in `without` are not named."""
+    if not logs:
+        return None
+    try:
+        found = frf.frf_findings(logs, arm)
+    except InputRejected as refused:
+        return Compliance((), f"the frequency responses are of no use: {refused.message}")
+    giving = [
+        one
+        for one in found.classification
+        if one.cause is not None and find_effect(one.cause).evidence == "frequency responses"
+    ]
+    wanted = [one for one in giving if one.cause not in without]
+    named = tuple(_acting(one, arm) for one in wanted)
+    left = "; ".join(one.evidence for one in found.undecided)
+    shown = {acting.place: one.seen_at for acting, one in zip(named, wanted, strict=True)}
+    return Compliance(named, left, found.seen, shown)
+
+
+def new_causes(now: Compliance, before: Compliance) -> tuple[Acting, ...]:
+    """Return the causes that the reference does not name, or not with these numbers."""
+    there = {one.place: one for one in before.named}
+    return tuple(
+        one for one in now.named if one.place not in there or _moved(one, there[one.place])
+    )
+
+
+def _moved(now: Acting, before: Acting) -> bool:
+    # a joint's frequency moves with the posture, its stiffness does not
+    one, other = now.parameters[0], before.parameters[0]
+    spread = float(np.hypot(one.std or 0.0, other.std or 0.0))
+    return abs(one.value - other.value) > max(_MOVED * spread, _SAME * other.value)
+
+
+def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIdentifiable, ...]:
+    """Return causes that only frequency responses show, where these are missing or undecided."""
+    missing = "only frequency responses tell it, and there is no frf log"
+    reason = missing if told is None else told.open
+    named = () if told is None else tuple(one.effect.name for one in told.named)
+    return tuple(
+        NotIdentifiable(kind.name, None, reason, kind.words.experiment)
+        for kind in all_effects()
+        if reason and kind.evidence == "frequency responses" and kind.name not in (*named, *without)
+    )
+
+
+def gaps_untold(
+    told: Compliance | None, without: Sequence[str] = ()
+) -> tuple[NotIdentifiable, ...]:
+    """Return causes at reversals, which need frequency responses that name no spring."""
+    if told is not None and not told.named:
+        return ()
+    reason, first = _GIVES_WAY, ""
+    if told is None:
+        reason, first = _NO_RESPONSES, "Measure frequency responses, which tell a spring. "
+    return tuple(
+        NotIdentifiable(kind.name, None, reason, f"{first}{kind.words.experiment}")
+        for kind in all_effects()
+        if kind.evidence == "reversals" and kind.name not in without
+    )
+
+
+def _acting(one: frf.Finding, arm: Arm) -> Acting:
+    """Return the cause with the numbers that the responses give."""
+    kind = find_effect(one.cause or "")
+    joint = one.joint if kind.scope == "joint" else None
+    known = one.parameters
+    return Acting.of(
+        kind(joint=joint),
+        {name: x.value for name, x in known.items()},
+        {name: x.std for name, x in known.items()},
+        revolute=joint is None or arm.robot.revolute[joint - 1],
+    )
+
+
+def _answer(one: frf.Seen) -> Answer:
+    first = one.measured.first
+    shown = relative_acceleration(one.measured).within(*one.modes.band)
+    unit = "1" if first.quantity == "r" else "1/(kg m^2)" if first.revolute else "1/kg"
+    return Answer(
+        one.measured.joint,
+        np.asarray(first.posture, dtype=np.float64),
+        unit,
+        shown.frequency,
+        np.abs(shown.response),
+        shown.coherence,
+        np.abs(one.modes.fit.response(shown.frequency)),
+    )

@@ -1,0 +1,350 @@
+"""Compute the figures of a diagnosis: residual analysis, and the proof of each finding.
+
+    evidence(fit, floor)              the residual over time, and against all that it may depend on
+    proof(before, after, joint, …)    of the joint that shows most of a finding
+    with_simulation(result, …)        the position errors of the simulated arms
+
+Amplitudes over the orders of an angle: a joint that goes to and fro over a part of a turn is longer
+at some angles than at others, and the mean of x e^(-jkq) shows the shape of that about every order.
+So every angle counts alike, and less towards the ends of the range (von Hann's window): what
+remains about an order is some 3 % of it, beyond two waves of the range on either side. With these
+weights a constant and one wave are fitted at a time:
+
+    min Σ w(q) (x - a - b cos kq - c sin kq)²        amplitude √(b² + c²)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.diagnosis.result import Curve, Diagnosis, Evidence, Proof, Spectrum
+from pipelines.diagnosis.table import Array
+from pipelines.model.rows.data import Data, LogData
+from pipelines.model.rows.fit import Refined
+from pipelines.model.simulation.comparison import Simulation
+from pipelines.signal.spectra import welch
+
+__all__ = ["amplitudes", "binned", "evidence", "least_order", "proof", "with_simulation"]
+
+_CURVE_BINS = 48
+_SERIES = 3000  # points of a series
+_SEGMENT = 512  # rows of a spectrum
+_BAND = 0.8  # of the power that the band holds
+_ORDERS = np.arange(0.5, 80.25, 0.25)  # [1/rev]
+_WAVES = 2.0  # of the lowest order in the range of the angle: half the width of the window's line
+_PART = 0.25  # of a wave of the highest order: angles are counted in parts as wide
+_ALIKE = 1e-6  # numerics: of the largest eigenvalue, below which a wave is a constant
+_RARE = 10.0  # times the mean, that a row counts at most at an angle where the joint hardly was
+_AS_MUCH = 0.9  # of what a curve over time shows of a cause
+_BINS, _MOST_BINS = 96, 768  # of a proof: a figure is six inches wide
+_ROWS, _FEWEST = 4, 2  # of a bin, at least; and where finer bins show more
+_FINER = 0.02  # of the predicted power, that twice as many bins have to show
+_CHANCE = 4.0  # standard deviations of what they show by chance
+_SHOWN = 0.2  # of the predicted power, that its means over a signal have to hold
+_STRETCH = 2.0  # [s] of a proof over time
+_SECONDS, _POINTS = 3.0, 1500  # of a simulated log that are shown at most
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """One signal at the moments of one joint's rows, logs one behind the other."""
+
+    name: str
+    unit: str
+    values: Array  # (rows of the joint,)
+
+
+@dataclass(frozen=True, eq=False)
+class Binned:
+    """Means of one quantity over another. Each (bins,)."""
+
+    x: Array
+    mean: Array
+    spread: Array  # standard deviation within the bin
+    count: Array
+
+    @property
+    def power(self) -> float:
+        """What the means hold of the sum of squares."""
+        return float(np.sum(self.count * self.mean**2))
+
+
+def binned(x: Array, y: Array, bins: int = _CURVE_BINS, least: int = _ROWS) -> Binned:
+    """Return `y` over `x`, in bins of equal count, of `least` rows or more."""
+    order = np.argsort(x, kind="stable")
+    edges = np.linspace(0, len(x), min(bins, max(1, len(x) // least)) + 1).astype(int)
+    first, count = edges[:-1], np.diff(edges).astype(np.float64)
+    mean_x, mean, square = (np.add.reduceat(v[order], first) / count for v in (x, y, y**2))
+    return Binned(mean_x, mean, np.sqrt(np.maximum(square - mean**2, 0.0)), count)
+
+
+def signals(data: Data, joint: int, load: Array) -> Iterator[Signal]:
+    """Return what the residual of `joint` (from 0) may depend on; `load` (rows,) is the torque."""
+    revolute = data.logs[0].log.robot.revolute
+    q, dq = (_at_rows(data, name) for name in ("q", "dq"))
+    angle, force = ("rad", "N m") if revolute[joint] else ("m", "N")
+    yield Signal("time", "s", np.concatenate([one.t - one.t[0] for one in data.logs]))
+    yield Signal("position", angle, q[:, joint])
+    yield Signal("speed", f"{angle}/s", dq[:, joint])
+    yield Signal("load", force, load[data.joint == joint])
+    travel = np.concatenate([_travel(one, joint) for one in data.logs])
+    yield Signal("travel since reversal", angle, travel)
+    for other, turns in enumerate(revolute):
+        if other != joint:
+            unit = "rad" if turns else "m"
+            yield Signal(f"position of joint {other + 1}", unit, q[:, other])
+            yield Signal(f"speed of joint {other + 1}", f"{unit}/s", dq[:, other])
+
+
+def _at_rows(data: Data, name: str) -> Array:
+    return np.concatenate([one.at_rows(getattr(one.motion, name)) for one in data.logs])
+
+
+def _travel(one: LogData, joint: int) -> Array:
+    """Return the signed distance from where the joint last reversed."""
+    q = one.motion.q[:, joint]
+    turns = np.flatnonzero(np.diff(np.sign(one.motion.dq[:, joint])) != 0) + 1
+    begin = np.concatenate([[0], turns])
+    which = np.searchsorted(begin, np.arange(len(q)), side="right") - 1
+    return np.asarray(one.at_rows(q - q[begin[which]]))
+
+
+def least_order(q: Array) -> float:
+    """Return the lowest order [1/rev] that is resolved; infinite where the joint stood still."""
+    span = float(np.ptp(q)) if len(q) else 0.0
+    return _WAVES * 2.0 * np.pi / span if span > 0.0 else np.inf
+
+
+def amplitudes(q: Array, x: Array, orders: Array) -> Array:
+    """Return the amplitude (orders,) of each wave over the angle q (rows,) in x (rows,).
+
+    Zero of a joint that stood still.
+
+    Args:
+        orders: evenly spaced.
+    """
+    if not np.isfinite(least_order(q)):
+        return np.zeros(len(orders))
+    weight, spacing = _weights(q, float(np.max(orders))), np.ptp(orders) / max(len(orders) - 1, 1)
+    wave, step, sums = np.exp(1j * orders[0] * q), np.exp(1j * spacing * q), []
+    for _ in orders:  # of w e^(jkq), w e^(2jkq) and w x e^(jkq)
+        weighted = weight * wave
+        sums.append((weighted.sum(), weighted @ wave, weighted @ x))
+        wave = wave * step
+    one, two, own = np.transpose(sums)
+    whole, level = np.full(len(orders), weight.sum()), np.full(len(orders), weight @ x)
+    cc, cs, ss = 0.5 * (whole + two.real), 0.5 * two.imag, 0.5 * (whole - two.real)
+    normal = np.array([[whole, one.real, one.imag], [one.real, cc, cs], [one.imag, cs, ss]])
+    inverse = np.linalg.pinv(np.moveaxis(normal, -1, 0), rcond=_ALIKE, hermitian=True)
+    fitted = np.einsum("kij,jk->ki", inverse, np.array([level, own.real, own.imag]))
+    return np.asarray(np.hypot(fitted[:, 1], fitted[:, 2]))
+
+
+def _weights(q: Array, highest: float) -> Array:
+    """Return von Hann's window (rows,) over the range, shared by the rows at the same angle."""
+    along = (q - q.min()) / np.ptp(q)
+    parts = max(1, int(np.ceil(float(np.ptp(q)) * highest / (2.0 * np.pi * _PART))))
+    part = np.minimum((along * parts).astype(int), parts - 1)
+    count = np.bincount(part, minlength=parts)[part]
+    return np.asarray(np.sin(np.pi * along) ** 2 * np.minimum(1.0 / count, _RARE * parts / len(q)))
+
+
+def evidence(done: Refined, floor: Array) -> Evidence:
+    """Return the residual of the nominal model over the first log, curves and spectra over all."""
+    data, left, n = done.data, done.left, done.data.n_joints
+    predicted = data.y - left
+    measured, modelled, rest = (next(iter(data.split(x))).T for x in (data.y, predicted, left))
+    curves, spectra = list[Curve](), list[Spectrum]()
+    for joint in range(n):
+        own = left[data.joint == joint]
+        for one in signals(data, joint, predicted):
+            means = binned(one.values, own)
+            share = means.power / max(float(own @ own), 1e-300)
+            curve = (means.x, means.mean, means.spread, share)
+            curves.append(Curve(joint + 1, one.name, one.unit, *curve))
+        spectra += _spectra(data, left, joint)
+    every = max(1, -(-len(measured) // _SERIES))
+    joints = [data.joint == j for j in range(n)]
+    r, y, torque = (np.array([x[own] for own in joints]) for x in (left, data.y, predicted))
+    with np.errstate(invalid="ignore"):
+        correlation = np.nan_to_num(np.corrcoef(r, y)[:n, n:])
+    mixed = np.linalg.lstsq(torque.T, y.T, rcond=None)[0].T
+    return Evidence(
+        data.logs[0].log.name,
+        data.logs[0].t[::every],
+        measured[::every],
+        modelled[::every],
+        rest[::every],
+        None,
+        None,
+        tuple(curves),
+        tuple(spectra),
+        np.clip(1.0 - np.square(floor / done.rms), 0.0, 1.0),
+        _bands(spectra, n),
+        correlation,
+        mixed,
+    )
+
+
+def _spectra(data: Data, left: Array, joint: int) -> list[Spectrum]:
+    """Return the spectra over frequency, of the longest log, and over orders of the angle."""
+    found, q = list[Spectrum](), _at_rows(data, "q")[:, joint]
+    parts = [(one, x[joint]) for one, x in zip(data.logs, data.split(left), strict=True)]
+    own = _over_frequency(*max(parts, key=lambda part: len(part[1])))
+    if own is not None:
+        found.append(Spectrum(joint + 1, "frequency", "Hz", *own))
+    resolved = least_order(q) <= _ORDERS
+    if resolved.any():
+        unit = "1/rev" if data.logs[0].log.robot.revolute[joint] else "1/(2 pi m)"
+        waves = amplitudes(q, left[data.joint == joint], _ORDERS)[resolved]
+        found.append(Spectrum(joint + 1, "order", unit, _ORDERS[resolved], waves))
+    return found
+
+
+def _over_frequency(one: LogData, x: Array) -> tuple[Array, Array] | None:
+    """Return frequencies [Hz] and amplitudes of bins of x (rows,); None of too short a log.
+
+    The squares of the amplitudes add up to the mean square of x.
+    """
+    if len(x) < 64:
+        return None
+    step = float(np.median(np.diff(one.t)))
+    found = welch(x[:, None], 1.0 / step, min(_SEGMENT, len(x) // 2))
+    width = float(found.frequency[1] - found.frequency[0])
+    return found.frequency, np.sqrt(found.density[:, 0] * width)
+
+
+def _bands(spectra: list[Spectrum], joints: int) -> Array:
+    """Return the bands (joints, 2) [Hz] that hold most of the residual's power."""
+    out = np.full((joints, 2), np.nan)
+    for one in spectra:
+        if one.over == "frequency":
+            power = np.square(one.amplitude)
+            total = np.cumsum(power) / max(float(power.sum()), 1e-300)
+            ends = np.searchsorted(total, (0.5 - 0.5 * _BAND, 0.5 + 0.5 * _BAND))
+            out[one.joint - 1] = one.x[np.minimum(ends, len(one.x) - 1)]
+    return out
+
+
+def proof(
+    before: Refined, after: Refined, joint: int | None, log: int | None = None, event: bool = False
+) -> Proof:
+    """Return the residual over the signal by which the cause is predicted best.
+
+    Over frequency where no signal is: what a resonance adds is not alike along an angle or a speed.
+    An event is shown over the time of its log; one that comes in every log over that of all.
+
+    Args:
+        log: place of the log it happened in, among those of the rows.
+        event: whether it happened.
+    """
+    data = before.data
+    three = (before.left, after.left, before.left - after.left)
+    shown = joint - 1 if joint is not None else int(np.argmax(data.rms(three[2]) / before.rms))
+    own = data.joint == shown
+    parts = [x[own] for x in three]
+    t, rows = _stretch(data, parts[2])
+    over_time = (t, *(x[rows] for x in parts))
+    if log is not None:
+        there = data.log_of[own] == log
+        best = Signal("time", "s", data.logs[log].t)
+        return _over(best, [x[there] for x in parts], shown, over_time)
+    time, *others = signals(data, shown, data.y - before.left)
+    power = {one: binned(one.values, parts[2]).power for one in (time, *others)}
+    # in a log that goes once through its range anything is shown over time: when, and not by what
+    best = max(others, key=lambda one: power[one])
+    if event or power[best] < _AS_MUCH * power[time]:
+        best = time
+    if not event and power[best] < _SHOWN * float(parts[2] @ parts[2]):
+        place = max(range(len(data.logs)), key=lambda k: _power_in(data, three[2], k, shown))
+        lines = [
+            _over_frequency(data.logs[place], list(data.split(x))[place][shown]) for x in three
+        ]
+        if found := [one for one in lines if one is not None]:
+            hertz, none = found[0][0], np.zeros(len(found[0][0]))
+            without, with_it, predicted = (lines for _, lines in found)
+            curves = (hertz, without, with_it, predicted, none)
+            return Proof(shown + 1, "frequency", "Hz", *curves, *over_time)
+    return _over(best, parts, shown, over_time)
+
+
+def _power_in(data: Data, x: Array, log: int, joint: int) -> float:
+    return float(np.sum(np.square(list(data.split(x))[log][joint])))
+
+
+def _over(
+    signal: Signal, parts: list[Array], joint: int, over_time: tuple[Array, Array, Array, Array]
+) -> Proof:
+    """Return `parts`, without the finding, with it and what it predicts, over a signal."""
+    bins = _fine_enough(signal.values, parts[2])
+    before, after, predicted = (binned(signal.values, x, bins, _FEWEST) for x in parts)
+    curves = (before.x, before.mean, after.mean, predicted.mean)
+    spread = before.spread / np.sqrt(before.count)
+    return Proof(joint + 1, signal.name, signal.unit, *curves, spread, *over_time)
+
+
+def _fine_enough(x: Array, predicted: Array) -> int:
+    """Return as many bins as show what a cause predicts over x, as far as there are rows.
+
+    What scatters within a bin, and not along x, makes none of them finer.
+    """
+    bins = min(_BINS, max(1, len(x) // _ROWS))
+    least, (here, _) = _FINER * float(predicted @ predicted), _surely(x, predicted, bins)
+    while bins < _MOST_BINS:
+        finer, chance = _surely(x, predicted, 2 * bins)
+        if finer - here <= max(least, _CHANCE * chance):
+            break
+        bins, here = 2 * bins, finer
+    return bins
+
+
+def _surely(x: Array, y: Array, bins: int) -> tuple[float, float]:
+    """Return the power of the means less what they have by chance, and the deviation of that."""
+    means = binned(x, y, bins, _FEWEST)
+    chance = means.spread**2 * means.count / np.maximum(means.count - 1.0, 1.0)
+    # the mean of all bins: of pairs of rows one squared deviation is far from its mean
+    deviation = float(np.sqrt(2.0 * len(chance)) * np.mean(chance))
+    return float(np.sum(means.count * means.mean**2 - chance)), deviation
+
+
+def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
+    """Return time and rows of the stretch in which the predicted part varies most.
+
+    The variance, not the power: a joint at rest shows a constant, which proves nothing.
+    """
+    first, best, found = 0, -1.0, slice(0, 0)
+    times = np.concatenate([one.t for one in data.logs])
+    for one in data.logs:
+        step = float(np.median(np.diff(one.t))) if one.rows > 1 else 1.0
+        size = max(2, min(one.rows, round(_STRETCH / step)))
+        for start in range(first, first + one.rows - size + 1, max(1, size // 2)):
+            power = float(np.var(predicted[start : start + size]))
+            if power > best:
+                best, found = power, slice(start, start + size)
+        first += one.rows
+    return times[found], found
+
+
+def with_simulation(found: Diagnosis, nominal: Simulation, extended: Simulation) -> Diagnosis:
+    """Return the result with the position errors of both arms, where both ran in closed loop."""
+    if not found.evidence or nominal.first is None or extended.first is None:
+        return found
+    first, other = nominal.first, extended.first.error
+    samples = int(np.searchsorted(first.t, _SECONDS))
+    shown = slice(0, samples, max(1, samples // _POINTS))
+    return replace(
+        found,
+        evidence=(
+            replace(
+                found.evidence[0],
+                simulated_t=first.t[shown],
+                simulated_position_error=first.error[shown],
+                simulated_log=first.log,
+                extended_position_error=other[shown],
+            ),
+            *found.evidence[1:],
+        ),
+    )

@@ -1,0 +1,93 @@
+"""Say in words where a finding is, how much of it there is, and what imitates it.
+
+where(finding)                 " at joint 2 (from joint 1)"
+how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
+beside(findings)               "; and torque logging delay (120 ms) at joint 1"
+taken_in(finding, left)        ", most of which the nominal model had taken in"
+of_any_size(finding)           whether these logs leave open how large its torque is
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from pipelines.diagnosis.result import Finding, Value
+from pipelines.log.experiment import Array
+from pipelines.model.effects import find_effect
+from pipelines.model.words import plain_number, within
+
+__all__ = ["beside", "how_much", "of_any_size", "other_joint", "taken_in", "where"]
+
+# usual units, where these are not SI
+_USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
+_DEGREE = np.pi / 180.0
+_TORQUES = ("N m", "N")
+_TOLD = 2  # further findings that a sentence names
+_OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
+
+
+def where(one: Finding) -> str:
+    """Return the joint of a finding, the other joint it depends on, and when it happened."""
+    other, start = other_joint(one.parameters), one.parameters.get("start")
+    at = "" if one.joint is None else f" at joint {one.joint}"
+    when = ""
+    if start is not None and isinstance(start.value, int | float):
+        when = f", {start.value:.2f} s into {one.log or 'every log'}"
+    return f"{at}{f' ({other})' if other else ''}{when}"
+
+
+def how_much(one: Finding) -> str:
+    """Return the number that is the size of a finding, to three digits; empty without one."""
+    effect = find_effect(one.cause)
+    told = one.parameters.get(effect.words.size)
+    if told is None or not isinstance(told.value, int | float) or not np.isfinite(told.value):
+        return ""
+    if told.unit == "kg" and one.joint is None:
+        return f" of {plain_number(told.value, 3)} kg"
+    times, unit = _USUAL.get(told.unit, (1.0, told.unit))
+    if effect.words.size == "angle":
+        times, unit = 1.0 / _DEGREE, "°"
+    signed = any(q.name == effect.words.size and q.low < 0.0 for q in effect.parameters)
+    sign = "+" if signed and told.value > 0.0 else ""
+    space = "" if unit == "°" else " "
+    return f" ({sign}{plain_number(told.value * times, 3)}{space}{unit.replace('^2', '²')})"
+
+
+def other_joint(parameters: Mapping[str, Value]) -> str:
+    """Return "from joint 1"; empty where a cause depends on no other joint."""
+    for name, word in _OTHER.items():
+        joint = parameters[name].value if name in parameters else None
+        if isinstance(joint, int | float):
+            return f"{word} joint {joint:g}"
+    return ""
+
+
+def beside(others: Sequence[Finding]) -> str:
+    """Return "; and torque logging delay (120 ms) at joint 1", and how many more there are."""
+    told = [f"{within(one.title)}{how_much(one)}{where(one)}" for one in others[:_TOLD]]
+    if len(others) > _TOLD:
+        told.append(f"{len(others) - _TOLD} more")
+    *first, last = told or [""]
+    return f"; {', '.join(first)}{' ' if first else ''}and {last}" if last else ""
+
+
+def taken_in(one: Finding, left: Array) -> str:
+    """Return what is said where the nominal model imitates most of the power of a torque.
+
+    Its residual at that joint holds whatever of that torque it does not imitate.
+
+    Args:
+        left: (joints,) [N m] rms that the nominal model leaves of the logs it was fitted to.
+    """
+    rest = float(np.nanmax(left)) if one.joint is None else float(left[one.joint - 1])
+    most = one.torque_rms**2 > 2.0 * rest**2
+    return ", most of which the nominal model had taken in" if most else ""
+
+
+def of_any_size(one: Finding) -> bool:
+    """Return whether the largest torque among the numbers has no finite deviation."""
+    torques = [v for v in one.parameters.values() if v.unit in _TORQUES and np.ndim(v.value) == 0]
+    largest = max(torques, key=lambda v: abs(np.nan_to_num(v.value)), default=None)
+    return largest is not None and largest.std is not None and bool(np.isinf(largest.std).all())

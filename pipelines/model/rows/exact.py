@@ -1,0 +1,392 @@
+"""Compute the torque of an arm with its effects exactly, and its slopes by every number.
+
+    model = Exact.start(columns, fit)                     the nominal model
+    model = model.with_effect(effect, amplitudes)         and a cause
+    model.torque(data), model.arm
+    slopes, names = slopes_of(model, data, rigid)
+
+The numbers are the base parameters, amplitudes and shapes of the friction laws, amplitudes and free
+shapes of the effects. Slopes by what is linear are columns; all others are differences of the torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from pipelines.log.experiment import Array
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
+from pipelines.model.effects.fast import from_motion
+from pipelines.model.estimation.regression import Columns
+from pipelines.model.rigid.body import Motion
+from pipelines.model.rows.data import Data
+from pipelines.model.rows.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows, several_rows
+from pipelines.signal.first_order import lagging
+
+__all__ = ["Exact", "Named", "Which", "further_slopes", "law_of", "number_moved", "recorded", "slopes_of"]
+
+def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
+    """Return torque (samples, joints), or columns (samples, joints, k), as `arm` records them.
+
+    Where the log tells the torque at its start, that is no column's: each begins with nothing.
+    """
+    start = None if motion.logged is None else 0.0
+    for acting in arm.effects:
+        if acting.effect.acts_on != "record":
+            continue
+        joint, time = (acting.effect.joint or 1) - 1, float(acting.effect.amplitudes(acting.values)[0])
+        own, table = np.ascontiguousarray(table[:, joint].T), table.copy()
+        table[:, joint] = lagging(own, motion.t, time, start, motion.since).T
+    return table
+
+
+_FARTHEST = 0.5  # of ln shape, a step
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect with its amplitudes."""
+
+    effect: Effect
+    amplitudes: tuple[float, ...]
+    log: int | None = None  # number of the log it belongs to, where it happened once; None: it acts in all
+    tied: tuple[str, ...] = ()  # shapes that are those of the friction at its joint
+    held: tuple[str, ...] = ()  # shapes that are not fitted
+
+    @property
+    def values(self) -> dict[str, float]:
+        return self.effect.values(np.array(self.amplitudes))
+
+    @property
+    def free_shapes(self) -> list[Quantity]:
+        return [q for q in self.effect.parameters if q.name in self.effect.free and q.name not in (*self.tied, *self.held)]
+
+    @property
+    def free_amplitudes(self) -> bool:
+        return self.effect.parameters.fixed is None
+
+    @property
+    def count(self) -> int:
+        """Numbers that are fitted."""
+        return len(self.free_shapes) + (len(self.amplitudes) if self.free_amplitudes else 0)
+
+    @property
+    def possible(self) -> bool:
+        """Return whether every number lies in its range, amplitudes of derived sign apart."""
+        return self.effect.possible(self.values)
+
+
+@dataclass(frozen=True, eq=False)
+class NominalArm:
+    """Base parameters and laws of all models that differ in their effects alone."""
+
+    columns: Columns
+    beta: Array
+
+    @cached_property
+    def arm(self) -> Arm:
+        return nominal_arm(self.columns, self.beta)
+
+
+@dataclass(frozen=True, eq=False)
+class Exact:
+    """A model with all its numbers."""
+
+    columns: Columns  # laws in their shapes
+    beta: Array  # of the rigid body and the laws
+    effects: tuple[Named, ...]
+    standing: tuple[Acting, ...] = ()  # that just add; their torque was subtracted from the rows, over the motion as it was read
+    of: NominalArm | None = field(default=None, repr=False)  # handed on by `replace`
+
+    def __post_init__(self) -> None:
+        if self.of is None or self.of.columns is not self.columns or self.of.beta is not self.beta:
+            object.__setattr__(self, "of", NominalArm(self.columns, self.beta))
+
+    @classmethod
+    def start(cls, columns: Columns, fit: Fit) -> Exact:
+        count = len(columns.kept) + sum(not q.shape for law in columns.laws for q in law.parameters)
+        return cls(columns, fit.beta[:count].copy(), ())
+
+    def with_effect(self, effect: Effect, amplitudes: Array, log: int | None = None, held: tuple[str, ...] = ()) -> Exact:
+        given = amplitudes if effect.parameters.fixed is None else effect.parameters.fixed
+        tied = tuple(q.name for q in effect.parameters if q.shared and law_of(self.columns.laws, effect, q.name) is not None)
+        return replace(self, effects=(*self.effects, Named(effect, tuple(map(float, given)), log, tied, held)))
+
+    def without(self, place: int) -> Exact:
+        return replace(self, effects=tuple(e for k, e in enumerate(self.effects) if k != place))
+
+    @property
+    def nominal(self) -> Arm:
+        """The arm without effects: one and the same object for models that differ in these alone."""
+        assert self.of is not None
+        return self.of.arm
+
+    @cached_property
+    def arm(self) -> Arm:
+        """With every effect that does not belong to one log."""
+        return self.arm_in(-1)
+
+    def arm_in(self, log: int) -> Arm:
+        """As it was in log number `log`."""
+        turning = self.columns.body.robot.revolute
+        acting = [Acting.of(one.effect, one.values, revolute=one.effect.joint is None or turning[one.effect.joint - 1])
+                  for one in self.effects if one.log in (None, log)]
+        return self.nominal.extended(*acting)
+
+    def torque_in(self, log: int, motion: Motion) -> Array:
+        """(samples, joints) [N m] in log number `log`, less what stands beside the model where nothing acts on it."""
+        arm = self.arm_in(log)
+        if not self.standing:
+            return arm.torque(motion)
+        known = self._standing_torque(motion)
+
+        def inside(there: Motion, own: ArmModel) -> Array:
+            same = there is motion and isinstance(own, Arm) and own.base is self.nominal.base and own.body is self.nominal.body
+            return known if same else _added(self.standing, there, own)
+
+        return np.asarray(arm.torque(motion, inside) - known)
+
+    def _standing_torque(self, motion: Motion) -> Array:
+        """(samples, joints) [N m] of the standing effects, kept with the motion."""
+        key = ("standing", self.standing, self.nominal)
+        return motion.kept(key, lambda: _added(self.standing, motion, self.nominal))
+
+    @property
+    def core(self) -> int:
+        """How many of the effects the torque has to be worked out with as a whole: all up to the last that does not just add."""
+        if any(one.effect.acts_on != "load" for one in self.effects):
+            return len(self.effects)
+        return max((k + 1 for k, one in enumerate(self.effects) if not adds(one.effect)), default=0)
+
+    def torque(self, data: Data, laid: Sequence[Array] | None = None) -> Array:
+        """(rows,); `laid` as in `laid`, where it is known."""
+        core, parts = self.core, self.laid(data) if laid is None else laid
+        added = [one.effect.amplitudes(one.values) @ part for one, part in zip(self.effects[core:], parts, strict=True)]
+        return np.asarray(sum(added, self.core_torque(data, core)))
+
+    def laid(self, data: Data) -> list[Array]:
+        """Columns (k, rows) of each of the effects that just add."""
+        return [self.columns_of(data, one) for one in self.effects[self.core:]]
+
+    def core_torque(self, data: Data, core: int) -> Array:
+        """(rows,) of the nominal model and the first `core` effects, which act on what stands beside it as well."""
+        if core:
+            inner = replace(self, effects=self.effects[:core])
+            return data.lay_each(inner.torque_in)
+        return self._nominal_rows(data)
+
+    def _nominal_rows(self, data: Data) -> Array:
+        if not all(from_motion(law) for law in self.columns.laws):
+            return data.lay(self.nominal.torque)
+        kept = len(self.columns.kept)
+        torque, first = self.beta[:kept] @ rigid_rows(data, self.columns), kept
+        for law in self.columns.laws:
+            count = sum(not q.shape for q in law.parameters)
+            torque = torque + self.beta[first:first + count] @ law_rows(data, law, self.columns)
+            first += count
+        return np.asarray(torque)
+
+    def added(self, data: Data, *several: Named) -> list[Array]:
+        """(rows,) what an effect adds beside the nominal model, in the logs it belongs to, each with other numbers."""
+        rows = several_rows(data, [one.effect.at(one.values) for one in several], self.nominal)
+        return [np.asarray(one.effect.amplitudes(one.values) @ self._of_log(data, one, own))
+                for one, own in zip(several, rows, strict=True)]
+
+    def columns_of(self, data: Data, one: Named) -> Array:
+        """(k, rows) the same of each of its amplitudes."""
+        return self._of_log(data, one, effect_rows(data, one.effect.at(one.values), self.nominal))
+
+    def _of_log(self, data: Data, one: Named, columns: Array) -> Array:
+        return columns if one.log is None else np.where(data.log_of == one.log - data.first, columns, 0.0)
+
+    def moved(self, shift: Array, names: Sequence[tuple[int, int, str]]) -> Exact:
+        """Every number moved: base first, then what `names` says: shapes of laws, numbers of effects."""
+        first = len(self.beta)
+        laws, effects = list(self.columns.laws), list(self.effects)
+        for (kind, place, name), by in zip(names, shift[first:].tolist(), strict=True):
+            if kind == 0:
+                laws[place] = _shape_moved(laws[place], name, by)
+            else:
+                effects[place] = number_moved(effects[place], name, by)
+        effects = [_following(one, laws) for one in effects]
+        columns = replace(self.columns, laws=tuple(laws))
+        return replace(self, columns=columns, beta=self.beta + shift[:first], effects=tuple(effects))
+
+
+def _added(standing: Sequence[Acting], motion: Motion, arm: ArmModel) -> Array:
+    """(samples, joints) [N m] of effects that just add theirs."""
+    return np.asarray(sum(one.effect.torque(motion, arm, one.values) for one in standing))
+
+
+def law_of(laws: Sequence[Effect], effect: Effect, name: str) -> int | None:
+    """Which of the laws at the joint of `effect` has a shape `name`."""
+    return next((k for k, law in enumerate(laws) if law.joint == effect.joint
+                 and any(q.shape and q.name == name for q in law.parameters)), None)
+
+
+def _following(one: Named, laws: Sequence[Effect]) -> Named:
+    """The effect with what it shares with the friction at its joint."""
+    at = {name: law_of(laws, one.effect, name) for name in one.tied}
+    shape: dict[str, Any] = {name: getattr(laws[k], name) for name, k in at.items() if k is not None}
+    return replace(one, effect=replace(one.effect, **shape)) if shape else one
+
+
+def _shape_moved(effect: Effect, name: str, by: float) -> Effect:
+    """A shape of positive range moves by its logarithm, any other by itself."""
+    quantity = next(q for q in effect.parameters if q.name == name)
+    here = float(getattr(effect, name))
+    there = here * float(np.exp(np.clip(by, -_FARTHEST, _FARTHEST))) if quantity.low > 0.0 else here + by
+    shape: dict[str, Any] = {name: float(np.clip(there, quantity.low, quantity.high))}
+    return replace(effect, **shape)
+
+
+def number_moved(one: Named, name: str, by: float) -> Named:
+    """Amplitude number `name`, or the shape of that name, moved: a shape of positive range by its logarithm."""
+    if name.isdigit():
+        amplitudes = list(one.amplitudes)
+        amplitudes[int(name)] += by
+        return replace(one, amplitudes=tuple(amplitudes))
+    return replace(one, effect=_shape_moved(one.effect, name, by))
+
+
+Which = tuple[int, int, str]  # 0 a law, 1 an effect; its place; the number of an amplitude, or the name of a shape
+
+_DIFFERENCE = 1e-3  # of a number
+
+
+def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | None = None) -> tuple[Array, list[Which]]:
+    """(numbers, rows) slopes of the torque by every number, those of `rigid` columns first; and which they are behind the base.
+
+    Args:
+        laid: as `model.laid(data)` makes it, where it is known.
+    """
+    further, names = further_slopes(model, data, range(1, data.n_joints + 1), laid)
+    if not _through(model):
+        laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
+        return np.concatenate([rigid, *laws, further]), names
+    columns, arm, kept = model.columns, model.arm, list(model.columns.kept)
+
+    def linear(motion: Motion) -> Array:
+        own = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
+        return recorded(arm, np.concatenate([own, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion)
+
+    return np.concatenate([data.lay(linear), further]), names
+
+
+def further_slopes(
+    model: Exact, data: Data, joints: Container[int | None], laid: Sequence[Array] | None = None
+) -> tuple[Array, list[Which]]:
+    """Return the slopes (numbers, rows) by all that is not a base parameter, and which they are.
+
+    Args:
+        joints: of whose friction laws the shapes are among them.
+    """
+    laws = model.columns.laws
+    bent, which = law_slopes(data, model.columns, model.beta)
+    own = [k for k, (place, _) in enumerate(which) if laws[place].joint in joints]
+    bent, names = [bent[k] for k in own], [(0, *which[k]) for k in own]
+    make = _slopes_through if _through(model) else _slopes_beside
+    more = make(model, data, bent, names, laid)
+    return np.concatenate([np.zeros((0, data.rows)), *more]), names
+
+
+def _through(model: Exact) -> bool:
+    """Return whether all torque passes through an effect, a lag of the record."""
+    return any(one.effect.acts_on == "record" for one in model.effects)
+
+
+def _slopes_beside(
+    model: Exact, data: Data, bent: list[Array], names: list[Which], laid: Sequence[Array] | None
+) -> list[Array]:
+    more, core = list(bent), model.core
+    here = model.core_torque(data, core) if core else np.zeros(0)
+    whole = any(one.effect.acts_on in ("encoder", "drive") for one in model.effects)
+    if whole:  # friction is felt where the joint truly is, and comes late
+        more = [_of_law(model, data, here, one) for one in names]
+    columns = model.laid(data) if laid is None else laid
+    for place, one in enumerate(model.effects):
+        own = columns[place - core] if place >= core else None
+        alone = here if own is None else one.effect.amplitudes(one.values) @ own
+        steps = [(name, step) for name, step in _steps(one) if own is None or not name.isdigit()]
+        if own is not None:  # it is linear in its amplitudes
+            amplitudes = [name for name, _ in _steps(one) if name.isdigit()]
+            names += [(1, place, name) for name in amplitudes]
+            more += [own[int(name)][None] for name in amplitudes]
+        there = _with(model, data, place, core, [number_moved(one, name, step) for name, step in steps])
+        names += [(1, place, name) for name, _ in steps]
+        for (name, step), torque in zip(steps, there, strict=True):
+            if _is_nothing(one, name):  # of what the arm does not feel either way no slope is left, and not the curvature
+                other = _with(model, data, place, core, [number_moved(one, name, -step)])[0]
+                more.append((torque - other)[None] / (2.0 * step))
+            else:
+                more.append((torque - alone)[None] / step)
+        for name in () if whole else one.tied:  # it moves with the friction at its joint
+            law = (0, law_of(model.columns.laws, one.effect, name), name)
+            if law in names:
+                torque = _with(model, data, place, core, [number_moved(one, name, _DIFFERENCE)])[0]
+                more[names.index(law)] = more[names.index(law)] + (torque - alone)[None] / _DIFFERENCE
+    return more
+
+
+def _with(model: Exact, data: Data, place: int, core: int, moved: Sequence[Named]) -> list[Array]:
+    """(rows,) of an effect with each of these numbers: of what just adds its torque, else that of the whole core."""
+    if place >= core:
+        return model.added(data, *moved)
+    return [replace(model, effects=(*model.effects[:place], one, *model.effects[place + 1:core])).core_torque(data, core)
+            for one in moved]
+
+
+def _is_nothing(one: Named, name: str) -> bool:
+    """Return whether a number is an amplitude that is 0."""
+    return name.isdigit() and one.amplitudes[int(name)] == 0.0
+
+
+def _slopes_through(
+    model: Exact, data: Data, bent: list[Array], names: list[Which], laid: Sequence[Array] | None
+) -> list[Array]:
+    arm = model.arm
+
+    def alone(one: Named) -> Array:
+        return data.lay_each(lambda log, motion: recorded(
+            arm, one.effect.at(one.values).columns(motion, model.nominal) @ np.array(one.amplitudes), motion)
+            if one.log in (None, log) else np.zeros_like(motion.q))
+
+    here = model.torque(data)
+    as_read = not any(one.effect.acts_on in ("encoder", "drive") for one in model.effects)
+    more = [_of_law(model, data, here, one) for one in names]
+    for place, one in enumerate(model.effects):
+        for name, size in _steps(one):
+            names.append((1, place, name))
+            there = number_moved(one, name, size)
+            if adds(one.effect) and as_read:
+                more.append((alone(there) - alone(one))[None] / size)
+            else:
+                effects = (*model.effects[:place], there, *model.effects[place + 1:])
+                more.append((replace(model, effects=effects).torque(data) - here)[None] / size)
+    return more
+
+
+def _of_law(model: Exact, data: Data, here: Array, law: Which) -> Array:
+    """(1, rows) slope of the whole torque, which is `here`, by a shape of a friction law."""
+    step = np.array([*np.zeros(len(model.beta)), _DIFFERENCE])
+    return (model.moved(step, [law]).torque(data) - here)[None] / _DIFFERENCE
+
+
+def _steps(one: Named) -> list[tuple[str, float]]:
+    """Numbers of an effect and how far each is moved for its slope."""
+    found = []
+    if one.free_amplitudes:
+        size = max((abs(a) for a in one.amplitudes), default=0.0) or 1e-3
+        found = [(str(k), _DIFFERENCE * max(abs(a), 0.1 * size)) for k, a in enumerate(one.amplitudes)]
+    for q in one.free_shapes:
+        here = abs(float(getattr(one.effect, q.name)))
+        wide = min(q.high - q.low, 1e2)
+        step = _DIFFERENCE if q.low > 0.0 else _DIFFERENCE * max(here, 1e-2 * wide)
+        top = float(getattr(one.effect, q.name)) >= q.high
+        found.append((q.name, -step if top else step))
+    return found

@@ -1,0 +1,339 @@
+"""Fit an exact model: Gauss-Newton over every number at once, and the covariance of all.
+
+    fit = refine(model, data, weight)
+    fit.residual, fit.covariance()
+    torque_gain_of(data, before, after)            residuals of two models on held-out rows, compared
+
+Friction takes power out of a joint: the amplitudes of its laws do not become negative. A negative
+viscous friction leaves a little less where it was fitted, and is wrong at every other speed.
+Columns are brought to unit length first, so that units do not matter; directions that rounding
+makes are left alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.fit.bootstrap import apart
+from pipelines.log.experiment import Array
+from pipelines.model.effects.base import Effect
+from pipelines.model.effects.kinds import FrictionLaw
+from pipelines.model.rows.data import Data
+from pipelines.model.rows.exact import Exact, Which, slopes_of
+from pipelines.model.rows.nominal import rigid_rows
+
+__all__ = ["Refined", "TorqueGain", "covariance", "dissipating", "driving", "left_out", "refine",
+           "solved", "superfluous", "torque_gain_of", "worse_log"]
+
+
+def dissipating(beta: Array, laws: Sequence[Effect]) -> Array:
+    """`beta`, its last numbers the amplitudes of `laws`, with those of friction not below zero where their range begins there."""
+    bound = _bounded(len(beta), laws)
+    return np.where(bound, np.maximum(beta, 0.0), beta)
+
+
+def driving(beta: Array, shift: Array, laws: Sequence[Effect]) -> list[int]:
+    """Places of the amplitudes that `shift` (its first numbers those of `beta`) would take below zero."""
+    there = beta + shift[:len(beta)]
+    return np.flatnonzero(_bounded(len(beta), laws) & (there < 0.0)).tolist()
+
+
+def _bounded(count: int, laws: Sequence[Effect]) -> npt.NDArray[np.bool_]:
+    own = [isinstance(law, FrictionLaw) and quantity.low == 0.0
+           for law in laws for quantity in law.parameters if not quantity.shape]
+    return np.array([False] * (count - len(own)) + own, dtype=bool)
+
+
+_LAGS = 20  # rows next to each other that share the noise of the low-pass
+_ROUNDING = 1e-11  # of the largest eigenvalue
+_ALONE = 1e-9  # the same: what a block alone tells, the others do not move
+
+
+def solved(table: Array, y: Array, ridge: float = 0.0) -> Array:
+    """(k,) coefficients of `table` (k, rows), smallest where rows do not tell; `ridge` of unit columns."""
+    unit, size = _unit(table)
+    values, vectors = _seen(unit @ unit.T)
+    return np.asarray((vectors / (values + ridge)) @ (vectors.T @ (unit @ y)) / size)
+
+
+def superfluous(table: Array, wanted: Sequence[int], least: float) -> list[int]:
+    """Which of the `wanted` columns of `table` (k, rows) the others are as well, but for a part below `least` of their length.
+
+    The one that is seen least goes first, and no longer counts as one of the others: of two columns that are nearly the same one
+    stays (pivoting, as in Golub & Van Loan 2013, ch. 5.4).
+    """
+    unit, _ = _unit(table)
+    gram, left = unit @ unit.T, list(wanted)
+    gone: list[int] = []
+    while left:
+        seen = [_apart(gram, place, gone) for place in left]
+        lowest = int(np.argmin(seen))
+        if seen[lowest] >= least:
+            break
+        gone.append(left.pop(lowest))
+    return gone
+
+
+def _apart(gram: Array, place: int, gone: Sequence[int]) -> float:
+    """Part of one unit column that no combination of the others is, but for those that are gone."""
+    others = np.ones(len(gram), dtype=bool)
+    others[[place, *gone]] = False
+    values, vectors = _seen(gram[np.ix_(others, others)])
+    along = vectors.T @ gram[others, place]
+    return float(np.sqrt(np.clip(gram[place, place] - float(along @ (along / values)), 0.0, 1.0)))
+
+
+def covariance(table: Array, residual: Array) -> Array:
+    """(k, k) of the coefficients of `table` (k, rows), weighted.
+
+    Newey & West 1987 over the rows of each joint, 20 lags: neighbouring rows share the noise of the low-pass. Their weights
+    1 - l / (L + 1) are those of the products of sums over L + 1 rows:
+
+        Σ_l (1 - |l| / (L + 1)) Σ_t s_t s_{t+l}ᵀ = 1 / (L + 1) Σ_t u_t u_tᵀ,    u_t = s_{t-L} + … + s_t
+    """
+    unit, size = _unit(table)
+    values, vectors = _seen(unit @ unit.T)
+    bread = (vectors / values) @ vectors.T
+    none = np.zeros((len(unit), _LAGS + 1))
+    upto = np.cumsum(np.concatenate([none, unit * residual, none[:, :_LAGS]], axis=1), axis=1)
+    sums = upto[:, _LAGS + 1:] - upto[:, :-_LAGS - 1]
+    meat = sums @ sums.T / (_LAGS + 1)
+    return np.asarray(bread @ meat @ bread / size / size[:, None])
+
+
+def left_out(table: Array, residual: Array, blocks: npt.NDArray[np.intp]) -> Array:
+    """Standard deviations (k,) of the same coefficients, by how each moves where one of the `blocks` (rows,) of time is left out:
+    the jackknife (Miller 1974), to first order around the solution.
+
+    What a law of the model lacks is no noise: it stays alike for longer than neighbouring rows, and other time asks for other
+    numbers. With G = X Xᵀ and s_b = X_b r_b of block b, its leaving moves them by -(G - X_b X_bᵀ)⁻¹ s_b.
+    """
+    unit, size = _unit(table)
+    gram = unit @ unit.T
+    moved = []
+    for block in range(int(blocks.max()) + 1):
+        own = unit[:, blocks == block]
+        values, vectors = _seen(gram - own @ own.T, _ALONE)
+        moved.append((vectors / values) @ (vectors.T @ (own @ residual[blocks == block])))
+    count = len(moved)
+    return np.asarray(np.sqrt((count - 1.0) * np.var(moved, axis=0)) / size)
+
+
+def _unit(table: Array) -> tuple[Array, Array]:
+    size = np.linalg.norm(table, axis=1)
+    size = np.where(size > 0.0, size, 1.0)
+    return table / size[:, None], size
+
+
+def _seen(gram: Array, least: float = _ROUNDING) -> tuple[Array, Array]:
+    values, vectors = np.linalg.eigh(gram)
+    keep = values > least * values[-1]
+    return values[keep], vectors[:, keep]
+
+
+_STEPS = 8
+_SHARES = (1.0, 0.4, 0.1)  # of a step, until one leaves less
+_RIDGES = (0.0, 1e-4, 1e-2)  # of unit columns: two numbers that do nearly the same would be moved far apart
+_GAIN = 1e-5  # of the squared residual: less is no progress
+_PARTS = 30  # blocks of time, of about a second: longer than noise remembers
+_INVISIBLE = 1e-3  # η below which a number is one that the others are as well
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """A model fitted exactly."""
+
+    model: Exact
+    data: Data
+    weight: Array  # (joints,)
+    left: Array  # (rows,) [N m]
+    slopes: Array  # (numbers, rows) unweighted
+    names: tuple[Which, ...]  # of the slopes behind those of the base
+    known: Array | None = None  # (numbers, numbers) their covariance, where they were fitted to other rows
+
+    @cached_property
+    def weights(self) -> Array:
+        return np.asarray(self.weight[self.data.joint])
+
+    @property
+    def residual(self) -> Array:
+        """(rows,) weighted."""
+        return np.asarray(self.left * self.weights)
+
+    @cached_property
+    def rss(self) -> float:
+        """Squared weighted residual."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def rms(self) -> Array:
+        return self.data.rms(self.left)
+
+    def of_effect(self, place: int) -> list[int]:
+        """Which slopes belong to effect number `place`."""
+        first = len(self.model.beta)
+        return [first + k for k, (kind, which, _) in enumerate(self.names) if kind == 1 and which == place]
+
+    @cached_property
+    def unseen(self) -> list[int]:
+        """Which slopes, of effects, the others are as well: those numbers stay where they were, for these logs do not tell them."""
+        if self.known is not None:  # where they were fitted they were held
+            return [k for k in range(len(self.model.beta), len(self.slopes)) if self.names[k - len(self.model.beta)][0] == 1
+                    and self.known[k, k] == 0.0]
+        return _superfluous(self.slopes * self.weights, len(self.model.beta), self.names)
+
+    def covariance(self) -> Array:
+        """(numbers, numbers): (JᵀJ)⁻¹ with the residual's own autocorrelation allowed for; zero of what is `unseen` and held.
+
+        Of a number that blocks of time left out in turn move by more than that, what they say is its deviation: noise is not all
+        that is left. Not to be written to.
+        """
+        return self._own_covariance if self.known is None else self.known
+
+    @cached_property
+    def _own_covariance(self) -> Array:
+        seen = np.ones(len(self.slopes), dtype=bool)
+        seen[self.unseen] = False
+        table, whole = (self.slopes * self.weights)[seen], np.zeros((len(seen), len(seen)))
+        residual = self.residual
+        noise = covariance(table, residual)
+        std = np.sqrt(np.maximum(np.diag(noise), 1e-300))
+        wider = np.maximum(left_out(table, residual, self.data.blocks(_PARTS)) / std, 1.0)
+        whole[np.ix_(seen, seen)] = noise * wider * wider[:, None]
+        whole.flags.writeable = False
+        return whole
+
+
+def refine(model: Exact, data: Data, weight: Array, steps: int = _STEPS) -> Refined:
+    """Gauss-Newton with halved steps until the squared weighted residual no longer falls."""
+    with np.errstate(all="ignore"):  # a step too far may run away: it is not taken then
+        return _refined(model, data, weight, steps)
+
+
+def _refined(model: Exact, data: Data, weight: Array, steps: int) -> Refined:
+    y, weights = data.y, weight[data.joint]
+    rigid = rigid_rows(data, model.columns)
+    model = replace(model, beta=dissipating(model.beta, model.columns.laws))
+    laid = model.laid(data)
+    left = y - model.torque(data, laid)
+    now = _power(data, left, weight)
+    slopes, names = slopes_of(model, data, rigid, laid)
+    for _ in range(steps):
+        better, table, y_left = False, slopes * weights, left * weights
+        for ridge in _RIDGES:
+            try:
+                shift = _within(model, names, table, y_left, ridge)
+            except np.linalg.LinAlgError:  # of numbers at which nothing can be solved: they stay, and gain nothing
+                break
+            for share in _SHARES:
+                there = model.moved(share * shift, names)
+                laid = there.laid(data)
+                other = y - there.torque(data, laid)
+                power = _power(data, other, weight)
+                if power < now:
+                    better = True
+                    break
+            if better:
+                break
+        if not better:
+            break
+        gained, model, left, now = 1.0 - power / now, there, other, power
+        slopes, names = slopes_of(model, data, rigid, laid)
+        if gained < _GAIN:
+            break
+    return Refined(model, data, weight, left, slopes, tuple(names))
+
+
+def _power(data: Data, left: Array, weight: Array) -> float:
+    residual = left * weight[data.joint]
+    return float(residual @ residual)
+
+
+def _within(model: Exact, names: list[Which], table: Array, y: Array, ridge: float) -> Array:
+    """The step for every number. The others do without one that would leave its range, and stays at its end; without friction that
+    would drive its joint; and without one of an effect that the rest of the model does as well: rounding would move it anywhere."""
+    first = len(model.beta)
+    stuck = _superfluous(table, first, names)
+    shift = _without(table, y, ridge, stuck)
+    beyond = [first + k for k, which in enumerate(names) if _beyond(model, which, float(shift[first + k]))]
+    held = driving(model.beta, shift, model.columns.laws)
+    while beyond or held:
+        shift = _without(table, y + model.beta[held] @ table[held], ridge, [*stuck, *beyond, *held])
+        shift[held] = -model.beta[held]
+        more = driving(model.beta, shift, model.columns.laws)  # of those that were free until then
+        if not more:
+            break
+        held = sorted({*held, *more})
+    return shift
+
+
+def _superfluous(table: Array, first: int, names: Sequence[Which]) -> list[int]:
+    """Of the numbers of effects, whose slopes stand behind the `first` of `table` (numbers, rows)."""
+    return superfluous(table, [first + k for k, (kind, _, _) in enumerate(names) if kind == 1], _INVISIBLE)
+
+
+def _without(table: Array, y: Array, ridge: float, stuck: list[int]) -> Array:
+    free = np.ones(len(table), dtype=bool)
+    free[stuck] = False
+    shift = np.zeros(len(table))
+    shift[free] = solved(table[free], y, ridge)
+    return shift
+
+
+def _beyond(model: Exact, which: Which, by: float) -> bool:
+    """Return whether a shape stands at the end of its range, and `by` points out of it."""
+    kind, place, name = which
+    if name.isdigit():
+        return False
+    effect = model.columns.laws[place] if kind == 0 else model.effects[place].effect
+    return effect.at_end(name, by)
+
+
+@dataclass(frozen=True)
+class TorqueGain:
+    """Root mean square of the torque residual on held-out equations."""
+
+    before: Array  # [N m]
+    after: Array
+    ci95: Array  # (joints, 2) [N m] in which `after` - `before` lies with 95 %: blocks of time drawn again
+
+
+_BLOCKS = 20  # of the held-out time
+_SEED = 20040509
+
+
+
+_WORSE = 1.05  # times the error of a held-out log, that an extension must not exceed
+
+
+
+def torque_gain_of(data: Data, before: Array, after: Array) -> TorqueGain:
+    """Root mean square of held-out residuals (rows,) [N m], joint by joint, and how sure its change is."""
+    place = data.blocks(_BLOCKS)
+    count = int(place.max()) + 1
+    ci = []
+    for joint in range(data.n_joints):
+        own = (data.joint == joint) & data.counts
+        sums = [np.asarray(np.bincount(place[own], values, minlength=count), dtype=np.float64)
+                for values in (before[own] ** 2, after[own] ** 2, np.ones(int(own.sum())))]
+        ci.append(apart(sums[0], sums[1], sums[2], np.random.default_rng(_SEED)))
+    return TorqueGain(data.rms(before), data.rms(after), np.array(ci))
+
+
+
+def worse_log(data: Data, before: Array, after: Array) -> str:
+    """In which held-out log the torque error grows by more than a tenth, of all joints together; empty where in none."""
+    for place, one in enumerate(data.logs):
+        own = (data.log_of == place) & data.counts
+        joints = data.joint[own]
+        overall = np.maximum(data.rms(before)[joints], 1e-12)
+        for scale in (1.0, overall):  # as they are, and each joint in units of its own error
+            was, now = (float(np.linalg.norm(x[own] / scale)) for x in (before, after))
+            if now > _WORSE * was:
+                return f"the torque error of {one.log.name}, held out, would be {100.0 * (now / was - 1.0):.0f} % larger"
+    return ""

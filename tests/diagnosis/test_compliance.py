@@ -1,0 +1,69 @@
+"""What gives way is named by frequency responses: the sample arm stands on a table that does, at 28 Hz, hardly damped."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.compliance import Compliance, compliance, gaps_untold, untold
+from pipelines.log.files import open_log
+from sample_logs.make_model import synthetic_arm
+
+SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs" / "rrr-healthy"
+
+
+def test_a_soft_base_is_named_with_its_frequency() -> None:
+    """sample_logs/README.md: 28 Hz, damping ratio 0.04; joint 1 feels it in both postures."""
+    found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm())
+    assert found is not None
+    assert [one.place for one in found.named] == ["base_resonance"]
+    numbers = found.named[0].values
+    assert numbers["frequency"] == pytest.approx(28.0, abs=0.2)
+    assert numbers["damping_ratio"] == pytest.approx(0.04, rel=0.1)
+    answers = found.answers(found.named[0])
+    assert [(one.joint, one.posture.shape) for one in answers] == [(1, (3,)), (1, (3,))]
+    for one in answers:  # a dip, then a rise beside the frequency of the base, and no such thing elsewhere
+        sure = (one.coherence > 0.9) & (one.frequency < 45.0)
+        assert 27.0 < one.frequency[sure][np.argmax(one.measured[sure])] < 31.0
+        assert one.fitted[sure] == pytest.approx(one.measured[sure], rel=0.1)
+        level = one.fitted[(one.frequency > 45.0) & (one.frequency < 100.0)]
+        assert np.ptp(level) < 0.1 * level.mean() < np.ptp(one.fitted)
+
+
+def test_without_responses_what_gives_way_is_not_testable() -> None:
+    assert compliance((), synthetic_arm()) is None
+    told = {one.cause: one for one in untold(None)}
+    assert set(told) == {"base_resonance", "joint_elasticity"}
+    assert all("no frf log" in one.reason and one.record for one in told.values())
+
+
+@pytest.mark.slow
+def test_a_gap_is_told_from_a_spring_by_responses_alone() -> None:
+    """Without them, and beside a spring, it has no name; where they show a rigid arm it has."""
+    sprung = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm())
+    assert ["no frf log" in one.reason for one in gaps_untold(None)] == [True]
+    assert ["show compliance" in one.reason for one in gaps_untold(sprung)] == [True]
+    assert not any("Measure frequency responses" in one.record for one in gaps_untold(sprung))
+    assert gaps_untold(Compliance((), "")) == ()
+    assert gaps_untold(None, ("backlash",)) == ()
+
+
+def test_responses_of_no_use_are_said() -> None:
+    """A log in which v never moves anything answers nothing: the reason stands where the causes would."""
+    log = open_log(SAMPLES / "frf-1-1.h5").log
+    still = replace(log, signals={**log.signals, "v": replace(log.signals["v"], values=np.zeros_like(log.signals["v"].values))})
+    found = compliance([still], synthetic_arm())
+    assert found is not None
+    assert not found.named
+    assert {one.reason for one in untold(found)} == {found.open}
+    assert "frequency responses are of no use" in found.open
+
+
+@pytest.mark.slow
+def test_a_cause_left_out_is_not_named() -> None:
+    found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm(), ("base_resonance",))
+    assert found is not None
+    assert not found.named

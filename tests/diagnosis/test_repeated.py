@@ -1,0 +1,64 @@
+"""What differs between rows of one state is noise, whatever they have in common beside it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.diagnosis.decision import Repeated
+from pipelines.log.experiment import Array
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.rows.data import Data
+from pipelines.model.rows.prepare import Logs, prepare
+from tests.diagnosis.arms import hidden
+
+NOISE = 0.05
+
+
+@pytest.fixture(scope="module")
+def twice() -> Data:
+    """One motion in two logs, neither of which declares a period."""
+    return prepare(Logs((hidden(1), replace(hidden(1), name="again"))), Recipe()).data
+
+
+def wrong(data: Data, size: float) -> Array:
+    """Torque (rows,) that hangs on position and speed, `size` of root mean square."""
+    found = data.lay(lambda motion: np.sin(9.0 * motion.q) + np.sign(motion.dq))
+    return np.asarray(size * found / found.std())
+
+
+@pytest.mark.parametrize("size", [0.0, 0.02, 2.0])
+def test_noise_beside_a_wrong_model(twice: Data, size: float) -> None:
+    rng = np.random.default_rng(1)
+    left = wrong(twice, size) + rng.normal(size=twice.rows) * NOISE
+    pairs = Repeated.of(twice)
+    common, differing = pairs.parts(left)
+    assert pairs.noise(left) == pytest.approx(np.full(3, NOISE**2), rel=0.2)
+    assert np.mean(common - differing) == pytest.approx(size**2, rel=0.2, abs=1e-4)
+
+
+def test_no_row_is_in_two_pairs_and_none_beside_its_partner(twice: Data) -> None:
+    pairs = Repeated.of(twice)
+    every = np.concatenate([pairs.first, pairs.second])
+    assert len(np.unique(every)) == len(every)
+    time = np.concatenate([one.t for one in twice.logs])
+    log = np.repeat([0, 1], [one.rows for one in twice.logs])
+    apart = np.abs(time[pairs.first] - time[pairs.second]) > 0.99
+    assert (apart | (log[pairs.first] != log[pairs.second])).all()
+
+
+def test_where_nothing_comes_again_nobody_knows_the_noise() -> None:
+    data = prepare(Logs((hidden(1), hidden(2))), Recipe()).data
+    assert np.isnan(Repeated.of(data).noise(np.ones(data.rows))).all()
+
+
+def test_rows_that_do_not_count_are_not_asked(twice: Data) -> None:
+    first, second = twice.logs
+    weighed = first.weighed.copy()
+    weighed[0, 200:260] = False
+    data = replace(twice, logs=(replace(first, weighed=weighed), second))
+    left = np.random.default_rng(2).normal(size=data.rows) * NOISE
+    left[200:260] = 40.0
+    assert Repeated.of(data).noise(left)[0] == pytest.approx(NOISE**2, rel=0.2)

@@ -1,0 +1,94 @@
+"""What frequency responses name enters the model, and is judged by held-out motion: a soft base on the test bench, its responses'
+numbers given (that they are found is tested in test_compliance). With reference logs only a base that became soft is news."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from pipelines.bench.faults import make
+from pipelines.bench.machine import draw_machine
+from pipelines.diagnosis import engine, extension
+from pipelines.diagnosis.compliance import Compliance, new_causes
+from pipelines.log.experiment import ExperimentLog
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects.base_resonance import BaseResonance
+from pipelines.model.rows.families import Wanted
+from pipelines.model.rows.prepare import Logs
+from pipelines.report.diagnosis_finding import finding_section
+from tests.diagnose.sessions import but, session
+from tests.diagnosis.asking import answered, extended
+
+FEW = but("base_resonance", "torque_offset")
+
+
+def base(frequency: float | None = None, std: float = 0.02) -> Acting:
+    """The bench's soft base at full strength as responses would tell it, or one of another frequency."""
+    true = make("base_resonance", draw_machine(7, "fault"), None, 1, 1.0).parameters()
+    values = {name: float(value) for name, value in true.items() if isinstance(value, float)}
+    values |= {"frequency": frequency} if frequency else {}
+    return Acting.of(BaseResonance(), values, {name: std * value for name, value in values.items()})
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def compliance(logs: Sequence[ExperimentLog], arm: Arm, without: Sequence[str] = ()) -> Compliance | None:
+        return Compliance((base(),), "") if logs else None
+
+    for module in (engine, extension):
+        monkeypatch.setattr(module, "compliance", compliance)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("told")
+def test_a_soft_base_is_worth_something_on_held_out_logs_and_enters_the_model() -> None:
+    fitted, judging = session("base_resonance", None)
+    found = answered(Logs((fitted,), (judging,), (), (fitted,)), exclude=FEW, whole=True)
+    assert [(one.cause, one.origin) for one in found.findings] == [("base_resonance", "frequency responses")]
+    gain = found.findings[0].gain
+    assert gain.validate_torque_rms.ci95[0, 1] < 0.0
+    assert gain.validate_torque_rms.after[0] < 0.5 * gain.validate_torque_rms.before[0]
+    assert gain.simulated_position_rms is not None
+    assert gain.simulated_position_rms.after[0] < gain.simulated_position_rms.before[0]
+    assert found.extended is not None
+    assert [one.place for one in found.extended.effects] == ["base_resonance"]
+    assert found.after_rms.validate[0] == pytest.approx(gain.validate_torque_rms.after[0], rel=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("told")
+def test_what_does_harm_to_the_model_is_told_once() -> None:
+    """Responses name a soft base where motion shows a firm one: a finding, with why the model goes without it."""
+    fitted, judging = session(seed=3)
+    found = answered(Logs((fitted,), (judging,), (), (fitted,)), exclude=FEW)
+    assert [one.cause for one in found.findings] == ["base_resonance"]
+    assert found.findings[0].doubt
+    assert "base_resonance" not in [one.cause for one in found.rejected]
+    assert found.extended is not None
+    assert not found.extended.effects
+    section = finding_section(1, found.findings[0], found.residual_rms)
+    assert any("The extended model goes without it" in text for text in section.text)
+    assert not any("rrrid extend" in text for text in section.text)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("told")
+def test_the_extension_takes_the_responses_numbers() -> None:
+    """Nothing but the base: its frequency is that of the responses, within their deviation."""
+    fitted, judging = session("base_resonance", None)
+    found = extended(Logs((fitted,), (judging,), (), (fitted,)), Wanted(BaseResonance()))
+    assert [one.cause for one in found.findings] == ["base_resonance"]
+    assert not found.rejected
+    assert found.arm is not None
+    assert found.arm.effects[0].values["frequency"] == pytest.approx(base().values["frequency"], rel=0.06)
+    assert np.all(found.after.validate <= 1.05 * found.before.validate)
+
+
+def test_a_base_that_was_always_soft_is_no_news_by_its_responses() -> None:
+    """28 Hz again, by a hair; 28 and now 25 Hz; firm and now soft."""
+    now, again, other = base(28.0, 1e-3), base(28.01, 1e-3), base(25.0, 1e-3)
+    assert new_causes(Compliance((now,), ""), Compliance((again,), "")) == ()
+    assert new_causes(Compliance((other,), ""), Compliance((again,), "")) == (other,)
+    assert new_causes(Compliance((now,), ""), Compliance((), "")) == (now,)
