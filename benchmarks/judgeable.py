@@ -22,7 +22,6 @@ from pipelines.diagnosis.decision import facts, nominal_estimate
 from pipelines.errors import RrridError
 from pipelines.estimation.checks.gates import logs_of_roles
 from pipelines.model.estimation.judgeable import Facts, JudgeableConfig, cannot_judge
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import prepare
 from pipelines.stage import Request
@@ -58,7 +57,7 @@ def asked(folder: Path) -> dict[str, Any]:
     except RrridError as refused:
         return {"refused": f"{refused.code}: {refused.message}"}
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
-    rows = Recipe(cutoff_hz=DiagnosisConfig.cutoff_hz)
+    rows = DiagnosisConfig().recipe()
     prepared = with_terms_told_apart(prepare(chosen, rows), settings.blocks)
     known = facts(found, prepared, nominal_estimate(prepared))
     return {"verdict": found.verdict, "origin": found.noise_floor_origin,

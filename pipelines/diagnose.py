@@ -23,7 +23,6 @@ from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.log.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.named_cause import refuse_unknown
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, Logs, prepare
@@ -129,8 +128,8 @@ def compute(inputs: Inputs, settings: Settings, whole: bool = True) -> Result:
 def _diagnosed(logs: Logs, settings: Settings, given: Material, whole: bool) -> tuple[Diagnosis, Extended | None]:
     """Return the causes, each joint and cause in one Gaussian model of reference logs and later ones."""
     usual = DiagnosisConfig()
-    config = replace(usual, causes=settings.max_causes, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
-    rows = Recipe(cutoff_hz=config.cutoff_hz, decimation=settings.decimate, min_speed=settings.min_speed)
+    config = replace(usual, causes=settings.max_causes, cutoff_hz=settings.cutoff_hz)
+    rows = config.recipe(settings.decimate, settings.min_speed)
     prepared = with_terms_told_apart(prepare(logs, rows, given.arm), settings.blocks)
     given.tell("comparing with the reference logs" if logs.reference else "looking for causes")
     found = diagnose_prepared(prepared, config, settings.exclude)

@@ -34,7 +34,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
-from pipelines.model.estimation.logs import Motions, Recipe
+from pipelines.model.estimation.logs import Motions
 from pipelines.model.estimation.outcome import torques, validity
 from pipelines.model.motion import Reconstructed
 from pipelines.model.named_cause import refuse_unknown, wanted_cause
@@ -122,8 +122,8 @@ def compute(inputs: Inputs, settings: Settings) -> Extension:
     found = before.extension if before is not None and not settings.causes else None
     if found is None:
         usual = DiagnosisConfig()
-        config = replace(usual, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
-        rows = Recipe(cutoff_hz=config.cutoff_hz, decimation=settings.decimate, min_speed=settings.min_speed)
+        config = replace(usual, cutoff_hz=settings.cutoff_hz)
+        rows = config.recipe(settings.decimate, settings.min_speed)
         prepared = with_terms_told_apart(prepare(chosen, rows, given.arm), settings.blocks)
         given.tell(f"fitting {', '.join(dict.fromkeys(one.place for one in wanted))}")
         found = extend(prepared, _each(wanted), config, settings.blocks)

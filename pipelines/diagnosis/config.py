@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.model.estimation.logs import Recipe
+
 __all__ = ["DiagnosisConfig"]
 
 
@@ -11,9 +13,8 @@ __all__ = ["DiagnosisConfig"]
 class DiagnosisConfig:
     """All deciding numbers of the diagnosis; `benchmarks.sensitivity` varies each by ½ and 2."""
 
-    cutoff_hz: float = (
-        25.0  # zero-phase low-pass of all rows: above it quantised positions dominate
-    )
+    cutoff_hz: float | None = None  # zero-phase low-pass of all rows; None: as `recipe`
+    highest_hz: float = 25.0  # of a low-pass that is found: above it quantised positions dominate
     alpha: float = 0.01  # family-wise error of screening, all candidates together
     set_alpha: float = 0.05  # of the model confidence set (Hansen, Lunde & Nason 2011)
     block: float = 1.0  # [s] blocks of the predictive score, longer than the low-pass remembers
@@ -42,3 +43,20 @@ class DiagnosisConfig:
     misfit: float = (
         0.01  # share of a joint's torque that repeats, and no cause explains, which is a fault
     )
+
+    def recipe(
+        self, decimation: int | None = None, min_speed: tuple[float, ...] = (0.0,)
+    ) -> Recipe:
+        """Return how rows are made: within the band that the motion and ripple of a turn fill.
+
+        In closed loop what lies above that is the drive's answer to noise: there the motion is late
+        behind the torque whatever the arm is, and a delay or a lag is found in any (Ljung 1999,
+        13.4).
+        """
+        return Recipe(
+            cutoff_hz=self.cutoff_hz,
+            decimation=decimation,
+            min_speed=min_speed,
+            orders=self.ripple_orders,
+            highest_hz=self.highest_hz,
+        )

@@ -20,7 +20,6 @@ from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
@@ -96,7 +95,7 @@ def diagnose(
         InputRejected: as `prepare`, logs that give no rows.
     """
     config = config or DiagnosisConfig()
-    prepared = prepare(Logs.by_role(logs), Recipe(cutoff_hz=config.cutoff_hz))
+    prepared = prepare(Logs.by_role(logs), config.recipe())
     return diagnose_prepared(prepared, config, exclude)
 
 

@@ -7,7 +7,6 @@ import pytest
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import Diagnosis, diagnose, pose
 from pipelines.diagnosis.screening import best_of
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import healthy_again, session
 
@@ -28,7 +27,7 @@ def test_what_moves_base_parameters_as_well_is_no_payload(cause: str, joint: int
 def test_a_longer_link_is_screened_beside_the_masses_that_it_moves() -> None:
     """What screening says that it saves is what a fit saves, in which how heavy each link is stays free."""
     config, logs = DiagnosisConfig(), (*healthy_again(session()), *session("link_length"))
-    later = pose(prepare(Logs.by_role(logs), Recipe(cutoff_hz=config.cutoff_hz)), config)
+    later = pose(prepare(Logs.by_role(logs), config.recipe()), config)
     start = later.start()
     seen = best_of(later.screened(start))["link_length", None]
     effect = later.dictionary.families[seen.group.key].shapes[seen.group.shape]

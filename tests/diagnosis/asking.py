@@ -13,7 +13,6 @@ from pipelines.diagnosis.result import Diagnosis as Answer
 from pipelines.diagnosis.result import Extended
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, Logs, Prepared, prepare
@@ -24,7 +23,7 @@ _USUAL = DiagnosisConfig()
 
 
 def diagnosed(
-    *logs: ExperimentLog, exclude: Sequence[str] = (), cutoff_hz: float = _USUAL.cutoff_hz
+    *logs: ExperimentLog, exclude: Sequence[str] = (), cutoff_hz: float | None = None
 ) -> Diagnosis:
     """Return what the engine says of logs in their roles."""
     return diagnose(logs, replace(_USUAL, cutoff_hz=cutoff_hz), exclude)
@@ -57,14 +56,14 @@ def effects(found: Diagnosis) -> tuple[Acting, ...]:
 
 
 def prepared_for(
-    logs: Logs, arm: Arm | None = None, cutoff_hz: float = _USUAL.cutoff_hz
+    logs: Logs, arm: Arm | None = None, cutoff_hz: float | None = None
 ) -> Prepared:
     """Return the rows of logs, with friction laws of as many terms as the logs tell apart."""
-    return with_terms_told_apart(prepare(logs, Recipe(cutoff_hz=cutoff_hz), arm), BLOCKS)
+    return with_terms_told_apart(prepare(logs, replace(_USUAL, cutoff_hz=cutoff_hz).recipe(), arm), BLOCKS)
 
 
 def extended(
-    logs: Logs, *wanted: Wanted, arm: Arm | None = None, cutoff_hz: float = _USUAL.cutoff_hz
+    logs: Logs, *wanted: Wanted, arm: Arm | None = None, cutoff_hz: float | None = None
 ) -> Extended:
     """Return the model extended by the wanted causes."""
     config = replace(_USUAL, cutoff_hz=cutoff_hz)

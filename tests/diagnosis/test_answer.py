@@ -16,7 +16,6 @@ from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.diagnosis.result import Diagnosis, Extended, Finding
 from pipelines.log.hdf5 import read_parts
 from pipelines.model.effects import find_effect
-from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
@@ -38,7 +37,7 @@ def _arm(shared: Path, number: str) -> _Arm:
     (truth,) = answers[f"arm-{number}"]["truth"]
     paths = sorted((shared / f"plant-b/arm-{number}").glob("*.h5"))
     config = DiagnosisConfig()
-    settings = Recipe(cutoff_hz=config.cutoff_hz)
+    settings = config.recipe()
     prepared = prepare(Logs.by_role([read_parts(path)[0] for path in paths]), settings)
     found = diagnose_prepared(prepared, config)
     told, extended = answer(prepared, found, lambda words: None, _BLOCKS, whole=False)
