@@ -16,6 +16,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
+from pipelines.log.recording.clock import counted_on
 from pipelines.log.recording.column_names import read_name, words_of
 from pipelines.log.recording.column_roles import Group, unit_of_group
 from pipelines.log.recording.evidence import Guess, Slope, units_of_ratio
@@ -93,7 +94,7 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
 
 def _single(table: RawTable, column: str) -> Clock:
     unit = unit_of_group([column], table)[0] or ""
-    return Clock((column,), (unit,), table.columns[column])
+    return Clock((column,), (unit,), counted_on(table.columns[column])[0])
 
 
 def _rises(values: Array) -> bool:
