@@ -356,7 +356,7 @@ def untrue(draft: str, lay: Layout, answer: Answer, run: Run) -> list[str]:
     claimed = torque not in (None, ASK, *answer.torque) and "unsure" not in line
     if claimed and recipe.get("signals", {}).get("tau"):
         wrong.append(f"torque: {torque}")
-    if "add sign = -1" in draft:
+    if "sign = -1" in draft or "sign = [" in draft:
         wrong.append("sign")
     if not asks(draft) and not answer.draftable:
         wrong.append("a draft without blanks")
