@@ -139,6 +139,8 @@ class _Drafting:
             if not clock.paired and not clock.units[0] and (said := stated_unit(reading.table.notes, "time")) and said.value:
                 clock = replace(clock, units=(said.value,))
             self.clock_unit, self.clock_guess = unit_of_clock(clock, self.q, reading.slope)
+            if not clock.units[0] and (ticks := stated_scale(reading.table.notes, "time")):
+                self.clock_unit, self.clock_guess = "", Guess("", "unsure", f"the file states '{ticks[0].words}'")
             self._clock_by_rate(clock)
             factor = 1.0 if clock.paired else SECONDS.get(self.clock_unit)
             factor = 1.0 / self.rate if self.clock_unit == "sample" and self.rate > 0.0 else factor
@@ -466,7 +468,7 @@ class _Drafting:
         """Return the unit of the torques, "" where columns, file or positions leave it open."""
         q = self.reading.q.group
         guess, peak = torque_unit(tau, named, self.current, self.links, self.reading.message), f"up to {np.abs(tau).max():.4g}"
-        if group.words == WITHOUT_NAME:
+        if group.words == WITHOUT_NAME and named is None:
             return Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
         if guess.confidence == "sure":
             if self._noted_motor or (group.motor and not self.current and not self._followed):
@@ -570,8 +572,9 @@ class _Drafting:
 
     @property
     def _noted_motor(self) -> bool:
-        """Tell whether a line above the table says that its numbers are the motors', and the robot's links do not deny it."""
-        return not self._followed and any(_MOTOR_SIDE.search(note) for note in self.reading.table.notes)
+        """Tell whether a line of the file says that its numbers are the motors', or names a gear, and no links deny it."""
+        notes = self.reading.table.notes
+        return not self._followed and (stated_gear(notes) is not None or any(_MOTOR_SIDE.search(note) for note in notes))
 
     def _missing(self) -> list[str]:
         """Return [missing] with the numbers that mark a lost sample; nothing where none does."""

@@ -75,7 +75,7 @@ def _wanted(listed: list[tuple[str, tuple[int, ...], str]], source: str) -> list
     declared = sum(8 * math.prod(shape) for _, shape, kind in listed if kind in _NUMERIC)
     if declared > BUDGET or any(size < 0 for _, shape, _ in listed for size in shape):
         raise InputRejected("X05", f"declares {declared} bytes of samples", where=source, remedy="split the recording")
-    names = [name for name, _, kind in listed if kind in (*_NUMERIC, "struct") and not name.startswith("__")]
+    names = [name for name, _, kind in listed if kind in (*_NUMERIC, "struct", "char") and not name.startswith("__")]
     foreign = [f"{name} ({kind})" for name, _, kind in listed if kind not in _HARMLESS]
     if not names:
         if foreign:

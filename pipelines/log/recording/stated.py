@@ -30,6 +30,7 @@ _SCALE = (re.compile(rf"{_NUMBER}\s*([^\W\d][^\s\d/]*){_PER}(?:one )?{_COUNT}\b"
           re.compile(rf"(?<![\w.])1 ?{_COUNT}\s*(?:=|is|corresponds to|equals)\s*{_NUMBER}\s*([^\W\d][^\s\d,;]*)"))  # fmt: skip
 _RATIO = re.compile(r"(?<![\d:.])(\d+(?:[.,]\d+)?)\s*:\s*(\d+(?:[.,]\d+)?)(?![\d:])")
 _QUANTITY = re.compile(rf"{_NUMBER}\s*(k?hz|fps|sps|[mµμu]?s(?:ec\w*)?|milli\w+|micro\w+|毫秒|ミリ秒|秒)?(?![\w/])")
+_THINNED = re.compile(r"decimat\w*\W+(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)|jede[rn]? \d")
 _UNIT_OF_NAME = re.compile(r"[a-z].*[\[(_ ](k?hz|[mµμu]?s)(?:[\])]|\b)(?=[^a-z]*$)")
 _GEARS = frozenset({
     "gear", "gears", "gearbox", "gearing", "reduction", "reducer", "planetary", "harmonic", "ratio", "getriebe",
@@ -140,9 +141,9 @@ def stated_rate(notes: Sequence[str]) -> Statement | None:
     found: dict[float, str] = {}
     for clause in _clauses(notes):
         text = plain_letters(clause).lower()
+        if _THINNED.search(text):
+            found.setdefault(math.nan, clause)
         if not _SAMPLED.search(text) or _NOT_SAMPLED.search(text):
-            if "decimat" in text and (number := re.search(_NUMBER, text)) and _number(number[1]) != 1.0:
-                found.setdefault(math.nan, clause)
             continue
         named = _UNIT_OF_NAME.search(text)
         for number, unit in _QUANTITY.findall(text):

@@ -20,7 +20,7 @@ _ENGLISH = {
     "acceleration": "ddq qdd qddot acc accel acceleration accelerations ddtheta qacc jacc ddφ ddθ",
     "torque": "tau torque torques trq tq moment moments effort efforts eff mom tor qfrc jtau tauj jtrq τ",
     "current": "i iq isq curr current currents cur amp amps ampere",
-    "time": "t time times tout timestamp timestamps stamp clock sec secs second seconds nsec nsecs nanosec nanosecs "
+    "time": "t ms us ns time times tout timestamp timestamps stamp clock sec secs second seconds nsec nsecs nanosec nanosecs "
     "nanosecond nanoseconds usec usecs microsec microseconds msec millisec milliseconds millis micros nanos elapsed "
     "ts uptime datetime date",
     "index": "idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id cycle",
