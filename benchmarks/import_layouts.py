@@ -98,7 +98,7 @@ UNITS |= {"q°": DEG, "q_ref°": DEG, "dq°": DEGS, "counts": ("counts",), "coun
 UNITS |= {"dq_ref": RADS, "dq_ref°": DEGS, "ddq": ("rad/s^2",), "tau_ref": NM, "N mm": ("N mm",)}
 UNITS |= {"rev": ("turn", "turns", "rev"), "rev/s": ("turn/s", "turns/s", "rev/s"), "?": ()}
 UNITS |= {"mrad": ("mrad",), "mNm": ("mN m", "mNm", "N mm"), "0.1 %": ("0.1 %",), "rpm": ("rpm",)}
-UNITS |= {"mA": ("mA",), "A": ("A",), "kNm": ("kN m", "kNm"), "deg/s": ("deg/s",)}
+UNITS |= {"mA": ("mA",), "A": ("A",), "kNm": ("kN m", "kNm"), "kgf cm": ("kgf cm",), "deg/s": ("deg/s",)}
 
 
 def block(pattern: str, values: np.ndarray, start: int = 1) -> dict[str, np.ndarray]:

@@ -19,7 +19,8 @@ _FASTEST, _SLOWEST = 1e5, 1.0  # [Hz] what robots are recorded at
 _UNITS = {unit: UNITS[unit].factor for unit in ("s", "ms", "us", "ns")}
 
 
-_FULL = (2.0**16, 2.0**24, 2.0**32, 86400.0, 86400e3, 86400e6, 86400e9)  # counters of so many bits, and of a day
+_FULL = (*(2.0**bits * unit for bits in (16, 24, 32) for unit in (1.0, 1e-3, 1e-6)),  # counters of so many bits, some in s
+         *(86400.0 * unit for unit in (1.0, 1e3, 1e6, 1e9)))  # and of a day
 
 
 def counted_on(stamps: Array) -> tuple[Array, float]:

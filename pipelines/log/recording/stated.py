@@ -30,7 +30,7 @@ _SCALE = (re.compile(rf"{_NUMBER}\s*([^\W\d][^\s\d/]*){_PER}(?:one )?{_COUNT}\b"
           re.compile(rf"(?<![\w.])1 ?{_COUNT}\s*(?:=|is|corresponds to|equals)\s*{_NUMBER}\s*([^\W\d][^\s\d,;]*)"))  # fmt: skip
 _RATIO = re.compile(r"(?<![\d:.])(\d+(?:[.,]\d+)?)\s*:\s*(\d+(?:[.,]\d+)?)(?![\d:])")
 _QUANTITY = re.compile(rf"{_NUMBER}\s*(k?hz|fps|sps|[mµμu]?s(?:ec\w*)?|milli\w+|micro\w+|毫秒|ミリ秒|秒)?(?![\w/])")
-_THINNED = re.compile(r"decimat\w*\W+(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)|jede[rn]? \d")
+_THINNED = re.compile(r"decimat\w*+\W++(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)|jede[rn]? \d")
 _UNIT_OF_NAME = re.compile(r"[a-z].*[\[(_ ](k?hz|[mµμu]?s)(?:[\])]|\b)(?=[^a-z]*$)")
 _GEARS = frozenset({
     "gear", "gears", "gearbox", "gearing", "reduction", "reducer", "planetary", "harmonic", "ratio", "getriebe",

@@ -58,10 +58,12 @@ def test_other_frequencies_are_no_rate(lines: list[str]) -> None:
     assert stated_rate(lines) is None
 
 
-def test_a_rate_that_is_decimated_is_open() -> None:
-    found = stated_rate(["physics_dt = 0.005", "decimation = 4"])
+@pytest.mark.parametrize(
+    ("line", "known"), [("decimation = 1", True), ("decimation = 4", False), ("every 10th sample stored", False)])
+def test_a_rate_that_is_thinned_is_open(line: str, known: bool) -> None:
+    found = stated_rate(["physics_dt = 0.005", line])
     assert found is not None
-    assert np.isnan(found.number)
+    assert bool(np.isfinite(found.number)) is known
 
 
 @pytest.mark.parametrize(("line", "counts"), [
