@@ -77,7 +77,8 @@ _WORDS: Final = ((r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"), (r"\bmilli[
                  (r"newton[ -]?met(?:er|re)s?\b", "N m"), (r"newtons?\b", "N"), (r"met(?:er|re)s?\b", "m"),
                  (r"deg(?:ree)?s?\b", "deg"), (r"rad(?:ian)?s?\b", "rad"), (r"\b(?:rev(?:olution)?|turn)s?\b", "rev"),
                  (r"sec(?:ond)?s?\b", "s"), (r"amp(?:ere)?s?\b", "A"), (r"°", "deg"), (r"/s/s\b|/s\^?2\b", "/s^2"),
-                 (r"\bdps\b", "deg/s"), (r"\brps\b", "rev/s"), (r"rev/min(?:ute)?\b", "rpm"), (r"\bkg(?=[ -])", "kgf"),
+                 (r"\bdps\b", "deg/s"), (r"\brps\b", "rev/s"), (r"rev/min(?:ute)?\b", "rpm"), (r"^min(?:ute)?s?$", "min"),
+                 (r"\bkg(?=[ -])", "kgf"),
                  (r"\b(?:ft|in)[ -](?:lbs?|lbf|oz)\b", lambda m: _turned(m[0])), (r"\blbs?(?=[ -])", "lbf"),
                  (r"\boz(?=[ -])", "ozf"), (r"(?<=f)-", " "), (r"^([mcuk]?)n[ .-]?m$", r"\1N m"))  # fmt: skip
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
-from pipelines.log.recording.clock_guess import SECONDS, Clock, round_rate, unit_of_clock
+from pipelines.log.recording.clock_guess import SECONDS, clock_as_stated, rate_as_stated, round_rate
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
@@ -31,7 +31,6 @@ from pipelines.log.recording.evidence import (
     sign_of,
     slide_unit,
     torque_unit,
-    units_of_ratio,
     velocity_unit,
 )
 from pipelines.log.recording.link_evidence import LinkFit, fits_by_unit, unlike_links
@@ -57,8 +56,7 @@ __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
-_SYMBOLS = frozenset({"q", "qpos", "jpos"})  # of mechanics: with dq, both in one unit of angle
-_SAME_RATE = 0.02
+_ONE_UNIT = frozenset({"q", "qpos", "jpos", "effort", "efforts"})  # mechanics, ROS: velocities in the positions' unit of angle
 _SHARE = 0.02  # of a bound: a number that keeps 0..1, and comes near both, is a share of an opening or of a range
 _ANGLES, _NAMED = ("rad", "deg", "rev"), "as named"  # what positions may be in where no unit is named; else that
 _MOTOR_SIDE = re.compile(r"(motor|rotor|drive)[ _-]*(side|shaft|seit)|before the gear", re.IGNORECASE)
@@ -132,16 +130,11 @@ class _Drafting:
         self.clock_unit, self.clock_guess = "", Guess("", "unsure", "")
         self.t: Array | None = None  # [s]
         self.stated, self.counts = stated_rate(reading.table.notes), stated_counts(reading.table.notes)
-        self.rate, self.rate_guess = self._stated_rate()
         self.slope = reading.slope if reading.clock is None else None  # of q against dq, per second (or sample)
+        self.rate, self.rate_guess = rate_as_stated(self.stated, self.slope)
         if reading.clock is not None:
             clock = reading.clock
-            if not clock.paired and not clock.units[0] and (said := stated_unit(reading.table.notes, "time")) and said.value:
-                clock = replace(clock, units=(said.value,))
-            self.clock_unit, self.clock_guess = unit_of_clock(clock, self.q, reading.slope)
-            if not clock.units[0] and (ticks := stated_scale(reading.table.notes, "time")):
-                self.clock_unit, self.clock_guess = "", Guess("", "unsure", f"the file states '{ticks[0].words}'")
-            self._clock_by_rate(clock)
+            self.clock_unit, self.clock_guess = clock_as_stated(clock, self.q, reading.slope, reading.table.notes, self.stated)
             factor = 1.0 if clock.paired else SECONDS.get(self.clock_unit)
             factor = 1.0 / self.rate if self.clock_unit == "sample" and self.rate > 0.0 else factor
             if factor is not None:
@@ -245,32 +238,6 @@ class _Drafting:
         why = self.rate_guess.why or "no column rises steadily, so only you know it"
         return ["[time]", f'rate = "{BLANK}"                        # Hz; {clean(why, 200)}', *self._map_hint(), ""]
 
-    def _stated_rate(self) -> tuple[float, Guess]:
-        """Return the rate [Hz] that the file states, nan where it states none, or one that the recorded velocity contradicts."""
-        if self.stated is None:
-            return math.nan, Guess("", "unsure", "")
-        rate, words = self.stated.number, clean(self.stated.words, 200)
-        slope = self.reading.slope if self.reading.clock is None else None
-        if slope is not None and math.isfinite(rate) and units_of_ratio(slope.factor * rate) is None:
-            rate = math.nan
-        return rate, Guess(f"{rate:g} Hz", "likely", f"the file states {words}")
-
-    def _clock_by_rate(self, clock: Clock) -> None:
-        """Take the unit of time that agrees with the rate the file states, where it is open; ask where another was likely."""
-        if self.stated is None or clock.paired or self.clock_guess.confidence == "sure" or self.clock_unit == "sample":
-            return
-        steps = np.diff(clock.values)
-        step = float(np.median(steps[steps > 0]))
-        fits = [unit for unit in SECONDS if abs(step * SECONDS[unit] * self.rate - 1.0) < _SAME_RATE]
-        words = f"a median step of {step:.4g}, and the file states {self.stated.words}"
-        if len(fits) == 1 and self.clock_unit in ("", fits[0]):
-            self.clock_unit, self.clock_guess = fits[0], Guess(fits[0], "likely", words)
-        elif step == 1.0 and not self.clock_unit and math.isfinite(self.rate):
-            self.clock_unit, self.clock_guess = "sample", Guess("sample", "likely", words)
-        elif self.clock_unit:
-            self.clock_guess = Guess("", "unsure", f"{self.clock_guess.why}; but {words}")
-            self.clock_unit = ""
-
     def _rate_of_velocity(self) -> tuple[float, Guess]:
         """Return the rate [Hz] that a recorded velocity shows; nan where none does, or no round one, as recorders are set to."""
         slope = self.reading.slope if self._one_unit_of_angle() else None
@@ -286,8 +253,9 @@ class _Drafting:
         if q is None or dq is None:
             return False
         position, speed = (self._named(group, self.reading.table)[0] for group in (q, dq))
-        symbols = {word.rstrip("0123456789") for word in q.words.split()}
-        return speed == f"{position}/s" if position or speed else bool(symbols & _SYMBOLS) or bool(self.reading.message)
+        words = q.words.split() + (self.reading.tau.group.words.split() if self.reading.tau.group else [])
+        named = bool(_ONE_UNIT & {word.rstrip("0123456789") for word in words}) or bool(self.reading.message)
+        return speed == f"{position}/s" if position or speed else named
 
     def _named(self, group: Group, table: RawTable) -> tuple[str | None, ...]:
         """Return the unit of each column by header and name, else as a line of the file states it; None where none does."""

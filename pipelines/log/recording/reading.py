@@ -55,8 +55,8 @@ _PATH = re.compile(r"[./]")
 # Messages by fields that others have not, whose definition says rad, rad/s and N m: ROS sensor_msgs/JointState,
 # libfranka's RobotState, Universal Robots' RTDE outputs, MuJoCo's mjData.
 _MESSAGES = tuple((message, frozenset(fields.split())) for message, fields in (
-    ("sensor_msgs/JointState", "joint_states position"), ("sensor_msgs/JointState", "position velocity effort"),
-    ("sensor_msgs/JointState", "field position effort"), ("libfranka's RobotState", "q tau_J"),
+    ("sensor_msgs/JointState", "joint_states position"), ("sensor_msgs/JointState", "field position effort"),
+    ("sensor_msgs/JointState", "header position effort"), ("libfranka's RobotState", "q tau_J"),
     ("libfranka's RobotState", "q tau_ext_hat_filtered"),
     ("Universal Robots' RTDE", "actual_q actual_current"), ("mjData", "qpos qfrc_actuator")))
 _MOST_JOINTS = 16

@@ -31,19 +31,26 @@ _SCALE = (re.compile(rf"{_NUMBER}\s*([^\W\d][^\s\d/]*){_PER}(?:one )?{_COUNT}\b"
 _RATIO = re.compile(r"(?<![\d:.])(\d+(?:[.,]\d+)?)\s*:\s*(\d+(?:[.,]\d+)?)(?![\d:])")
 _QUANTITY = re.compile(rf"{_NUMBER}\s*(k?hz|fps|sps|[mµμu]?s(?:ec\w*)?|milli\w+|micro\w+|毫秒|ミリ秒|秒)?(?![\w/])")
 _THINNED = re.compile(r"decimat\w*+\W++(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)|jede[rn]? \d")
+_GENERIC = frozenset({
+    "all", "alle", "are", "base", "column", "columns", "data", "each", "einheit", "einheiten", "in", "is", "of",
+    "otherwise", "si", "signals", "stated", "the", "to", "todas", "toutes", "unidad", "unidades", "unit", "unita", "unite",
+    "unites", "units", "unless", "value", "values", "单位", "単位",
+})  # fmt: skip
 _UNIT_OF_NAME = re.compile(r"[a-z].*[\[(_ ](k?hz|[mµμu]?s)(?:[\])]|\b)(?=[^a-z]*$)")
 _GEARS = frozenset({
     "gear", "gears", "gearbox", "gearing", "reduction", "reducer", "planetary", "harmonic", "ratio", "getriebe",
     "untersetzung", "ubersetzung", "reducteur", "reductor", "riduttore", "riduzione", "reduccion", "减速比", "減速比",
 })  # fmt: skip
 _SAMPLED = re.compile(r"sampl|\bf_?s\b|\bt_?s\b|\bdt\b|_dt\b|\bfps\b|\brate\b|logg|record|acqui|scan|abtast|takt|zyklus|cycle|"
-                      r"echantillon|cadence|muestre|campion|amostra|采样|サンプリング|샘플링|interval|period|timestep|time step|"
+                      r"echantillon|cadence|muestre|campion|amostra|bemonster|"
+                      r"probkow|vzorkov|ornekleme|дискрет|采样|サンプリング|샘플링|interval|period|timestep|time step|"
                       r"step_?(?:size|time)|delta_x")  # fmt: skip
 _NOT_SAMPLED = re.compile(r"filter|cut.?off|low.?pass|pwm|bandwidth|excit|sine|chirp|resonan|control|servo|count\b|duration|start|"
                           r"baud|regel|frequency of|trajectory|camera|buffer|update|inner|current loop")  # fmt: skip
 _VOID = frozenset({
-    "not", "no", "non", "nicht", "kein", "pas", "from", "was", "were", "converted", "convert", "conversion", "before",
-    "originally", "raw", "except", "but", "unknown", "todo", "likely", "maybe", "probably", "either", "or",
+    "before", "but", "conversion", "convert", "converted", "display", "displayed", "either", "except", "from", "gui",
+    "kein", "likely", "maybe", "multiply", "nicht", "no", "non", "not", "or", "originally", "pas", "plot", "plots", "print",
+    "printed", "probably", "raw", "show", "shown", "shows", "todo", "unknown", "was", "were",
 })  # fmt: skip
 _SI = re.compile(r"\bsi[ -](?:base )?(?:units?|einheiten|unites?)\b|\b(?:units?|einheiten|unites?|unidades|unita)\W+(?:\w+ )?si\b")
 _SI_UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "current": "A", "time": "s"}
@@ -126,8 +133,9 @@ def stated_unit(notes: Sequence[str], quantity: str, linear: bool = False, motor
             found.setdefault(_SI_UNITS[quantity], clause)
         for unit, before in _units(clause):
             own = UNITS[unit].quantity
-            said = read_name(before).quantity if before else ""
-            if own == quantity and said in ("", own, "index") and (
+            beside = {word for word in _words(before) if not word.isdecimal()}
+            told = read_name(before).quantity == own or beside <= _GENERIC | WORDS["joint"] | {unit.lower()}
+            if own == quantity and told and (
                     own != "position" or linear == (unit in ("m", "cm", "mm", "um"))):
                 found.setdefault(canonical_unit(unit), clause)
     if not found:
