@@ -133,7 +133,8 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
     `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot;
     `side` is what the names say: only of a joint does its range of motion say anything. `fits` compare the torque with
     the robot's links for units that positions can have; `message` names the definition of the messages, in SI units, that
-    the columns come from; `speed` is the unit of the recorded velocity, `counts` of a turn, where the file states them.
+    the columns come from; `speed` is the unit of the recorded velocity, `counts` of a turn, where the file states them (0:
+    it states several).
     """
     span = float(np.ptp(q, axis=0).max())
     wrap = rollover(q)
@@ -258,6 +259,8 @@ def held(tau: Array, q: Array) -> Guess:
 
 def _counts(q: Array, span: float, wrap: float | None, named: str | None, stated: float) -> tuple[Guess, str]:
     why = "named so" if named else f"whole numbers over a range of {span:.5g}"
+    if stated == 0.0:
+        return Guess("counts", "likely", f"{why}; the file states several numbers for a turn"), f', counts_per_rev = "{BLANK}"'
     if math.isfinite(stated):
         again = f", wrap = {stated:g}" if wrap is not None and abs(wrap / stated - 1.0) < 0.1 else ""
         guess = Guess("counts", "likely", f"{why}; so many make a turn as the file states")

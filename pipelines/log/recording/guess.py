@@ -309,11 +309,11 @@ class _Drafting:
         if turning:
             slope = self.slope if self.t is not None else None  # decides the unit of angle once that of time is known
             joints = [self.joints[j] for j in turning] if self.joints else ()
-            guess, further = position_unit(self.q[:, turning], slope, named[turning[0]], joints, group.side, self.fits,
-                                           self.reading.message, speed, self.counts.number if self.counts else math.nan)
+            first = next((named[j] for j in turning if named[j] is not None), None)
+            guess, further = position_unit(self.q[:, turning], slope, first, joints, group.side, self.fits, self.reading.message,
+                                           speed, self._counts_of_turn)
             for j in turning:
-                said = named[j] or guess.value
-                units[j] = said if guess.value and (said in UNITS or said == "counts") else ""
+                units[j] = _unit_of_joint(named[j], guess.value, first)
             why.append(guess)
             if guess.value == "rad" and "times pi/2" in guess.why:
                 self.ratios = quarter_turns(self.q)
@@ -322,13 +322,23 @@ class _Drafting:
             units[j] = guess.value
             why.append(guess)
         own = unit_of_group(group.columns, self.reading.table)
-        shares = [j for j in range(self.n) if not self.joints and own[j] is None and _is_share(self.q[:, j])]
-        if shares and len(shares) < self.n:
+        shares = self._shares(own)
+        if shares:
             units = ["" if j in shares else unit for j, unit in enumerate(units)]
             which = ", ".join(clean(group.columns[j], 40) for j in shares)
-            why.append(Guess("", "unsure", f"{which}: from 0 to {np.abs(self.q[:, shares]).max():.3g}, a gripper's opening or a "
-                             "share of a range, rather than a joint's angle?"))
+            why.append(Guess("", "unsure", f"{which}: up to {np.abs(self.q[:, shares]).max():.3g}, near 1 or 100: a gripper's "
+                             "opening or a share of a range, rather than a joint's angle?"))
         return units, further, why
+
+    @property
+    def _counts_of_turn(self) -> float:
+        """Return the counts of a turn that the file states; nan where it states none, 0 where it states several numbers."""
+        return math.nan if self.counts is None else self.counts.number if math.isfinite(self.counts.number) else 0.0
+
+    def _shares(self, own: Sequence[str | None]) -> list[int]:
+        """Return the joints, without a robot that has them or a unit of their own, that move like a share of a range."""
+        found = [j for j in range(self.n) if self.q is not None and not self.joints and own[j] is None and _is_share(self.q[:, j])]
+        return found if len(found) < self.n else []
 
     def _as_stated(self, group: Group, table: RawTable) -> list[str]:
         """Return a comment with the words of the file that a unit was taken from, or that contradict each other."""
@@ -412,8 +422,10 @@ class _Drafting:
         named = tuple(unit or (scales[0].value if len(scales) == 1 else None) for unit in named)
         guess = self._torque_unit(self.tau, choice.group, named[0])
         self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
-        units = [unit or guess.value for unit in named]
-        units = [unit if guess.value and unit in UNITS else "" for unit in units]
+        units = [_unit_of_joint(unit, guess.value, next(filter(None, named), None)) for unit in named]
+        own = unit_of_group(choice.group.columns, table)
+        if self.q is not None and self.q.shape == self.tau.shape:
+            units = ["" if j in self._shares(own) else unit for j, unit in enumerate(units)]
         if guess.value == "N m" and self.joints:
             units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]
         file = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
@@ -571,11 +583,20 @@ def _whole(values: Array) -> bool:
     return bool((values == np.round(values)).mean() > 0.99)
 
 
+def _unit_of_joint(named: str | None, guessed: str, first: str | None) -> str:
+    """Return the unit of one of several columns: its own, or what was guessed of all; "" where only others state one."""
+    if not guessed or (named is None and first is not None):
+        return ""
+    unit = guessed if named is None else named
+    return unit if unit in UNITS or unit == "counts" else ""
+
+
 def _is_share(values: Array) -> bool:
-    """Tell whether numbers keep 0..1 or 0..100 and come near both ends, as a gripper's opening does and a joint hardly."""
+    """Tell whether numbers keep 0..1, 0..100 or these and their negatives, and come near both ends, as a joint hardly does."""
     low, high = float(values.min()), float(values.max())
-    full = 1.0 if high <= 1.0 + _SHARE else 100.0
-    return low >= -_SHARE * full and low < 0.3 * full and 0.7 * full < high <= (1.0 + _SHARE) * full
+    full = 1.0 if max(high, -low) <= 1.0 + _SHARE else 100.0
+    near = 0.7 * full < high <= (1.0 + _SHARE) * full
+    return near and (-_SHARE * full <= low < 0.3 * full or -(1.0 + _SHARE) * full <= low < -0.7 * full)
 
 
 def _also(choice: Choice, table: RawTable) -> list[str]:

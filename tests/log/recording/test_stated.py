@@ -121,6 +121,17 @@ def test_a_column_that_keeps_0_to_1_is_asked_about(tmp_path: Path) -> None:
     assert 'unit = ["rad", "rad", "rad", "FILL IN"]' in drafted(tmp_path, "# q in rad\n", columns)
 
 
+def test_a_column_without_the_unit_that_its_neighbours_have_is_asked_about(tmp_path: Path) -> None:
+    columns = {name.replace("q_1", "q_1 [deg]").replace("q_2", "q_2 [deg]"): values for name, values in good().items()}
+    assert 'unit = ["deg", "deg", "FILL IN"]' in drafted(tmp_path, "", columns)
+
+
+def test_encoders_of_different_counts_are_asked_about(tmp_path: Path) -> None:
+    raw = {f"enc_{j}": np.round(600 * good()[f"q_{j}"]) for j in (1, 2, 3)}
+    draft = drafted(tmp_path, "# axis 1: 4096 counts/rev\n# axis 3: 8192 counts/rev\n", {"t": good()["t"]} | raw)
+    assert 'counts_per_rev = "FILL IN"' in draft
+
+
 def test_the_unit_of_a_velocity_is_that_of_the_position_it_is_the_slope_of(tmp_path: Path) -> None:
     speeds = {f"dq_{j} [deg/s]": np.gradient(good()[f"q_{j}"], good()["t"]) for j in (1, 2, 3)}
     assert 'q = { columns = "q_{j}", unit = "deg" }' in drafted(tmp_path, "", good() | speeds)
