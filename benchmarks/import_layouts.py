@@ -98,7 +98,7 @@ UNITS |= {"q°": DEG, "q_ref°": DEG, "dq°": DEGS, "counts": ("counts",), "coun
 UNITS |= {"dq_ref": RADS, "dq_ref°": DEGS, "ddq": ("rad/s^2",), "tau_ref": NM, "N mm": ("N mm",)}
 UNITS |= {"rev": ("turn", "turns", "rev"), "rev/s": ("turn/s", "turns/s", "rev/s"), "?": ()}
 UNITS |= {"mrad": ("mrad",), "mNm": ("mN m", "mNm", "N mm"), "0.1 %": ("0.1 %",), "rpm": ("rpm",)}
-UNITS |= {"mA": ("mA",), "A": ("A",), "kNm": ("kN m", "kNm"), "deg/s": ("deg/s",)}
+UNITS |= {"mA": ("mA",), "A": ("A",), "kNm": ("kN m", "kNm"), "kgf cm": ("kgf cm",), "deg/s": ("deg/s",)}
 
 
 def block(pattern: str, values: np.ndarray, start: int = 1) -> dict[str, np.ndarray]:
@@ -356,7 +356,7 @@ def untrue(draft: str, lay: Layout, answer: Answer, run: Run) -> list[str]:
     claimed = torque not in (None, ASK, *answer.torque) and "unsure" not in line
     if claimed and recipe.get("signals", {}).get("tau"):
         wrong.append(f"torque: {torque}")
-    if "add sign = -1" in draft:
+    if "sign = -1" in draft or "sign = [" in draft:
         wrong.append("sign")
     if not asks(draft) and not answer.draftable:
         wrong.append("a draft without blanks")

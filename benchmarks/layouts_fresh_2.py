@@ -157,8 +157,8 @@ def structured_npy(folder: Path, run: Run) -> Answer:
 @layout(FOUR, rate=100.0)
 def kilogram_force(folder: Path, run: Run) -> Answer:
     """A hobby servo's bench: degrees and kgf·cm."""
-    specs = "ms=ms; *servo{}_deg=q°; *servo{}_load (kgf·cm)=kg:tau:?"
-    return recorded(folder, run, "servo.csv", {"ms": "ms"}, specs, known=False, data={"kg": run.tau * 10.197})
+    specs = "ms=ms; *servo{}_deg=q°; *servo{}_load (kgf·cm)=kg:tau:kgf cm"
+    return recorded(folder, run, "servo.csv", {"ms": "ms"}, specs, data={"kg": run.tau * 10.197})
 
 
 @layout(SIX, rate=200.0)

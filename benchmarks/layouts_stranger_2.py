@@ -468,8 +468,8 @@ def thousands_separators(folder: Path, run: Run) -> Answer:
         columns[f"Torque {j + 1} [Nmm]"] = [f"{x:,.1f}" for x in 1000 * run.tau[:, j]]
     pd.DataFrame(columns).to_csv(folder / "display.csv", index=False)
     right = {"tau": (si("Torque {} [Nmm]", 6, "N mm"),)}
-    right["q"] = (Signal(tuple(f"Angle {j} [mdeg]" for j in range(1, 7))),)
-    return Answer("display.csv", {"Time [ms]": "ms"}, right=right, draftable=False)
+    right["q"] = (Signal(tuple(f"Angle {j} [mdeg]" for j in range(1, 7)), ("mdeg",)),)
+    return Answer("display.csv", {"Time [ms]": "ms"}, right=right)
 
 
 @moves(SIX, rate=250.0)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
 
 from pipelines.errors import InputRejected, did_you_mean
@@ -25,6 +27,7 @@ class Unit:
 
 
 _TURN = 2.0 * math.pi
+_KGF, _LBF = 9.80665, 4.4482216152605  # [N] NIST SP 811 (2008), table B.8
 
 UNITS: Final[dict[str, Unit]] = {
     # time
@@ -33,16 +36,21 @@ UNITS: Final[dict[str, Unit]] = {
     # position, revolute and prismatic
     "rad": Unit("position", 1.0), "mrad": Unit("position", 1e-3), "deg": Unit("position", math.pi / 180.0),
     "°": Unit("position", math.pi / 180.0), "rev": Unit("position", _TURN), "turn": Unit("position", _TURN),
-    "m": Unit("position", 1.0), "mm": Unit("position", 1e-3), "um": Unit("position", 1e-6),
+    "mdeg": Unit("position", math.pi / 180e3), "arcmin": Unit("position", math.pi / 10800.0),
+    "arcsec": Unit("position", math.pi / 648e3),
+    "m": Unit("position", 1.0), "cm": Unit("position", 1e-2), "mm": Unit("position", 1e-3), "um": Unit("position", 1e-6),
     # velocity
     "rad/s": Unit("velocity", 1.0), "deg/s": Unit("velocity", math.pi / 180.0), "rpm": Unit("velocity", _TURN / 60.0),
-    "rev/s": Unit("velocity", _TURN), "m/s": Unit("velocity", 1.0), "mm/s": Unit("velocity", 1e-3),
+    "rev/s": Unit("velocity", _TURN), "mrad/s": Unit("velocity", 1e-3), "mdeg/s": Unit("velocity", math.pi / 180e3),
+    "m/s": Unit("velocity", 1.0), "cm/s": Unit("velocity", 1e-2), "mm/s": Unit("velocity", 1e-3),
     # acceleration
     "rad/s^2": Unit("acceleration", 1.0), "deg/s^2": Unit("acceleration", math.pi / 180.0),
     "rev/s^2": Unit("acceleration", _TURN), "m/s^2": Unit("acceleration", 1.0), "mm/s^2": Unit("acceleration", 1e-3),
     # torque and force
     "N m": Unit("torque", 1.0), "mN m": Unit("torque", 1e-3), "N mm": Unit("torque", 1e-3), "N cm": Unit("torque", 1e-2),
-    "kN m": Unit("torque", 1e3),
+    "kN m": Unit("torque", 1e3), "cN m": Unit("torque", 1e-2), "uN m": Unit("torque", 1e-6),
+    "kgf m": Unit("torque", _KGF), "kgf cm": Unit("torque", 1e-2 * _KGF), "lbf ft": Unit("torque", 0.3048 * _LBF),
+    "lbf in": Unit("torque", 0.0254 * _LBF), "ozf in": Unit("torque", 0.0254 * _LBF / 16.0),
     "N": Unit("torque", 1.0), "mN": Unit("torque", 1e-3), "kN": Unit("torque", 1e3),
     # current
     "A": Unit("current", 1.0), "mA": Unit("current", 1e-3),
@@ -51,14 +59,9 @@ UNITS: Final[dict[str, Unit]] = {
 }
 
 _SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "•": " ", "∙": " ", "・": " ", "²": "^2", "\u03bc": "µ"})
-_ALIASES = {"µs": "us",
-                   "Nm": "N m", "mNm": "mN m", "Nmm": "N mm", "Ncm": "N cm", "kNm": "kN m", "degree": "deg", "degrees": "deg",
-                   "radian": "rad", "radians": "rad", "seconds": "s", "sec": "s", "rad/s2": "rad/s^2",
-                   "rad/s/s": "rad/s^2", "m/s2": "m/s^2", "deg/s2": "deg/s^2", "N.m": "N m", "N-m": "N m", "1/min": "rpm",
-                   "rad/sec": "rad/s",
-                   "deg/sec": "deg/s", "Rad": "rad", "RAD": "rad", "Deg": "deg", "DEG": "deg", "msec": "ms", "usec": "us",
-                   "nsec": "ns", "Grad": "deg", "Grad/s": "deg/s", "U/min": "rpm",
-                   "°": "deg", "°/s": "deg/s", "°/s^2": "deg/s^2", "r/min": "rpm", "℃": "degC"}
+_ALIASES = {"µs": "us", "Nmm": "N mm", "N.mm": "N mm", "Ncm": "N cm", "N.cm": "N cm", "rad/s2": "rad/s^2", "m/s2": "m/s^2",
+            "deg/s2": "deg/s^2", "1/min": "rpm", "Grad": "deg", "Grad/s": "deg/s", "U/min": "rpm", "r/min": "rpm", "°": "deg",
+            "℃": "degC"}
 _IN_OTHER_LANGUAGES: Final = {
     "rad": "弧度 ラジアン рад radians radianes radianti radianos",
     "deg": "度 град град. grados degrés gradi graus graden grader stopnie",
@@ -69,12 +72,37 @@ _IN_OTHER_LANGUAGES: Final = {
 }  # fmt: skip
 _ALIASES |= {word: unit for unit, words in _IN_OTHER_LANGUAGES.items() for word in words.split()}
 _ALIASES |= {"牛 米": "N m", "Н м": "N m"}
+_WORDS: Final = ((r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"), (r"\bmilli[ -]?(?=deg|rad|newton|amp|sec|met)", "m"),
+                 (r"\bmicro[ -]?(?=sec|met|newton)", "u"), (r"\bnano[ -]?(?=sec)", "n"), (r"\bcenti[ -]?(?=met|newton)", "c"),
+                 (r"newton[ -]?met(?:er|re)s?\b", "N m"), (r"newtons?\b", "N"), (r"met(?:er|re)s?\b", "m"),
+                 (r"deg(?:ree)?s?\b", "deg"), (r"rad(?:ian)?s?\b", "rad"), (r"\b(?:rev(?:olution)?|turn)s?\b", "rev"),
+                 (r"sec(?:ond)?s?\b", "s"), (r"amp(?:ere)?s?\b", "A"), (r"°", "deg"), (r"/s/s\b|/s\^?2\b", "/s^2"),
+                 (r"\bdps\b", "deg/s"), (r"\brps\b", "rev/s"), (r"rev/min(?:ute)?\b", "rpm"), (r"^min(?:ute)?s?$", "min"),
+                 (r"\bkg(?=[ -])", "kgf"),
+                 (r"\b(?:ft|in)[ -](?:lbs?|lbf|oz)\b", lambda m: _turned(m[0])), (r"\blbs?(?=[ -])", "lbf"),
+                 (r"\boz(?=[ -])", "ozf"), (r"(?<=f)-", " "), (r"^([mcuk]?)n[ .-]?m$", r"\1N m"))  # fmt: skip
+
+
+def _turned(name: str) -> str:
+    """Return "lbf ft" of "ft-lb": people write the arm on either side."""
+    arm, force = re.split("[ -]", name)
+    return f"{force.rstrip('fs')}f {arm}"
 
 
 def canonical_unit(unit: str) -> str:
     """`unit` as `UNITS` spells it: "Nm" and "N·m" are "N m"."""
     name = " ".join(str(unit).translate(_SPELLINGS).split())
-    return _ALIASES.get(name, name)
+    return _ALIASES.get(name) or (name if name in UNITS else _in_words(name))
+
+
+@lru_cache(maxsize=1024)
+def _in_words(name: str) -> str:
+    """Return the unit of "degrees per second", "Newton metres" or "DEG/SEC"; any other name as it is."""
+    plain = name.lower()
+    for pattern, symbol in _WORDS:
+        plain = re.sub(pattern, symbol, plain)
+    found = _ALIASES.get(plain, plain)
+    return found if found in UNITS and len(name) > 1 and not name.startswith("MN") else name
 
 
 def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:

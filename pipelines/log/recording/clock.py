@@ -12,11 +12,30 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.recipe import TimeSpec
 from pipelines.log.units import UNITS, canonical_unit, to_si
 
-__all__ = ["declared_step", "plausible_units", "time_of"]
+__all__ = ["counted_on", "declared_step", "plausible_units", "time_of"]
 
 _NEAR = 0.2  # a rate within a fifth of the declared one is the declared one
 _FASTEST, _SLOWEST = 1e5, 1.0  # [Hz] what robots are recorded at
 _UNITS = {unit: UNITS[unit].factor for unit in ("s", "ms", "us", "ns")}
+
+
+_FULL = (*(2.0**bits * unit for bits in (16, 24, 32) for unit in (1.0, 1e-3, 1e-6)),  # counters of so many bits, some in s
+         *(86400.0 * unit for unit in (1.0, 1e3, 1e6, 1e9)))  # and of a day
+
+
+def counted_on(stamps: Array) -> tuple[Array, float]:
+    """Return time stamps that go on where their counter starts again, and its range; 0 where it does not start again.
+
+    It falls by its whole range less a step or a few: a clock that was set back by chance does not.
+    """
+    steps = np.diff(stamps)
+    falls, rises = steps[steps < 0], steps[steps > 0]
+    if not falls.size or not rises.size or stamps.min() < 0.0:
+        return stamps, 0.0
+    near = 3.0 * float(np.median(rises))
+    fits = [full for full in _FULL if stamps.max() < full and ((falls + full > 0.0) & (falls + full <= near)).all()]
+    full = fits[0] if fits else 0.0
+    return stamps + full * np.concatenate([[0.0], np.cumsum(steps < 0)]), full
 
 
 def declared_step(spec: TimeSpec) -> float | None:
@@ -38,8 +57,10 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     column, declared = spec.parts[0]
     name = table.name_of(column, "t")
     where = f"{table.source}, column '{name}'"
-    stamps = table.columns[name]
-    finite = stamps[np.isfinite(stamps)]
+    stamps = table.columns[name].copy()
+    known = np.isfinite(stamps)
+    stamps[known], full = counted_on(stamps[known])
+    finite = stamps[known]
     steps = np.diff(finite)
     steps = steps[steps > 0]
     if finite.size < 2 or steps.size == 0:
@@ -48,6 +69,9 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     median = float(np.median(steps))
     unit = declared or table.units.get(name)
     checks: list[Check] = []
+    if full:
+        checks.append(Check.of("S08", "warn", f"the counter of time starts again after {full:.10g}: counted on", where=where,
+                               remedy="none needed, unless the clock was set back by just so much"))
     if unit is None:
         unit = _detected(median, step, where, assume, checks)
     elif declared and (other := table.units.get(name)) and _contradict(other, declared):

@@ -8,21 +8,24 @@ plausible pace and agrees with a recorded velocity. Numbers 0, 1, 2, … may als
 from __future__ import annotations
 
 import itertools
+import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
+from pipelines.log.recording.clock import counted_on
 from pipelines.log.recording.column_names import read_name, words_of
 from pipelines.log.recording.column_roles import Group, unit_of_group
 from pipelines.log.recording.evidence import Guess, Slope, units_of_ratio
 from pipelines.log.recording.raw import RawTable
+from pipelines.log.recording.stated import Statement, stated_scale, stated_unit
 from pipelines.log.units import UNITS
 
-__all__ = ["Clock", "find_clock", "round_rate", "unit_of_clock"]
+__all__ = ["SECONDS", "Clock", "clock_as_stated", "find_clock", "rate_as_stated", "round_rate", "unit_of_clock"]
 
 _COMMON = ("s", "ms", "us", "ns")
 SECONDS = {unit: UNITS[unit].factor for unit in (*_COMMON, "100 ns", "min", "d")}
@@ -93,7 +96,7 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
 
 def _single(table: RawTable, column: str) -> Clock:
     unit = unit_of_group([column], table)[0] or ""
-    return Clock((column,), (unit,), table.columns[column])
+    return Clock((column,), (unit,), counted_on(table.columns[column])[0])
 
 
 def _rises(values: Array) -> bool:
@@ -206,6 +209,37 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
         else []
     )
     return "", Guess("", "unsure", "; ".join(why))
+
+
+def rate_as_stated(stated: Statement | None, slope: Slope | None) -> tuple[float, Guess]:
+    """Return the rate [Hz] that the file states; nan where it states none, or one that a velocity (per sample) contradicts."""
+    if stated is None:
+        return math.nan, Guess("", "unsure", "")
+    agrees = slope is None or units_of_ratio(slope.factor * stated.number) is not None
+    rate = stated.number if math.isfinite(stated.number) and agrees else math.nan
+    return rate, Guess(f"{rate:g} Hz", "likely", f"the file states {stated.words}")
+
+
+def clock_as_stated(
+    clock: Clock, q: Array | None, slope: Slope | None, notes: Sequence[str], stated: Statement | None
+) -> tuple[str, Guess]:
+    """Return the unit of a clock as `unit_of_clock` does, with what the file states of it and of the rate."""
+    if not clock.paired and not clock.units[0] and (said := stated_unit(notes, "time")) and said.value:
+        clock = replace(clock, units=(said.value,))
+    unit, guess = unit_of_clock(clock, q, slope)
+    if not clock.units[0] and (ticks := stated_scale(notes, "time")):
+        return "", Guess("", "unsure", f"the file states '{ticks[0].words}'")
+    if stated is None or clock.paired or guess.confidence == "sure" or unit == "sample":
+        return unit, guess
+    steps = np.diff(clock.values)
+    step = float(np.median(steps[steps > 0]))
+    words = f"a median step of {step:.4g}, and the file states {stated.words}"
+    fits = [other for other, size in SECONDS.items() if abs(step * size * stated.number - 1.0) < _RATIO_TOLERANCE]
+    if len(fits) == 1 and unit in ("", fits[0]):
+        return fits[0], Guess(fits[0], "likely", words)
+    if step == 1.0 and not unit and math.isfinite(stated.number):
+        return "sample", Guess("sample", "likely", words)
+    return "", Guess("", "unsure", f"{guess.why}; but {words}" if unit else guess.why)
 
 
 def _since(first: float, units: Sequence[str]) -> tuple[str, str] | None:

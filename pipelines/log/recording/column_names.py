@@ -48,31 +48,29 @@ _COMPOUND = sorted(
 )
 _UNIT_WORDS = {
     "s": "s sec secs second seconds",
-    "ms": "ms msec millis millisec milliseconds",
-    "us": "us usec usecs micros microsec microseconds",
-    "ns": "ns nsec nsecs nanosec nanosecs nanos nanosecond nanoseconds",
-    "rad": "rad radian radians",
-    "mrad": "mrad",
-    "deg": "deg degree degrees grad",
-    "rev": "rev",
-    "turn": "turns",
+    "ms": "msec millis millisec milliseconds",
+    "us": "usec usecs micros microsec microseconds",
+    "ns": "nsec nsecs nanosec nanosecs nanos nanosecond nanoseconds",
+    "rad": "radian radians",
+    "deg": "degree degrees grad",
+    "rev": "turns",
     "counts": "counts cnt cnts ticks inc incs",
     "A": "a amps",
-    "mA": "ma",
-    "N m": "nm",
-    "mN m": "mnm",
-    "kN m": "knm",
-    "N mm": "nmm",
-    "N cm": "ncm",
-    "rpm": "rpm",
-    "rad/s": "rads radps",
-    "deg/s": "degs degps dps",
-    "mm": "mm",
+    "rad/s": "rads",
+    "deg/s": "dps",
+    "mdeg/s": "mdps",
     "%": "pct percent",
     "‰": "permille promille",
     "LSB": "lsb",
 }
-_SUFFIX_UNITS = {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
+_NOT_IN_NAMES = frozenset({"m", "d", "n", "k", "min", "mn", "kn", "turn", "100ns"})  # words and indices rather than units
+_SUFFIX_UNITS = {
+    word: unit
+    for join in ("", "p")
+    for unit in reversed(UNITS)
+    if (word := re.sub("[ ^]", "", unit.lower()).replace("/", join)) not in _NOT_IN_NAMES
+}
+_SUFFIX_UNITS |= {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
 
 
 _ROLE_WORDS = frozenset[str]().union(*(words for meaning, words in WORDS.items() if meaning not in QUANTITIES), {"d"})
@@ -251,12 +249,7 @@ def _unit_in_name(column: str, quantity: str) -> tuple[str, frozenset[str]]:
     parts = [
         part for part in re.split(r"[\W_]+", _whole_words(column)) if part and not part.isdecimal()
     ]
-    if len(parts) > 2 and (ratio := f"{parts[-2]}/{parts[-1]}".lower()) in (
-        "rad/s",
-        "deg/s",
-        "m/s",
-        "mm/s",
-    ):
+    if len(parts) > 2 and (ratio := canonical_unit(f"{parts[-2]}/{parts[-1]}".lower())) in UNITS:
         return ratio, frozenset(parts[-2:])
     within = (re.findall(r"[A-Z]?[a-z]+", part) for part in parts)
     pieces = [

@@ -24,7 +24,6 @@ __all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quanti
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
-_SYMBOLS = frozenset({"q", "qpos", "jpos", "tau", "jtau", "tauj", "qfrc"})  # of mechanics, in SI units
 
 Order = Literal["robot", "numbers", "file", "text"]
 
@@ -42,11 +41,6 @@ class Group:
     order: Order  # text: as columns of text name them, and no robot has these names
     words: str  # the group in words, for comments
     unknown: frozenset[str] = frozenset()  # words of all its names that say neither what it is nor which joint
-
-    @property
-    def in_si(self) -> bool:
-        """Tell whether it has the symbol of mechanics, not a word for degrees or a share of a rated torque."""
-        return bool(_SYMBOLS & {word.rstrip("0123456789") for word in self.words.split()})
 
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:
@@ -73,14 +67,18 @@ class Choice:
     others: tuple[Group, ...] = ()
 
 
-def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
-    """Return the groups of the columns of `table`; `joints` names the robot's, from the base to the tip."""
+def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False) -> list[Group]:
+    """Return the groups of the columns of `table`; `joints` names the robot's, from the base to the tip.
+
+    Where one of them `slides`, its force stands beside the torques of the others.
+    """
     texts = texts_of(table, joints)
     patterns = _patterns(table, joints)
     found: dict[tuple[object, ...], list[tuple[ColumnName, int | None]]] = {}
-    shared = _shared_path(table)
+    shared, port = _shared_path(table), _shared_port(table)
     for column in table.columns:
-        rest, place = _without_joint(column.removeprefix(shared), patterns)
+        rest, place = _without_joint(column.removeprefix(shared).removesuffix(port), patterns)
+        rest = re.sub("(?i)force|kraft|fuerza|forza", "torque", rest) if slides and _number(words_of(rest)) is not None else rest
         name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
         if place is None:
             place = _place_by_words(name.label, joints)
@@ -89,6 +87,8 @@ def groups_of(table: RawTable, joints: Sequence[str] = ()) -> list[Group]:
     groups = []
     for members in found.values():
         for part in _split(members):
+            if {"x", "y", "z"} <= {name.column.removeprefix(shared).lower() for name, _ in part}:
+                part = [(replace(name, quantity="other"), place) for name, place in part]  # the tool's pose
             groups.append(_ordered(part, joints, texts))
     return groups
 
@@ -100,9 +100,15 @@ def _shared_path(table: RawTable) -> str:
     """
     signals = [column for column in table.columns if read_name(column).quantity not in ("time", "index")]
     every, path = (_common_path(names) for names in (list(table.columns), signals))
-    said = read_name(path.removeprefix(every))
+    said = read_name(path.removeprefix(every).replace("Model Root", ""))  # that of every signal of Simulink's models
     path = every if said.partial and said.origin != "measured" else path or every
     return "" if read_name(path).origin == "commanded" else path
+
+
+def _shared_port(table: RawTable) -> str:
+    """Return the last part of the path that all columns with a path have: the "Out1" of dSPACE's blocks."""
+    ports = {column.rpartition("/")[2] for column in table.columns if "/" in column}
+    return f"/{ports.pop()}" if len(ports) == 1 else ""
 
 
 def _common_path(names: Sequence[str]) -> str:

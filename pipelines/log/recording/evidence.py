@@ -50,8 +50,8 @@ class Guess:
     why: str
 
 
-_RAD_OR_DEG = Guess("", "unsure", "less than a turn in rad: rad, or the degrees of a small motion?")
-_RAD_OR_TURNS = Guess("", "unsure", "within half a turn in rad and in revolutions: rad, or rev as servo drives count?")
+_NO_UNIT = "no unit is stated, and"
+_LESS_THAN_A_TURN = "rad, or the degrees of a small motion, or turns as servo drives count?"
 
 
 def rollover(values: Array) -> float | None:
@@ -73,8 +73,9 @@ def rollover(values: Array) -> float | None:
 _ANGULAR_RATIOS = {1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"), 1.0 / 60.0: ("rev", "rpm"),
                   6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm")}
 _ONE_TURN = 5e-3  # by so much the range of one recorded revolution differs from the encoder's resolution
-_TURNING = {unit: UNITS[unit].factor for unit in ("rad", "mrad", "deg", "rev", "turn")}
-_WIDEST = {"rad": 400.0, "mrad": 4e5, "deg": 36000.0, "rev": 1e4, "turn": 1e4}  # range of a motor in a recording
+_TURNING = {unit: UNITS[unit].factor for unit in ("rad", "mrad", "deg", "mdeg", "arcmin", "arcsec", "rev", "turn")}
+_WIDEST = 400.0  # [rad] range of a motor in a recording, of one in rad; others are named on purpose
+_SPEEDS = ("rad/s", "deg/s", "rev/s", "rpm", "mrad/s", "mdeg/s")
 _STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
 _LIKE = 0.95  # correlation over which one block is the slope of another
 _SAME_RATIO = 0.1  # scatter of the ratio over the joints
@@ -125,31 +126,35 @@ def _slope_over(q: Array, summed: Array, width: int) -> Slope | None:
 
 
 def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequence[Joint] = (), side: Side = "joint",
-                  fits: Mapping[str, LinkFit] | None = None, in_si: bool = False) -> tuple[Guess, str]:
+                  fits: Mapping[str, LinkFit] | None = None, message: str = "", speed: str | None = None,
+                  counts: float = math.nan) -> tuple[Guess, str]:
     """The unit of the positions of turning joints, "" where it stays open, and further keys of the recipe (counts_per_rev, wrap).
 
     `slope` is the relation of a recorded velocity where the unit of time is known; `joints` are those of the robot;
     `side` is what the names say: only of a joint does its range of motion say anything. `fits` compare the torque with
-    the robot's links for units that positions can have; `in_si` says that the names are those of a convention in SI units.
+    the robot's links for units that positions can have; `message` names the definition of the messages, in SI units, that
+    the columns come from; `speed` is the unit of the recorded velocity, `counts` of a turn, where the file states them (0:
+    it states several).
     """
     span = float(np.ptp(q, axis=0).max())
     wrap = rollover(q)
     further = f", wrap = {wrap:g}" if wrap is not None else ""
     if named == "counts" or (named is None and span > 2000.0 and _whole(q)):
-        return _counts(q, span, wrap, named)
+        return _counts(q, span, wrap, named, counts)
     if named in _TURNING:
         problem = "" if side == "motor" else _beyond(q, joints, named)
-        if not problem and slope is not None and (found := _by_velocity(slope)) and UNITS[found.value] != UNITS[named]:
+        if not problem and slope is not None and (found := _by_velocity(slope, speed)) and (
+                UNITS[found.value] != UNITS[named]):
             problem = f"but {found.why}"
         if problem:
             return Guess("", "unsure", f"its name or header says '{named}', {problem}: another unit, or the motor's side?"), further
-        return Guess(named, "sure" if span <= _WIDEST[named] else "unsure",
+        return Guess(named, "sure" if named != "rad" or span <= _WIDEST else "unsure",
                      f"named so; the largest range is {span:.4g} {named}"), further
     if named is not None:
         return unknown_unit(named), further
     if wrap in (360.0, 2.0 * math.pi):
         return Guess("deg" if wrap == 360.0 else "rad", "likely", f"it starts again after {wrap:.4g}, one turn"), further
-    if slope is not None and (found := _by_velocity(slope)) is not None and not (
+    if slope is not None and (found := _by_velocity(slope, speed)) is not None and not (
             side != "motor" and _beyond(q, joints, found.value)):
         return found, further
     if turns := quarter_turns(q):
@@ -161,10 +166,9 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
     if side == "motor" or (side == "scaled" and not 1.0 < far <= 2.0 * math.pi):
         return Guess("", "unsure", _OPEN_SIDES[side]), further
     unit, proved = best_unit(fits or {})
-    in_si = in_si and unit in ("", "rad")
     if proved:
         return Guess(unit, "likely", f"the torque follows from the motion by the robot's links if it is in {unit}"), further
-    return _by_limits(q, joints, in_si) or _by_size(q, in_si), further
+    return _by_limits(q, joints, message if unit in ("", "rad") else "") or _by_size(far, message), further
 
 
 def unknown_unit(named: str) -> Guess:
@@ -188,44 +192,38 @@ def _beyond(q: Array, joints: Sequence[Joint], unit: str) -> str:
     return ""
 
 
-def _by_limits(q: Array, joints: Sequence[Joint], in_si: bool) -> Guess | None:
+def _by_limits(q: Array, joints: Sequence[Joint], message: str) -> Guess | None:
     """The unit under which the motion keeps the robot's limits; a small motion keeps them in any."""
     limited = [(j, joint) for j, joint in enumerate(joints) if all(map(math.isfinite, joint.position))]
     if not limited or len(joints) != q.shape[1]:
         return None
-
-    def inside(factor: float) -> bool:
-        return all(_inside(factor * q[:, j], joint) for j, joint in limited)
-
-    if inside(1.0) and inside(2.0 * math.pi):
-        return _RAD_OR_TURNS
-    if inside(1.0) and in_si:
-        return Guess("rad", "likely", f"named so in SI units, and inside the robot's limits; the largest range is "
-                     f"{np.ptp(q, axis=0).max():.3g}")
-    if inside(1.0):
-        return _RAD_OR_DEG
-    if inside(math.pi / 180.0):
+    fits = [unit for unit in ("rad", "deg", "rev") if all(_inside(_TURNING[unit] * q[:, j], joint) for j, joint in limited)]
+    if "rad" in fits and message:
+        return Guess("rad", "likely", f"as {message} defines it, and inside the robot's limits")
+    if fits == ["rad"]:
+        return Guess("rad", "likely", "inside the robot's limits in rad alone, neither in deg nor in rev")
+    if "rad" in fits:
+        return Guess("", "unsure", f"{_NO_UNIT} it is inside the robot's limits in {' and '.join(fits)}: {_LESS_THAN_A_TURN}")
+    if "deg" in fits:
         return Guess("", "unsure", "beyond the robot's limits in rad, inside them in deg: deg, or the motor's side in rad?")
     return Guess("", "unsure", "outside the robot's limits in rad and in deg: motor side, counts, or another robot?")
 
 
-def _by_size(q: Array, in_si: bool) -> Guess:
+def _by_size(far: float, message: str) -> Guess:
     """The unit by what a joint can do, where no limits are known."""
-    far = float(np.abs(q).max())
-    if far <= 0.5:
-        return _RAD_OR_TURNS
-    if far <= 2.05 * math.pi and in_si:
-        return Guess("rad", "likely", f"named so in SI units, and within {far:.3g}")
+    if far <= 2.05 * math.pi and message:
+        return Guess("rad", "likely", f"as {message} defines it, and within {far:.3g}")
     if far <= 2.05 * math.pi:
-        return _RAD_OR_DEG
+        return Guess("", "unsure", f"{_NO_UNIT} up to {far:.3g} it may be {_LESS_THAN_A_TURN}")
     if far <= 720.0:
-        return Guess("", "unsure", f"up to {far:.4g}: more than a turn in rad, so deg? or the motor's side in rad, then [drive]")
+        return Guess("", "unsure", f"{_NO_UNIT} up to {far:.4g} is more than a turn in rad: deg, turns, or the motor's side "
+                     "in rad, then [drive]?")
     return Guess("", "unsure", f"up to {far:.5g}: neither an arm's in rad nor in deg; motor side, or counts?")
 
 
 def slide_unit(q: Array, named: str | None, joint: Joint) -> Guess:
     """The unit of the position of one sliding joint, "" where it stays open."""
-    if named in ("m", "mm", "um"):
+    if named in ("m", "cm", "mm", "um"):
         return Guess(named, "sure", "named so")
     if named is not None:
         return unknown_unit(named)
@@ -259,8 +257,14 @@ def held(tau: Array, q: Array) -> Guess:
                  "the drive was commanded, to be held until the next sample")
 
 
-def _counts(q: Array, span: float, wrap: float | None, named: str | None) -> tuple[Guess, str]:
+def _counts(q: Array, span: float, wrap: float | None, named: str | None, stated: float) -> tuple[Guess, str]:
     why = "named so" if named else f"whole numbers over a range of {span:.5g}"
+    if stated == 0.0:
+        return Guess("counts", "likely", f"{why}; the file states several numbers for a turn"), f', counts_per_rev = "{BLANK}"'
+    if math.isfinite(stated):
+        again = f", wrap = {stated:g}" if wrap is not None and abs(wrap / stated - 1.0) < 0.1 else ""
+        guess = Guess("counts", "likely", f"{why}; so many make a turn as the file states")
+        return guess, f", counts_per_rev = {stated:.10g}{again}"
     if wrap is not None:
         return (Guess("counts", "sure" if named else "likely", f"{why}; it starts again after {wrap:g}, taken for a revolution"),
                 f", counts_per_rev = {wrap:g}, wrap = {wrap:g}")
@@ -285,12 +289,17 @@ def units_of_ratio(factor: float, tolerance: float = 0.1) -> tuple[str, str] | N
     return _ANGULAR_RATIOS[nearest] if abs(factor / nearest - 1.0) <= tolerance else None
 
 
-def _by_velocity(slope: Slope) -> Guess | None:
-    """The unit that the recorded velocity decides: where both have one unit of angle it decides nothing."""
-    unit, speed = units_of_ratio(slope.factor) or ("", "")
-    if not unit:
+def _by_velocity(slope: Slope, speed: str | None) -> Guess | None:
+    """The unit that the recorded velocity decides: its own, where the file states one, or one of a telling ratio."""
+    if speed in UNITS:
+        sizes = {unit: abs(UNITS[speed].factor / slope.factor / size - 1.0) for unit, size in _TURNING.items()}
+        unit = min(sizes, key=lambda unit: sizes[unit])
+        found = unit if sizes[unit] < _SAME_RATIO else ""
+    else:
+        found, speed = units_of_ratio(slope.factor) or ("", "")
+    if not found:
         return None
-    return Guess(unit, "likely", f"its slope is {slope.factor:.4g} times the recorded velocity, as with {unit} and {speed}")
+    return Guess(found, "likely", f"its slope is {slope.factor:.4g} times the recorded velocity, as with {found} and {speed}")
 
 
 def crossed(q: Array, dq: Array, t: Array | None) -> tuple[int, int] | None:
@@ -303,22 +312,19 @@ def crossed(q: Array, dq: Array, t: Array | None) -> tuple[int, int] | None:
 
 def velocity_unit(slope: Slope, position: str) -> str:
     """The unit of a velocity by that of the position whose slope it is, "" where their ratio fits none."""
-    units = units_of_ratio(slope.factor)
-    if units is None:
-        return ""
-    unit, speed = units
-    same = {"rad": "rad/s", "deg": "deg/s", "m": "m/s", "mm": "mm/s", "rev": "rev/s", "turn": "rev/s"}
-    return same.get(position, "") if not unit else speed if unit == position else ""
+    size = UNITS[position].factor * slope.factor if position in UNITS else math.nan
+    near = [unit for unit in _SPEEDS if abs(size / UNITS[unit].factor - 1.0) <= _SAME_RATIO]
+    return near[0] if near else ""
 
 
-def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | None, in_si: bool) -> Guess:
+def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | None, message: str) -> Guess:
     """The unit of torques, "" where it stays open: by name, by what the robot's own links ask for.
 
-    `fit` is None where links or motion are unknown; a name `in_si` is then taken at its word.
+    `fit` is None where links or motion are unknown; the definition of a `message` is then taken at its word.
     """
     peak = float(np.abs(tau).max())
     unit = named or "N m"
-    if named is not None and not (named in ("A", "mA") or named.endswith("N m") or named.endswith("N")):
+    if named is not None and (named not in UNITS or UNITS[named].quantity not in ("torque", "current")):
         return unknown_unit(named)
     if named is None and current:
         return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or a share of the drive's rated current?")
@@ -327,16 +333,18 @@ def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | Non
         return Guess("", "unsure", f"{'named so, but ' if named else ''}up to {peak:.4g} {unit}: {off}")
     if named is not None:
         return Guess(named, "sure", f"named so; up to {peak:.4g} {named}")
-    if fit is None and in_si:
-        return Guess("N m", "likely", f"up to {peak:.4g}, named by the symbol of mechanics")
+    if fit is None and message:
+        return Guess("N m", "likely", f"up to {peak:.4g}, as {message} defines it")
     if fit is None:
         return Guess("", "unsure", f"up to {peak:.4g}, and no links of a robot to compare with: N m of the joint or of the "
                      "motor, a share of a rated torque, or a current in A?")
     return Guess("N m", "likely", f"up to {peak:.4g}, and it follows from the motion by weight and inertia of the robot's links")
 
 
-def sign_of(q: Array, tau: Array) -> Guess:
-    """Dry friction turns with the speed: where a joint reverses, its torque jumps the same way, and all else is smooth.
+def sign_of(q: Array, tau: Array, links: Array | None = None) -> Guess:
+    """The sign of each joint's torque, by the links of the robot where they tell it (`links`: -1, 0, 1), else by friction.
+
+    Dry friction turns with the speed: where a joint reverses, its torque jumps the same way, and all else is smooth.
 
     About each reversal, tau = a + b k + c k² + d k³ + F sign(dq); F is positive (Coulomb's law; Armstrong-Hélouvry 1991).
     Student's test of the mean F of a joint's reversals, at `_FALSE_SIGN` over all joints. A jump that fits better
@@ -357,11 +365,20 @@ def sign_of(q: Array, tau: Array) -> Guess:
         mean, error = float(np.mean(jumps)), float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps))
         chance = 2.0 * stdtr(len(jumps) - 1, -abs(mean) / max(error, 1e-300))
         claims[j] = np.sign(mean) if chance < _FALSE_SIGN / q.shape[1] else 0.0
-    wrong = [str(j + 1) for j in np.flatnonzero(claims < 0)]
+    weight = np.zeros(q.shape[1]) if links is None else links
+    signs = np.where(weight != 0.0, weight, claims)
+    wrong = ", ".join(str(j + 1) for j in np.flatnonzero(signs < 0))
+    if (weight * claims < 0).any():
+        return Guess("sign = -1?", "unsure", "sign: friction and the robot's links tell opposite signs of a joint")
+    if wrong and (weight[signs < 0] < 0).all():
+        return Guess(f"[{', '.join('-1' if sign < 0 else '1' for sign in signs)}]", "likely",
+                     f"sign: torque of joint {wrong} follows the robot's own links with the other sign")
     if wrong:
         return Guess("sign = -1?", "likely",
-                     f"torque of joint {', '.join(wrong)} jumps against the speed where it reverses, unlike friction: "
-                     "add sign = -1 there, unless its transmission is negative")
+                     f"torque of joint {wrong} jumps against the speed where it reverses, unlike friction: "
+                     "sign = -1 there, unless its transmission is negative")
+    if (weight > 0).all():
+        return Guess("as recorded", "likely", "sign: torque follows the robot's own links")
     if (claims > 0).all():
         return Guess("as recorded", "likely", "sign: torque jumps with the speed where a joint reverses, as friction does")
     return Guess("as recorded", "unsure", "sign: torque and motion do not tell")

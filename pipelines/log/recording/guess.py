@@ -20,7 +20,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.experiment import Array
-from pipelines.log.recording.clock_guess import SECONDS, round_rate, unit_of_clock
+from pipelines.log.recording.clock_guess import SECONDS, clock_as_stated, rate_as_stated, round_rate
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
@@ -48,6 +48,7 @@ from pipelines.log.recording.reading import (
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.recording.sound import lost_numbers, sound_samples
 from pipelines.log.recording.sources import read_table
+from pipelines.log.recording.stated import Statement, stated_counts, stated_gear, stated_rate, stated_scale, stated_unit
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.log.units import UNITS
 
@@ -55,8 +56,10 @@ __all__ = ["Draft", "guess_recipe"]
 
 _MOST_COLUMNS = 2000
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
+_ONE_UNIT = frozenset({"q", "qpos", "jpos", "effort", "efforts"})  # mechanics, ROS: velocities in the positions' unit of angle
+_SHARE = 0.02  # of a bound: a number that keeps 0..1, and comes near both, is a share of an opening or of a range
 _ANGLES, _NAMED = ("rad", "deg", "rev"), "as named"  # what positions may be in where no unit is named; else that
-_MOTOR_SIDE = re.compile(r"motor[ _-]*(side|shaft|seit)", re.IGNORECASE)
+_MOTOR_SIDE = re.compile(r"(motor|rotor|drive)[ _-]*(side|shaft|seit)|before the gear", re.IGNORECASE)
 _ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
 name = "one-joint"
 gravity = [0.0, 0.0, -9.81]
@@ -126,14 +129,19 @@ class _Drafting:
         self.joints: tuple[Joint, ...] = arm.joints if arm is not None else ()
         self.clock_unit, self.clock_guess = "", Guess("", "unsure", "")
         self.t: Array | None = None  # [s]
+        self.stated, self.counts = stated_rate(reading.table.notes), stated_counts(reading.table.notes)
         self.slope = reading.slope if reading.clock is None else None  # of q against dq, per second (or sample)
+        self.rate, self.rate_guess = rate_as_stated(self.stated, self.slope)
         if reading.clock is not None:
-            self.clock_unit, self.clock_guess = unit_of_clock(reading.clock, self.q, reading.slope)
-            factor = 1.0 if reading.clock.paired else SECONDS.get(self.clock_unit)
+            clock = reading.clock
+            self.clock_unit, self.clock_guess = clock_as_stated(clock, self.q, reading.slope, reading.table.notes, self.stated)
+            factor = 1.0 if clock.paired else SECONDS.get(self.clock_unit)
+            factor = 1.0 / self.rate if self.clock_unit == "sample" and self.rate > 0.0 else factor
             if factor is not None:
-                self.t = reading.clock.values * factor
+                self.t = clock.values * factor
                 self.slope = reading.slope and Slope(reading.slope.factor / factor, reading.slope.correlation)
-        self.rate = self._rate_of_velocity() if reading.clock is None else math.nan
+        elif not math.isfinite(self.rate) and self.stated is None:
+            self.rate, self.rate_guess = self._rate_of_velocity()
         self.current = tau is not None and tau.quantity == "current"
         self.fits: dict[str, LinkFit] = {}  # by the unit of the positions
         self.fits = self._fits()
@@ -174,13 +182,13 @@ class _Drafting:
                     lines.append(f'tip_link = "{self.blank("robot.tip_link")}"')
             return [*lines, ""]
         known = self.reading.q.group or self.reading.tau.group
-        if not arm.files and known and self.n == 1:
+        if not arm.files and known and self.n == 1 and not self.reading.sisters:
             return _ONE_JOINT.split("\n")
         which = "robot.toml, a URDF, or a shipped name"
         if arm.files:
             which = f"one of {', '.join(clean(file, 40) for file in arm.files)}"
-        joints = f" of {self.n} joints" if known else ""
-        return ["[robot]", f'use = "{self.blank("robot.use")}"   # the robot{joints}: {which}', ""]
+        joints = f" of {self.n} joints" if known and self.n > 1 else ""
+        return ["[robot]", f'use = "{self.blank("robot.use")}"   # the robot{joints}: {which}', *self._sister_lines(), ""]
 
     def _log(self) -> list[str]:
         name = _quoted(self.reading.path.name)
@@ -215,35 +223,52 @@ class _Drafting:
         lines = ["[time]", f"column = {_quoted(clock.columns[0])}"]
         unit = self.clock_unit or self.blank("time.unit")
         lines.append(f'unit = "{unit}"   {self.note("time unit", self.clock_guess)}')
-        if self.clock_unit == "sample":
+        if self.clock_unit == "sample" and math.isfinite(self.rate):
+            lines.append(f"rate = {self.rate:g}   {self.note('rate', self.rate_guess)}")
+        elif self.clock_unit == "sample":
             lines.append(f'rate = "{self.blank("time.rate")}"   # Hz')
         return [*lines, ""]
 
     def _rate(self) -> list[str]:
-        """Return [time] without a column: the rate, which a recorded velocity may show."""
+        """Return [time] without a column: the rate that the file states, or a recorded velocity shows."""
         if math.isfinite(self.rate):
-            guess = Guess(f"{self.rate:g} Hz", "likely", "the recorded velocity is that often the step of the position "
-                          "from sample to sample, if both are in one unit of angle")
-            return ["[time]", f"rate = {self.rate:g}   {self.note('rate', guess)}", ""]
+            return ["[time]", f"rate = {self.rate:g}   {self.note('rate', self.rate_guess)}", ""]
         self.evidence.append("rate: no column of time")
         self.blanks.append("time.rate")
-        return ["[time]", f'rate = "{BLANK}"                        # Hz; no column rises steadily, so only you know it',
-                *self._map_hint(), ""]
+        why = self.rate_guess.why or "no column rises steadily, so only you know it"
+        return ["[time]", f'rate = "{BLANK}"                        # Hz; {clean(why, 200)}', *self._map_hint(), ""]
 
-    def _rate_of_velocity(self) -> float:
+    def _rate_of_velocity(self) -> tuple[float, Guess]:
         """Return the rate [Hz] that a recorded velocity shows; nan where none does, or no round one, as recorders are set to."""
         slope = self.reading.slope if self._one_unit_of_angle() else None
         rate = 1.0 / slope.factor if slope is not None and slope.factor > 0 else math.nan
         near = round_rate(1.005 * rate) if math.isfinite(rate) else math.nan
-        return near if abs(rate / near - 1.0) < 5e-3 else math.nan
+        guess = Guess(f"{near:g} Hz", "likely", "the recorded velocity is that often the step of the position from sample to "
+                      "sample, if both are in one unit of angle")
+        return near if abs(rate / near - 1.0) < 5e-3 else math.nan, guess
 
     def _one_unit_of_angle(self) -> bool:
-        """Tell whether a velocity without a clock is in the positions' unit: both name it, or are in SI units."""
+        """Tell whether a velocity without a clock is in the positions' unit: both name it, or are called q and dq."""
         q, dq = self.reading.q.group, self.reading.dq.group
         if q is None or dq is None:
             return False
-        position, speed = (unit_of_group(group.columns, self.reading.table)[0] for group in (q, dq))
-        return speed == f"{position}/s" if position or speed else self.reading.in_si
+        position, speed = (self._named(group, self.reading.table)[0] for group in (q, dq))
+        words = q.words.split() + (self.reading.tau.group.words.split() if self.reading.tau.group else [])
+        named = bool(_ONE_UNIT & {word.rstrip("0123456789") for word in words}) or bool(self.reading.message)
+        return speed == f"{position}/s" if position or speed else named
+
+    def _named(self, group: Group, table: RawTable) -> tuple[str | None, ...]:
+        """Return the unit of each column by header and name, else as a line of the file states it; None where none does."""
+        stated = [self._statement(group.quantity, bool(j < len(self.joints) and not self.joints[j].revolute), group.motor, table)
+                  for j in range(len(group.columns))]
+        return tuple(unit or (said.value or None if said else None)
+                     for unit, said in zip(unit_of_group(group.columns, table), stated, strict=True))
+
+    def _statement(self, quantity: str, linear: bool, motor: bool, table: RawTable) -> Statement | None:
+        """Return what the file states of a unit; raw counts go by the size that it states of one."""
+        if quantity == "position" and self.counts is not None and not linear:
+            return Statement("counts", self.counts.words)
+        return stated_unit(table.notes, quantity, linear, motor)
 
     def _map_hint(self) -> list[str]:
         """Positions that rise in even steps without a clock are a map rather than a motion."""
@@ -268,6 +293,7 @@ class _Drafting:
             self.blanks.append("signals.q.counts_per_rev")
         lines = [f"q = {{ {_columns(choice.group.columns, self.reading.table)}, unit = {self._units('q', units)}{further} }}"]
         lines += [f"    {self.note('q unit', guess)}" for guess in why]
+        lines += self._as_stated(choice.group, self.reading.table)
         lines += [f"    {comment}" for comment in self._order(choice.group)]
         if still := [str(j + 1) for j in np.flatnonzero(np.ptp(self.q, axis=0) == 0.0)]:
             lines.append(f"    # joint {', '.join(still)} never moves in this file")
@@ -276,17 +302,18 @@ class _Drafting:
     def _position_units(self, group: Group) -> tuple[list[str], str, list[Guess]]:
         """Return the unit of each joint, further keys of the recipe, and the reasons."""
         assert self.q is not None
-        named = unit_of_group(group.columns, self.reading.table)
+        named = self._named(group, self.reading.table)
+        speed = self._named(self.reading.dq.group, self.reading.table)[0] if self.reading.dq.group else None
         turning = [j for j in range(self.n) if not self.joints or self.joints[j].revolute]
         units, why, further = [""] * self.n, [], ""
         if turning:
             slope = self.slope if self.t is not None else None  # decides the unit of angle once that of time is known
             joints = [self.joints[j] for j in turning] if self.joints else ()
-            guess, further = position_unit(self.q[:, turning], slope, named[turning[0]], joints, group.side,
-                                           self.fits, self.reading.in_si)
+            first = next((named[j] for j in turning if named[j] is not None), None)
+            guess, further = position_unit(self.q[:, turning], slope, first, joints, group.side, self.fits, self.reading.message,
+                                           speed, self._counts_of_turn)
             for j in turning:
-                said = named[j] or ""
-                units[j] = said if guess.value and (said in UNITS or said == "counts") else guess.value
+                units[j] = _unit_of_joint(named[j], guess.value, first)
             why.append(guess)
             if guess.value == "rad" and "times pi/2" in guess.why:
                 self.ratios = quarter_turns(self.q)
@@ -294,7 +321,32 @@ class _Drafting:
             guess = slide_unit(self.q[:, j], named[j], self.joints[j])
             units[j] = guess.value
             why.append(guess)
+        own = unit_of_group(group.columns, self.reading.table)
+        shares = self._shares(own)
+        if shares:
+            units = ["" if j in shares else unit for j, unit in enumerate(units)]
+            which = ", ".join(clean(group.columns[j], 40) for j in shares)
+            why.append(Guess("", "unsure", f"{which}: up to {np.abs(self.q[:, shares]).max():.3g}, near 1 or 100: a gripper's "
+                             "opening or a share of a range, rather than a joint's angle?"))
         return units, further, why
+
+    @property
+    def _counts_of_turn(self) -> float:
+        """Return the counts of a turn that the file states; nan where it states none, 0 where it states several numbers."""
+        return math.nan if self.counts is None else self.counts.number if math.isfinite(self.counts.number) else 0.0
+
+    def _shares(self, own: Sequence[str | None]) -> list[int]:
+        """Return the joints, without a robot that has them or a unit of their own, that move like a share of a range."""
+        found = [j for j in range(self.n) if self.q is not None and not self.joints and own[j] is None and _is_share(self.q[:, j])]
+        return found if len(found) < self.n else []
+
+    def _as_stated(self, group: Group, table: RawTable) -> list[str]:
+        """Return a comment with the words of the file that a unit was taken from, or that contradict each other."""
+        said = self._statement(group.quantity, False, group.motor, table)
+        if said is None or None not in unit_of_group(group.columns, table):
+            return []
+        self.evidence.append(f"{group.quantity}: the file states {clean(said.words, 200)}")
+        return [f"    # check: {'' if said.value else 'contradictory, '}the file states {clean(said.words, 200)}"]
 
     def _units(self, signal: str, units: Sequence[str]) -> str:
         """Return the unit in TOML: one text, or one a joint where they differ; FILL IN where one is open."""
@@ -327,9 +379,9 @@ class _Drafting:
         if any(joint.type != "revolute" for joint in self.joints) or self._out_of_order(group) or (
                 position.order != group.order or self._doubt("q", position, self.reading.tau.group) is not None):
             return []
-        named = unit_of_group(group.columns, self.reading.table)[0]
+        named = self._named(group, self.reading.table)[0]
         unit = velocity_unit(slope, self._position_units(self.reading.q.group)[0][0])
-        if not unit or named not in (None, unit):
+        if not unit or UNITS.get(named or unit) != UNITS[unit]:
             return []
         guess = Guess(unit, "likely",
                       f"the position's slope is {slope.factor:.4g} times it; remove the line where it was not measured")
@@ -348,7 +400,7 @@ class _Drafting:
         words = group.unknown - (other.unknown if other else frozenset())
         if words and not (signal == "tau" and confirmed):
             return f"what does '{clean(min(words), 40)}' say of it?"
-        named = any(unit_of_group(group.columns, self.reading.torque_table))
+        named = any(self._named(group, self.reading.torque_table))
         best = min(self.fits.values(), key=lambda fit: fit.left, default=None)
         if exchanged := next((fit.exchanged for fit in (links, best) if fit is not None and fit.exchanged is not None), None):
             first, second = exchanged[0] + 1, exchanged[1] + 1
@@ -365,24 +417,38 @@ class _Drafting:
         doubt = self._doubt("tau", choice.group, self.reading.q.group)
         if choice.group is None or self.tau is None or doubt is not None:
             return self._open("tau", choice, doubt)
-        named = unit_of_group(choice.group.columns, table)
+        named = self._named(choice.group, table)
+        scales = stated_scale(table.notes, choice.group.quantity) if None in named and _whole(self.tau) else []
+        named = tuple(unit or (scales[0].value if len(scales) == 1 else None) for unit in named)
         guess = self._torque_unit(self.tau, choice.group, named[0])
         self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
-        units = [unit if guess.value and unit is not None and unit in UNITS else guess.value for unit in named]
+        units = [_unit_of_joint(unit, guess.value, next(filter(None, named), None)) for unit in named]
+        own = unit_of_group(choice.group.columns, table)
+        if self.q is not None and self.q.shape == self.tau.shape:
+            units = ["" if j in self._shares(own) else unit for j, unit in enumerate(units)]
         if guess.value == "N m" and self.joints:
             units = [unit if joint.revolute or unit != "N m" else "N" for unit, joint in zip(units, self.joints, strict=True)]
         file = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
-        lines = [f"tau = {{ {_columns(choice.group.columns, table)}, unit = {self._units('tau', units)}{file} }}",
-                 f"    {self.note('tau unit', guess)}", *(f"    {line}" for line in self._order(choice.group))]
+        if len(scales) == 1:
+            file += f", scale = {scales[0].number:g}"
+            self.evidence.append(f"tau scale: the file states {clean(scales[0].words, 200)}")
+        sign = Guess("as recorded", "unsure", "")
         if self.q is not None and self.q.shape == self.tau.shape:
-            lines.append(f"    {self.note('sign', sign_of(self.q, self.tau))}")
+            sign = sign_of(self.q, self.tau, self.links.signs if self.links is not None and self.links.followed else None)
+            value = f'"{self.blank("signals.tau.sign")}"' if sign.value.endswith("?") else sign.value
+            file += f", sign = {value}" if sign.value != "as recorded" else ""
+        lines = [f"tau = {{ {_columns(choice.group.columns, table)}, unit = {self._units('tau', units)}{file} }}",
+                 f"    {self.note('tau unit', guess)}", *(f"    {line}" for line in self._order(choice.group)),
+                 *self._as_stated(choice.group, table)]
+        if sign.why:
+            lines.append(f"    {self.note('sign', sign)}")
         return [*lines, *_also(choice, self.reading.table)]
 
     def _torque_unit(self, tau: Array, group: Group, named: str | None) -> Guess:
         """Return the unit of the torques, "" where columns, file or positions leave it open."""
         q = self.reading.q.group
-        guess, peak = torque_unit(tau, named, self.current, self.links, group.in_si), f"up to {np.abs(tau).max():.4g}"
-        if group.words == WITHOUT_NAME:
+        guess, peak = torque_unit(tau, named, self.current, self.links, self.reading.message), f"up to {np.abs(tau).max():.4g}"
+        if group.words == WITHOUT_NAME and named is None:
             return Guess("", "unsure", f"{peak}, neither position nor velocity: a torque in N m, or a current in A?")
         if guess.confidence == "sure":
             if self._noted_motor or (group.motor and not self.current and not self._followed):
@@ -406,7 +472,7 @@ class _Drafting:
             return {}
         named = self._position_units(group)[0]
         units = {unit: [unit] * self.n for unit in _ANGLES}
-        units = {_NAMED: named} if any(unit_of_group(group.columns, self.reading.table)) else units
+        units = {_NAMED: named} if any(self._named(group, self.reading.table)) else units
         if not {unit for each in units.values() for unit in each} <= UNITS.keys():
             return {}
         factors = {key: np.array([UNITS[unit].factor for unit in each]) for key, each in units.items()}
@@ -437,8 +503,14 @@ class _Drafting:
         order = f"these are {texts}" if texts else "in the order of the file"
         ask = f"{order}; write them from the base to the tip"
         first = choice.group if not doubt else None
+        lines += self._sister_lines()
         return [*lines, *(f"    # {ask if g is first else 'candidate'}: {_columns(g.columns, self.reading.table)}"
                          for g in found[:8])]
+
+    def _sister_lines(self) -> list[str]:
+        sisters = self.reading.sisters
+        files = ", ".join(clean(name, 40) for name in sisters[:8])
+        return [f"    # one file a joint? beside this one are {files}: join them, one column a joint"] if sisters else []
 
     def _drive(self) -> list[str]:
         """Return [drive]: ratios that the positions show, a blank where they are named the motor's, else a comment."""
@@ -453,27 +525,36 @@ class _Drafting:
         elif group and (self._noted_motor or (group.motor and "theta" not in group.words and not self._followed)):
             lines = ["[drive]                  # of motors, by name or note: q_motor = N q_joint, tau_joint = N^T tau_motor",
                      f'transmission = "{self.blank("drive.transmission")}"   # gear ratio of each joint; '
-                     "remove [drive] where they are the joints'"]
+                     "remove [drive] where they are the joints'", *self._stated_gear()]
         else:
             lines = [f"{'' if self.current else '# '}[drive]                # where numbers are motor side: q_motor = N q_joint, "
-                     "tau_joint = N^T tau_motor", f"# transmission = [{', '.join(['100.0'] * self.n)}]"]
+                     "tau_joint = N^T tau_motor", *(self._stated_gear() or [f"# transmission = [{', '.join(['100.0'] * self.n)}]"])]
         if self.current:
             blank = self.blank("drive.torque_constant")
             lines.append(f'torque_constant = "{blank}"             # N m/A, motor side: from the data sheet')
         return [*lines, ""]
 
+    def _stated_gear(self) -> list[str]:
+        """Return the gear ratios that the file states, for a person to confirm with their signs; nothing where it states none."""
+        gear = stated_gear(self.reading.table.notes)
+        if gear is None:
+            return []
+        ratios = f": transmission = [{', '.join([f'{gear.number:g}'] * self.n)}]" if gear.value else ""
+        return [f"# the file states '{clean(gear.words.strip(chr(39)), 200)}'{ratios}, + where motor and joint turn alike"]
+
     @property
     def _followed(self) -> bool:
         """Tell whether the robot's links confirm torque and motion as those of the joints, in size as well."""
         group = self.reading.tau.group
-        named = unit_of_group(group.columns, self.reading.torque_table)[0] if group else None
+        named = self._named(group, self.reading.torque_table)[0] if group else None
         unit, links = UNITS.get(named or "N m"), self.links
         return links is not None and unit is not None and links.followed and not unlike_links(links, unit.factor, named=False)
 
     @property
     def _noted_motor(self) -> bool:
-        """Tell whether a line above the table says that its numbers are the motors', and the robot's links do not deny it."""
-        return not self._followed and any(_MOTOR_SIDE.search(note) for note in self.reading.table.notes)
+        """Tell whether a line of the file says that its numbers are the motors', or names a gear, and no links deny it."""
+        notes = self.reading.table.notes
+        return not self._followed and (stated_gear(notes) is not None or any(_MOTOR_SIDE.search(note) for note in notes))
 
     def _missing(self) -> list[str]:
         """Return [missing] with the numbers that mark a lost sample; nothing where none does."""
@@ -496,6 +577,26 @@ class _Drafting:
                       f"steps of {1e3 * steps.min():.4g} to {1e3 * steps.max():.4g} ms, median {1e3 * median:.4g} ms: "
                       "the next round rate below, so that no sample is invented")
         return ["[resample]", f"rate = {rate:g}   {self.note('resample', guess)}", 'method = "spline"']
+
+
+def _whole(values: Array) -> bool:
+    return bool((values == np.round(values)).mean() > 0.99)
+
+
+def _unit_of_joint(named: str | None, guessed: str, first: str | None) -> str:
+    """Return the unit of one of several columns: its own, or what was guessed of all; "" where only others state one."""
+    if not guessed or (named is None and first is not None):
+        return ""
+    unit = guessed if named is None else named
+    return unit if unit in UNITS or unit == "counts" else ""
+
+
+def _is_share(values: Array) -> bool:
+    """Tell whether numbers keep 0..1, 0..100 or these and their negatives, and come near both ends, as a joint hardly does."""
+    low, high = float(values.min()), float(values.max())
+    full = 1.0 if max(high, -low) <= 1.0 + _SHARE else 100.0
+    near = 0.7 * full < high <= (1.0 + _SHARE) * full
+    return near and (-_SHARE * full <= low < 0.3 * full or -(1.0 + _SHARE) * full <= low < -0.7 * full)
 
 
 def _also(choice: Choice, table: RawTable) -> list[str]:

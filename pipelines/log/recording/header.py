@@ -142,7 +142,8 @@ def _names_above(
             cells = [cell.strip(" ,;\t") for cell in cells_of(line.strip(), delimiter)]
             fitted = _fitted(cells, width, rows)
             if fitted is None:
-                if rank == 0 and not comment and abs(len(cells) - width) == 1 and _words(cells):
+                times = any(re.match(r"\d{1,2}:\d\d", cell) for cell in cells)  # a message of the recorder
+                if rank == 0 and not comment and abs(len(cells) - width) == 1 and _words(cells) and not times:
                     odd = number, len(cells)
                 continue
             of_units = _are_units(fitted)

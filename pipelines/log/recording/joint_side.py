@@ -26,7 +26,7 @@ from pipelines.log.units import UNITS, canonical_unit, to_si
 
 __all__ = ["Converted", "drive_of", "joint_side", "si_of", "unit_declared", "units_of_joints"]
 
-_LINEAR = frozenset({"m", "mm", "um", "m/s", "mm/s", "m/s^2", "mm/s^2", "N", "mN", "kN"})
+_LINEAR = frozenset({"m", "cm", "mm", "um", "m/s", "cm/s", "mm/s", "m/s^2", "mm/s^2", "N", "mN", "kN"})
 _MOTION = ("position", "velocity", "acceleration")
 
 

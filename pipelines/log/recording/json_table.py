@@ -7,8 +7,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ __all__ = ["is_json", "read_json", "table_of_frames"]
 _LARGEST = 200_000_000  # [bytes]; parsed, JSON takes about ten times its size
 _DEEPEST = 8  # levels of names within a frame
 _MOST_COLUMNS = 2000
+_MOST_NOTES = 200
 
 
 def is_json(data: bytes) -> bool:
@@ -52,8 +55,9 @@ def read_json(data: bytes, source: str) -> RawTable:
         )
     document = _of_pandas(_parsed(data, source))
     frames = _frames(document, _DEEPEST)
+    notes = tuple(itertools.islice(_notes(document), _MOST_NOTES))
     if frames is not None:
-        return table_of_frames(frames, source)
+        return replace(table_of_frames(frames, source), notes=notes)
     arrays: dict[str, Array] = {}
     for name, value in _series(document, "", _DEEPEST):
         if (values := _array(value)) is not None:
@@ -65,7 +69,17 @@ def read_json(data: bytes, source: str) -> RawTable:
             where=source,
             remedy="save a list of frames, or one array a signal",
         )
-    return columns_of_arrays(arrays, source)
+    table = columns_of_arrays(arrays, source)
+    return replace(table, notes=(*table.notes, *notes))
+
+
+def _notes(document: Any) -> Iterator[str]:
+    """Yield "metadata.physics_dt = 0.005" of every number and text beside the samples."""
+    for path, value in _named(document, "", _DEEPEST) if isinstance(document, dict) else ():
+        if isinstance(value, int | float | str):
+            yield f"{path} = {value}"
+        elif isinstance(value, list) and value and all(isinstance(item, str) for item in value):
+            yield f"{path} = {' '.join(value)}"
 
 
 def _of_pandas(document: Any) -> Any:

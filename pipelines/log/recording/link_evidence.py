@@ -39,6 +39,7 @@ class Config:
     unnamed_gain: float = 1.5  # of a torque without a unit: a share of a rated torque may be near it by chance
     better: float = 0.5  # of what one unit or order leaves open is left by another that fits better
     proof: float = 0.1  # of the torque may be left open by the unit that is proved
+    friction: float = 0.3  # correlation with the direction of motion of what the links leave: where it is friction
     samples: int = 4000  # of a recording that are compared: ten seconds of a fast one
     samples_of_orders: int = 600  # of these, for each exchange of two joints
 
@@ -52,6 +53,7 @@ class LinkFit:
     alone: bool  # without any friction: computed, or simulated
     varies: bool  # the links' torque changes over the motion, so that the others say something
     left: float  # share of the torque's change that links and friction leave open, mean of the joints
+    signs: Array  # (joints,) -1 where weight and friction both have the other sign, 1 where both have the links', else 0
     exchanged: tuple[int, int] | None = None  # two joints (from 0) that would explain it better the other way round
 
 
@@ -101,7 +103,17 @@ def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config())
     followed = float(power[explains].sum()) > config.most * float(power.sum())
     left = np.var(tau - np.nan_to_num(gains) * model, axis=0).sum()
     alone = bool(left < (1.0 - config.alone) * np.var(tau, axis=0).sum())
-    return LinkFit(gains, followed, alone, varies, _left(rest, links, tau))
+    signs = np.sign(np.nan_to_num(gains))
+    friction = _correlation(tau - np.nan_to_num(gains) * model, np.sign(dq))
+    signs = np.where(signs * friction > config.friction, signs, 0.0)
+    return LinkFit(gains, followed, alone, varies, _left(rest, links, tau), signs)
+
+
+def _correlation(x: Array, y: Array) -> Array:
+    """Return the correlation of each column of `x` with that of `y`."""
+    x, y = x - x.mean(axis=0), y - y.mean(axis=0)
+    size = np.sqrt((x**2).sum(axis=0) * (y**2).sum(axis=0))
+    return np.asarray((x * y).sum(axis=0) / np.where(size > 0.0, size, 1.0))
 
 
 def _without_friction(values: Array, dq: Array, config: Config) -> Array:

@@ -10,6 +10,7 @@ import math
 import struct
 import warnings
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -74,7 +75,7 @@ def _wanted(listed: list[tuple[str, tuple[int, ...], str]], source: str) -> list
     declared = sum(8 * math.prod(shape) for _, shape, kind in listed if kind in _NUMERIC)
     if declared > BUDGET or any(size < 0 for _, shape, _ in listed for size in shape):
         raise InputRejected("X05", f"declares {declared} bytes of samples", where=source, remedy="split the recording")
-    names = [name for name, _, kind in listed if kind in (*_NUMERIC, "struct") and not name.startswith("__")]
+    names = [name for name, _, kind in listed if kind in (*_NUMERIC, "struct", "char") and not name.startswith("__")]
     foreign = [f"{name} ({kind})" for name, _, kind in listed if kind not in _HARMLESS]
     if not names:
         if foreign:
@@ -92,7 +93,7 @@ def _opened(name: str, value: Any, depth: int) -> list[tuple[str, npt.NDArray[np
     if not isinstance(value, np.ndarray):
         return []
     if value.dtype.names is None:
-        return [(name, value)] if depth == _DEEPEST or value.dtype.kind in "fiubc" else []
+        return [(name, value)] if depth == _DEEPEST or value.dtype.kind in "fiubcU" else []
     if depth == 0:
         return []
     found: list[tuple[str, npt.NDArray[np.generic]]] = []
@@ -123,7 +124,7 @@ def read_mat73(path: Path, source: str) -> Arrays:
             declared = sum(dataset.nbytes for dataset in members.values())
             if declared > BUDGET or declared > 1100 * path.stat().st_size + (64 << 20):
                 raise InputRejected("X05", f"declares {declared} bytes of samples", where=source, remedy="split the recording")
-            found: Arrays = {}
+            found: Arrays = dict(_attributes(file, ""))
             for name, dataset in members.items():
                 for key, values in _columns(name, dataset):
                     found[distinct(key, found, source)] = values
@@ -153,6 +154,20 @@ def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:
         elif kind is h5py.Dataset and (dataset := _usable(group[name], f"{prefix}{name}", source)) is not None:
             found[f"{prefix}{name}"] = dataset
     return found
+
+
+def _attributes(group: Any, prefix: str) -> Iterator[tuple[str, npt.NDArray[np.generic]]]:
+    """Yield the attributes of a file and its groups that are a number or a text, as text: "@rate" is "rate = 500"."""
+    import h5py
+
+    for key, value in list(group.attrs.items())[:_MOST_MEMBERS] if "MATLAB_class" not in group.attrs else []:
+        if isinstance(value, str | bytes | np.generic):
+            text = value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+            yield f"@{prefix}{key}", np.array([f"{prefix}{key} = {text[:200]}"])
+    for name in list(group)[:_MOST_MEMBERS] if prefix.count(".") < _DEEPEST else []:
+        hard = isinstance(group.get(name, getlink=True), h5py.HardLink)
+        if hard and name not in ("#refs#", "#subsystem#") and group.get(name, getclass=True) is h5py.Group:
+            yield from _attributes(group[name], f"{prefix}{name}.")
 
 
 def _usable(dataset: Any, name: str, source: str) -> Any:

@@ -124,8 +124,9 @@ def columns_of_arrays(arrays: Mapping[str, npt.NDArray[np.generic]], source: str
         InputRejected: S11 where arrays can be read both ways, S12 where none holds real numbers.
     """
     text = {name: problem for name, array in arrays.items() if (problem := _not_real(array)) is not None}
-    notes = tuple(" ".join(map(str, array.flat)) for name, array in arrays.items() if name in text and array.dtype.kind == "U"
-                  and array.size <= _MOST_KEYS)  # the joints' names
+    texts = {name: array for name, array in arrays.items() if name in text and array.dtype.kind == "U" and array.size <= _MOST_KEYS}
+    notes = tuple((f"{name} = " if name[:1] != "@" else "") + " ".join(map(str, array.flat)) for name, array in texts.items())
+    notes += tuple(f"{name} = {array.flat[0]}" for name, array in arrays.items() if array.size == 1 and array.dtype.kind in "fiub")
     usable = {name: array for name, array in arrays.items() if name not in text and array.size > 1}
     samples = _samples_of(usable, source)
     checks: list[Check] = []

@@ -6,6 +6,7 @@ velocity is the slope of its position. Where neither decides, nothing is chosen.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
@@ -48,6 +49,16 @@ __all__ = [
 WITHOUT_NAME, BY_FILE = "columns without a name", "columns named by their file"
 _PLANS = frozenset({"plan", "planned", "reference", "ref", "desired", "setpoint", "setpoints", "target", "targets"})
 _FEEDFORWARD, _FEEDBACK = frozenset({"ff", "feedforward"}), frozenset({"fb", "feedback"})
+_FILE_OF_AXIS = re.compile(r"(.*(?:joint|axis|axe|achse|motor|mot|id|actuator|servo|drive|node|j|m|a)[ _-]?)(\d+)(\D*)",
+                           re.IGNORECASE)
+_PATH = re.compile(r"[./]")
+# Messages by fields that others have not, whose definition says rad, rad/s and N m: ROS sensor_msgs/JointState,
+# libfranka's RobotState, Universal Robots' RTDE outputs, MuJoCo's mjData.
+_MESSAGES = tuple((message, frozenset(fields.split())) for message, fields in (
+    ("sensor_msgs/JointState", "joint_states position"), ("sensor_msgs/JointState", "field position effort"),
+    ("sensor_msgs/JointState", "header position effort"), ("libfranka's RobotState", "q tau_J"),
+    ("libfranka's RobotState", "q tau_ext_hat_filtered"),
+    ("Universal Robots' RTDE", "actual_q actual_current"), ("mjData", "qpos qfrc_actuator")))
 _MOST_JOINTS = 16
 _UNIT_NORM = 1e-3  # error of a quaternion's norm, written with four digits or more
 _MOST_BLOCKS = 6
@@ -90,11 +101,21 @@ class Reading:
         )
 
     @property
-    def in_si(self) -> bool:
-        """Tell whether the positions have the symbol of mechanics, or come with efforts as in ROS, whose units are SI."""
-        q, tau = self.q.group, self.tau.group
-        ros = tau is not None and bool({"effort", "efforts", "eff"} & set(tau.words.split()))
-        return q is not None and (ros or q.in_si)
+    def message(self) -> str:
+        """Return the message whose definition gives the unit of its fields, in SI, where the columns are those fields; else ""."""
+        names = [word for name in (*self.table.columns, *self.table.text, *self.table.labels) for word in _PATH.split(name)]
+        paths = {re.sub(r"[\W\d_]+$", "", name) for name in names}
+        return next((message for message, fields in _MESSAGES if fields <= paths), "")
+
+    @property
+    def sisters(self) -> tuple[str, ...]:
+        """Return the files beside that are named like this one but for the number of an axis: one file a joint."""
+        named = _FILE_OF_AXIS.fullmatch(self.path.stem)
+        if named is None:
+            return ()
+        pattern = re.compile(rf"{re.escape(named[1])}\d+{re.escape(named[3])}")
+        files = sorted(self.path.parent.glob(f"*{self.path.suffix}"))[:200]
+        return tuple(file.name for file in files if file != self.path and pattern.fullmatch(file.stem))
 
 
 def arm_beside(folder: Path, named: str | None = None) -> Arm:
@@ -125,7 +146,8 @@ def matrix(table: RawTable, columns: Sequence[str]) -> Array:
 
 def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     """Choose the columns of `table`, and of a companion file where the torques are in another."""
-    groups = _with_file_name(groups_of(table, arm.names), path)
+    slides = arm.robot is not None and not all(arm.robot.revolute)
+    groups = _with_file_name(groups_of(table, arm.names, slides), path)
     clock = find_clock(table, groups)
     used = clock.columns if clock else ()
     groups = [

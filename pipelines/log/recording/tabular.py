@@ -43,7 +43,7 @@ _MOST_JOINTS = 32
 _MOST_NOTES = 40  # lines above a table
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
-_TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?")
+_TIME_OF_DAY = re.compile(r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?(?:\s?([AaPp])\.?[Mm]\b)?")
 
 
 def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawTable:
@@ -263,12 +263,18 @@ def _arrays(cells: list[str]) -> Array | None:
 
 
 def _clock_times(cells: list[str]) -> tuple[Array, str] | None:
-    """Seconds of the day of texts such as "2024-05-17T11:30:00.125Z" or "11:30:00,125", going on over midnight. [s]"""
+    """Seconds of the day of texts such as "2024-05-17T11:30:00.125Z" or "1:30:00 PM", going on over midnight. [s]
+
+    Hours that stay below 13 and start again after noon are of a clock of 12 hours.
+    """
     found = [_TIME_OF_DAY.search(cell) for cell in cells]
     if not all(found):
         return None
-    seconds = np.array([3600.0 * int(m[1]) + 60.0 * int(m[2]) + float(f"{m[3]}.{m[4] or 0}") for m in found if m is not None])
-    return seconds + 86400.0 * np.concatenate([[0.0], np.cumsum(np.diff(seconds) < -43200.0)]), "s"
+    hours = [int(m[1]) % 12 + 12 * (m[5] in "Pp") if m[5] else int(m[1]) for m in found if m is not None]
+    seconds = np.array([60.0 * int(m[2]) + float(f"{m[3]}.{m[4] or 0}") for m in found if m is not None]) + 3600.0 * np.array(hours)
+    half = 1.0 if max(hours) > 12 or any(m[5] for m in found if m is not None) else 0.5  # of a day, after which they start again
+    again = np.diff(seconds) < -0.5 * half * 86400.0
+    return seconds + half * 86400.0 * np.concatenate([[0.0], np.cumsum(again)]), "s"
 
 
 def _refuse_formulas(line: Line, cells: list[str], names: tuple[str, ...], source: str) -> None:

@@ -20,13 +20,13 @@ _ENGLISH = {
     "acceleration": "ddq qdd qddot acc accel acceleration accelerations ddtheta qacc jacc ddφ ddθ",
     "torque": "tau torque torques trq tq moment moments effort efforts eff mom tor qfrc jtau tauj jtrq τ",
     "current": "i iq isq curr current currents cur amp amps ampere",
-    "time": "t time times tout timestamp timestamps stamp clock sec secs second seconds nsec nsecs nanosec nanosecs "
+    "time": "t ms us ns time times tout timestamp timestamps stamp clock sec secs second seconds nsec nsecs nanosec nanosecs "
     "nanosecond nanoseconds usec usecs microsec microseconds msec millisec milliseconds millis micros nanos elapsed "
     "ts uptime datetime date",
     "index": "idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id cycle",
     "temperature": "temp temperature temperatures tmp ϑ",
     "other": "pose ee eef eff_pose tcp tool flange cart cartesian force forces wrench ft voltage voltages volt volts "
-    "gripper finger fingers status mode error errors err deviation lag limit limits flag digital analog io quat "
+    "gripper finger fingers status mode error errors err deviation lag limit limits flag digital analog quat "
     "quaternion orientation rpy euler translation rotation dtau dtauj dτ jacobian power energy pwm duty safety imu gyro "
     "camera reward done success rate bus supply battery rel relative delta temp_core protective payload mass "
     "elbow_config distance trial trials repetition attempt",
@@ -43,7 +43,7 @@ _ENGLISH = {
     "motor": "motor mot motors rotor drive encoder servo",
     "joint": "joint joints jnt jnts axis axes link actuator actuators arm j a",
     "noise": "field fields data msg value values val state states robot robots header vector array log record signal "
-    "channel ch info feedback_data raw side of the in and ma active applied control norm normalized normalised scaled",
+    "channel ch io out info feedback_data raw side of the in and ma active applied control norm normalized normalised scaled",
 }
 _GERMAN = {
     "position": "winkel lage stellung drehwinkel gelenkwinkel",

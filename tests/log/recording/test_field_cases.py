@@ -130,4 +130,4 @@ def test_the_tip_of_a_robot_that_branches_is_named_beside_its_file(shared: Path,
 
 def test_the_draft_for_a_robot_that_branches_asks_for_its_tip(shared: Path) -> None:
     draft = draft_recipe(case(shared, "46") / "run1.csv")
-    assert draft.blanks == ("robot.tip_link",)
+    assert draft.blanks == ("robot.tip_link", "signals.q.unit", "signals.tau.unit")  # no links that prove a unit

@@ -22,13 +22,19 @@ from tests.log.recording.good import Array, good, run, text, write
 ABC = Arm("abc", ("a", "b", "c"), "zyy", (150, 150, 150))
 
 
+def stated(columns: Mapping[str, Array]) -> dict[str, Array]:
+    """Name the units in the header: a column's name alone states none."""
+    units = {"q": "rad", "tau": "Nm"}
+    return {f"{name} [{unit}]" if (unit := units.get(name.partition("_")[0])) else name: v for name, v in columns.items()}
+
+
 def drafted(folder: Path, content: str, name: str = "run.csv") -> str:
     return guess_recipe(write(folder, content, name)).text
 
 
-def test_a_plain_recording_needs_only_its_robot(tmp_path: Path) -> None:
+def test_a_recording_that_states_its_units_needs_only_its_robot(tmp_path: Path) -> None:
     folder = tmp_path / "data"
-    draft = guess_recipe(write(folder, text(good())))
+    draft = guess_recipe(write(folder, text(stated(good()))))
     assert draft.blanks == ("robot.use",)
     outcome = run(folder, draft.text.replace("FILL IN\"", 'rrr"', 1).replace('says rrr"', "says", 1))
     assert np.array_equal(open_log(outcome.folder / "logs" / "run.h5").log.q[:, 1], good()["q_2"])
@@ -121,7 +127,9 @@ def test_degrees_are_told_by_a_recorded_velocity(tmp_path: Path) -> None:
     degrees = {f"q_{j}": np.rad2deg(columns[f"q_{j}"]) for j in (1, 2, 3)}
     speeds = {f"dq_{j}": np.gradient(columns[f"q_{j}"], columns["t"]) for j in (1, 2, 3)}
     assert 'columns = "q_{j}", unit = "deg"' in drafted(tmp_path, text({**columns, **degrees, **speeds}))
-    assert 'columns = "q_{j}", unit = "rad"' in drafted(tmp_path, text({**columns, **speeds}))
+    assert 'columns = "q_{j}", unit = "FILL IN"' in drafted(tmp_path, text({**columns, **speeds}))
+    named = {f"{name} [rad/s]": values for name, values in speeds.items()}
+    assert 'columns = "q_{j}", unit = "rad"' in drafted(tmp_path, text({**columns, **named}))
 
 
 def test_a_flipped_torque_is_noticed(tmp_path: Path) -> None:
@@ -153,7 +161,7 @@ def test_a_handful_of_samples_is_refused(tmp_path: Path) -> None:
 
 def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
     columns = good()
-    odd = {"t": columns["t"], 'pos "1" \\ (rad)': columns["q_1"], "tau #1": columns["tau_1"]}
+    odd = {"t": columns["t"], 'pos "1" \\ (rad)': columns["q_1"], "tau #1 (Nm)": columns["tau_1"]}
     draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
     assert parse_recipe(draft.text).signals["q"].column
 
@@ -161,7 +169,7 @@ def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
 def test_nanoseconds_since_1970_are_a_time(tmp_path: Path) -> None:
     """Such stamps lie beyond 1e18; they are neither absurd nor a hole."""
     stamps = 1.7e18 + 1024000.0 * np.arange(1200)
-    draft = drafted(tmp_path / "data", text({"time_ns": stamps} | {k: v for k, v in good().items() if k != "t"}))
+    draft = drafted(tmp_path / "data", text({"time_ns": stamps} | {k: v for k, v in stated(good()).items() if k != "t"}))
     recipe = parse_recipe(draft.replace('use = "FILL IN"', 'use = "rrr"'))
     assert (recipe.time.column, recipe.time.unit) == ("time_ns", "ns")
 
@@ -328,7 +336,7 @@ def test_a_number_that_marks_a_lost_sample_is_proposed(tmp_path: Path) -> None:
         columns["q1"][[50, 300]] = columns["tau2"][400] = -9999.0
     draft = _table(tmp_path, lose, {})
     assert "[missing]\nvalues = [-9999.0]" in draft
-    assert 'q = { columns = "q{j}", unit = "rad" }' in draft
+    assert 'q = { columns = "q{j}"' in draft
 
 
 def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
@@ -371,7 +379,7 @@ def test_a_small_motion_without_a_unit_is_asked_about(tmp_path: Path) -> None:
     columns = good()
     named = {"t": columns["t"]} | {f"axis position {j}": 4.0 * columns[f"q_{j}"] for j in (1, 2, 3)}
     named |= {f"axis torque {j} [Nm]": columns[f"tau_{j}"] for j in (1, 2, 3)}
-    assert "rad, or the degrees of a small motion?" in drafted(tmp_path, text(named))
+    assert "rad, or the degrees of a small motion, or turns" in drafted(tmp_path, text(named))
 
 
 @pytest.mark.parametrize("also", [True, False])
@@ -398,14 +406,14 @@ def test_a_table_of_records_in_hdf5_is_read_like_named_columns(tmp_path: Path) -
     with h5py.File(tmp_path / "run.h5", "w") as file:
         file["session/samples"] = records
     draft = guess_recipe(tmp_path / "run.h5")
-    assert 'q = { columns = "session.samples.q_{j}", unit = "rad" }' in draft.text
-    assert draft.blanks == ("robot.use",)
+    assert 'q = { columns = "session.samples.q_{j}"' in draft.text
+    assert draft.blanks == ("robot.use", "signals.q.unit", "signals.tau.unit")
 
 
 @pytest.mark.parametrize("orient", ["columns", "split", "records"])
 def test_a_frame_that_pandas_wrote_as_json_is_read(tmp_path: Path, orient: str) -> None:
     pd.DataFrame(good()).to_json(tmp_path / "run.json", orient=orient)
-    assert guess_recipe(tmp_path / "run.json").blanks == ("robot.use",)
+    assert guess_recipe(tmp_path / "run.json").blanks == ("robot.use", "signals.q.unit", "signals.tau.unit")
 
 
 def test_a_header_that_comes_again_is_left_out(tmp_path: Path) -> None:

@@ -116,6 +116,7 @@ def test_a_folder_of_recordings_points_to_the_import(tmp_path: Path) -> None:
 ])
 def test_a_unit_that_is_not_known_is_asked_for(tmp_path: Path, names: dict[str, str], blank: str) -> None:
     """A header that says "%" is no torque in N m."""
+    names = {"q": "q_{} [rad]", "tau": "tau_{} [Nm]"} | names
     columns = {names.get(name.split("_")[0], name).format(name[-1]): values for name, values in good().items()}
     draft = guess_recipe(write(tmp_path, text(columns)))
     assert draft.blanks == ("robot.use", blank)
