@@ -1,0 +1,49 @@
+"""Arms in closed loop whose drives answer to noise: what that looks like is no delay and no lag.
+
+`benchmarks.other_plants` draws them: MuJoCo plants with their own friction laws and controllers.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks.other_plants.drawn import drawn
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.model.estimation.logs import motions_of, with_cutoff
+from pipelines.model.motion import Reconstruction
+from tests.diagnosis.arms import hidden
+from tests.diagnosis.asking import causes, diagnosed, effects
+
+
+def test_rows_hold_ripple_of_the_fastest_joint() -> None:
+    """24 periods a turn at ω rad/s are 24 ω / 2π Hz, where that is more than five times the motion's frequency."""
+    recipe = DiagnosisConfig(highest_hz=np.inf).recipe()
+    motions = motions_of([hidden(1)], Reconstruction())
+    fastest = np.abs(motions[0][1].motion.dq).max()
+    found = with_cutoff(recipe, motions).cutoff_hz
+    assert found is not None
+    assert found >= 24.0 * fastest / (2.0 * np.pi) * 0.999
+
+
+@pytest.mark.slow
+def test_a_delay_is_found_alone_and_to_a_twentieth() -> None:
+    """Over 25 Hz the drive's answer to noise made 8.7 ms of 7 ms, with a lag of 5.6 ms beside it."""
+    found = diagnosed(*drawn(19, 18)[-1].logs())
+    assert causes(found) == [("time_delay", 1)]
+    assert effects(found)[0].values["delay"] == pytest.approx(7e-3, rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "number"), [(31, 4), (18, 20)])
+def test_a_torque_that_hops_is_no_delay_and_no_contact(seed: int, number: int) -> None:
+    """A force of constant size that changes its sign at random: no cause of the library."""
+    found = diagnosed(*drawn(number, seed)[-1].logs())
+    assert found.decision.verdict == "unknown"
+    assert "wanders" in found.decision.reason
+
+
+@pytest.mark.slow
+def test_no_law_of_friction_stands_beside_friction_of_another_joint() -> None:
+    """A healthy joint 1 got "concave friction" beside the position-dependent friction of joint 6."""
+    assert causes(diagnosed(*drawn(6, 31)[-1].logs())) == [("position_friction", 6)]
