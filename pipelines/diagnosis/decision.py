@@ -311,16 +311,11 @@ def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
     """Return the errors of the nominal model on held-out motion, and the state of its floor."""
     judge = prepared.data if prepared.judge is None else prepared.judge
     left = found.residual_rms.validate
+    spread = predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns)))
     known = np.full(len(left), found.noise_floor_origin != "blocks")
-    if not known.all():
-        known = left <= _ABOVE * _noise(prepared)
-    return Facts(
-        left,
-        judge.rms(judge.y),
-        predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns))),
-        unresolved(estimated),
-        known,
-    )
+    if not known.all():  # what is predicted is off by the noise and by the deviations of the model
+        known = left <= _ABOVE * np.hypot(_noise(prepared), spread)
+    return Facts(left, judge.rms(judge.y), spread, unresolved(estimated), known)
 
 
 def _noise(prepared: Prepared) -> Array:

@@ -84,7 +84,7 @@ def test_motion_that_comes_again_is_a_noise_floor(base_hz: float, verdict: str) 
     rng, logs = np.random.default_rng(5), []
     for k, role in enumerate(("identify", "validate")):
         log = make_log(fourier(np.random.default_rng(k), base_hz=base_hz), duration=7.5, seed=k)
-        tau = log.tau + 0.25 * np.std(log.tau, axis=0) * rng.standard_normal(log.tau.shape)
+        tau = log.tau + 0.3 * np.std(log.tau, axis=0) * rng.standard_normal(log.tau.shape)
         logs.append(replace(with_signal(log, tau=tau), name=role, role=role, period=None))
     assert asked(logs).verdict == verdict
 
