@@ -24,8 +24,10 @@ import numpy.typing as npt
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.events import DIRECTIONS
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Diagnosis
+from pipelines.diagnosis.score import chi2_bound
 from pipelines.diagnosis.selection import Cause, Selection
 from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Arm
@@ -232,25 +234,36 @@ def _wandering(later: Later) -> Array:
     if later.dataset.reference is not None or whitening is None:
         return np.zeros(rows.n_joints)
     each = float(later.block_rows.mean()) / rows.n_joints
-    measured = np.concatenate([one.unwhitened for one in rows.data.logs], axis=1)
     lasting = later.dataset.noise_power / (each * whitening.weights[:, -1].sum(axis=1) ** 2)
-    return np.asarray(np.sqrt(lasting / np.maximum(np.mean(measured**2, axis=1), 1e-300)))
+    return np.asarray(np.sqrt(lasting / np.maximum(_torque_squared(later), 1e-300)))
+
+
+def _torque_squared(later: Later) -> Array:
+    """Return the mean square (joints,) of the torque as it was measured [(N m)²]."""
+    measured = np.concatenate([one.unwhitened for one in later.rows.data.logs], axis=1)
+    return np.asarray(np.mean(measured**2, axis=1))
 
 
 def _confused(later: Later, end: State, config: DiagnosisConfig) -> str:
     """Return why torque that wanders may look like a cause; "" where it cannot.
 
     In closed loop the drive answers such a torque a moment later, and so do the motion and its
-    record (Ljung 1999, 13.4): only a load that comes again with the motion is told from it.
+    record (Ljung 1999, 13.4): only a load that comes again with the motion is told from it, and one
+    of a moment that is larger than it comes by chance.
     """
-    others = [
-        one.effect.joint
-        for one in end.model.effects
-        if one.log is not None or one.effect.acts_on not in ("load", "body")
-    ]
     slow = _wandering(later)
-    at = [j for j in range(len(slow)) if None in others or j + 1 in others]
-    slow = np.where(np.isin(np.arange(len(slow)), at), slow, 0.0)
+    lasting = slow**2 * _torque_squared(later)  # variance of means over a block
+    bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
+    told = np.zeros(len(slow), dtype=np.bool_)
+    for one in end.model.effects:
+        if one.log is not None:
+            motion = later.rows.data.logs[one.log - later.rows.data.first].motion
+            size = np.abs(one.effect.torque(motion, end.model.nominal, one.values)).max(axis=0)
+            chance = lasting * config.block / one.values["duration"]
+            told |= np.sum(size**2 / np.maximum(chance, 1e-300)) < bound
+        elif one.effect.acts_on not in ("load", "body"):
+            told |= (np.arange(len(slow)) + 1 == one.effect.joint) | (one.effect.joint is None)
+    slow = slow * told
     return _wanders(slow) if slow.max() > config.misfit else ""
 
 

@@ -19,10 +19,10 @@ from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import Event
 
-__all__ = ["Window", "standing_out"]
+__all__ = ["DIRECTIONS", "Window", "standing_out"]
 
 _TOUCHED = 0.01  # numerics: of the largest effect of a push, from which a row is touched by it
-_DIRECTIONS = 3  # components of a force
+DIRECTIONS = 3  # components of a force
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def standing_out(
             gains.append(0.0 if own is None else own.gain)
     if best is None or best.gain < config.relevance**2 * _power(rows, best.touched):
         return None
-    bound = chi2_bound(config.alpha / config.event_candidates, _DIRECTIONS)
+    bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
     if best.gain <= max(bound, upper_point(gains, config.alpha)):
         return None
     return replace(best, free=_free(rows, best, residual))
@@ -86,7 +86,7 @@ def _free(rows: Rows, window: Window, residual: Sequence[Array]) -> float:
     for column, w, r in zip(columns, weight, residual, strict=True):
         x = column * w[window.rows]
         gain += float(x @ r[window.rows]) ** 2 / max(float(x @ x), 1e-300)
-    return gain - max(rows.n_joints - _DIRECTIONS, 0) * float(np.log(rows.count))
+    return gain - max(rows.n_joints - DIRECTIONS, 0) * float(np.log(rows.count))
 
 
 def _power(rows: Rows, touched: Indices) -> float:
