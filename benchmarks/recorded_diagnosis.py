@@ -83,13 +83,9 @@ def fold(data: Data, number: int, count: int) -> tuple[Data, Data]:
             replace(data, logs=(replace(one, weighed=one.weighed & inside),)))
 
 
-def searched(
-    prepared: Prepared, settings: Recipe, most: int, exclude: Sequence[str] = ()
-) -> Look:
+def searched(prepared: Prepared, most: int, exclude: Sequence[str] = ()) -> Look:
     """Return what `diagnose` finds without reference logs, `most` causes at most."""
-    usual = DiagnosisConfig()
-    config = replace(usual, causes=most, cutoff_hz=settings.cutoff_hz or usual.cutoff_hz)
-    return diagnose_prepared(prepared, config, exclude).look
+    return diagnose_prepared(prepared, DiagnosisConfig(causes=most), exclude).look
 
 
 def judged(what: str, prepared: Prepared, look: Look, judge: Data, seconds: float) -> Judged:
@@ -118,7 +114,7 @@ def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: Recipe
         begin = time.process_time()
         rest, judge = fold(prepared.data, number, count)
         own = replace(prepared, data=rest)
-        found = searched(own, settings, _TX40_CAUSES)
+        found = searched(own, _TX40_CAUSES)
         seconds = time.process_time() - begin
         out.append(judged(f"block {number + 1} of {count}", own, found, judge, seconds))
         print(f"  {out[-1].what}: " + ", ".join(f"{step.name} {100 * error:.2f} %"
@@ -131,7 +127,7 @@ def judged_odrive(data: Path, settings: Recipe = _ODRIVE) -> tuple[Look, list[Ju
     logs = imported("odrive", data)
     begin = time.process_time()
     prepared = prepare(Logs((logs["nocomp_0"], logs["nocomp_1"])), settings)
-    found = searched(prepared, settings, _ODRIVE_CAUSES)
+    found = searched(prepared, _ODRIVE_CAUSES)
     seconds = time.process_time() - begin
     out = []
     for name in ("nocomp_2", "comp_0", "slower_nocomp_0", "slower_comp_0"):

@@ -116,5 +116,5 @@ def test_odrive_in_brief(shared: Path) -> None:
     """The two greatest causes, in the order of their size: the ripple of seven pole pairs, and the lag of the logged current."""
     logs = imported("odrive", shared / "real")
     brief = Recipe(cutoff_hz=40.0)
-    found = searched(prepare(Logs((logs["nocomp_0"],), ()), brief), brief, 2, ("contact", "presliding", "backlash"))
+    found = searched(prepare(Logs((logs["nocomp_0"],), ()), brief), 2, ("contact", "presliding", "backlash"))
     assert names(found) == ["cogging", "torque_lag"]
