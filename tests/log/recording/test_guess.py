@@ -100,15 +100,22 @@ def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) ->
 @pytest.mark.parametrize("name", ["pos_read_data.csv", "curr_data.csv"])
 def test_the_tx40_draft_finds_both_files_and_the_motor_side(shared: Path, name: str) -> None:
     draft = guess_recipe(shared / "real" / "tx40" / name)
-    assert draft.blanks == ("time.rate", "signals.tau.unit", "drive.transmission")  # the file is named after a current
-    assert 'transmission = ["FILL IN", 32.0, 45.0, "FILL IN", "FILL IN", "FILL IN"]' in draft.text
-    filled = draft.text.replace('rate = "FILL IN"', "rate = 5000").replace('unit = "FILL IN"', 'unit = "N m"')
-    recipe = parse_recipe(filled.replace('"FILL IN"', "40.0"))
+    assert draft.blanks == ("time.rate", "signals.q.unit", "signals.tau.unit", "drive.transmission")  # named after a current
+    filled = draft.text.replace('rate = "FILL IN"', "rate = 5000").replace('unit = "FILL IN"', 'unit = "rad"', 1)
+    filled = filled.replace('unit = "FILL IN"', 'unit = "N m"')
+    recipe = parse_recipe(filled.replace('"FILL IN"', str([40.0] * 6)))
     assert recipe.robot["use"] == "tx40.urdf"
     assert recipe.log.match == "pos_read_data.csv"
     assert (recipe.signals["q"].columns, recipe.signals["q"].unit, recipe.signals["tau"].file) == ("Joint_{j}", "rad",
                                                                                                    "curr_data.csv")
-    assert "starts at 32, -45 times pi/2" in draft.text
+    assert "starts at 32, -45 times pi/2: by chance, or radians of the motor side" in draft.text
+
+
+def test_one_joint_at_a_quarter_turn_is_chance_and_no_gear(tmp_path: Path) -> None:
+    degrees = {f"q_{j}": np.rad2deg(good()[f"q_{j}"]) + (7.5 * np.pi if j == 2 else 0.0) for j in (1, 2, 3)}
+    draft = drafted(tmp_path, text(good() | degrees))
+    assert 'columns = "q_{j}", unit = "FILL IN"' in draft
+    assert "# transmission = [100.0, 100.0, 100.0]" in draft
 
 
 def test_a_map_is_recognised(shared: Path) -> None:
