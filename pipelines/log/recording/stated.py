@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pipelines.log.recording.column_names import read_name, words_of
-from pipelines.log.recording.vocabulary import WORDS, plain_letters
+from pipelines.log.recording.vocabulary import WORDS, narrow_signs, plain_letters
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["Statement", "stated_counts", "stated_gear", "stated_rate", "stated_scale", "stated_unit"]
@@ -71,7 +71,7 @@ class Statement:
 def _clauses(notes: Sequence[str]) -> Iterator[str]:
     """Yield the parts of lines that say one thing each; a line of two cells is a name and its value."""
     for line in notes:
-        text = line.strip().lstrip("#%/*!;\"' ").strip(" ,;\t\"'")[:_LONGEST]
+        text = narrow_signs(line).strip().lstrip("#%/*!;\"' ").strip(" ,;\t\"'")[:_LONGEST]
         cells = [cell.strip() for cell in re.split(r"[;\t]|,(?!\d)|(?<=[^\W\d]),", text) if cell.strip()]
         if len(cells) > 1 and all(re.fullmatch(r"[+-]?\d\S*( ?[^\W\d]+)?", cell) for cell in cells[1 : 2 + (len(cells) > 3)]):
             yield " ".join(cells)

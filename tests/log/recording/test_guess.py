@@ -111,6 +111,14 @@ def test_the_tx40_draft_finds_both_files_and_the_motor_side(shared: Path, name: 
     assert "starts at 32, -45 times pi/2: by chance, or radians of the motor side" in draft.text
 
 
+@pytest.mark.parametrize("brackets", ["（°）", "［deg］", "【度】", " （deg)"])
+@pytest.mark.parametrize("encoding", ["utf-8", "gb18030"])
+def test_units_in_wide_brackets_are_read(tmp_path: Path, brackets: str, encoding: str) -> None:
+    named = {f"关节{name[-1]}角度{brackets}" if name[0] == "q" else name: values for name, values in good().items()}
+    draft = draft_recipe(write(tmp_path, text(named).encode(encoding))).text
+    assert 'q = { columns = "关节{j}角度", unit = "deg" }' in draft
+
+
 def test_one_joint_at_a_quarter_turn_is_chance_and_no_gear(tmp_path: Path) -> None:
     degrees = {f"q_{j}": np.rad2deg(good()[f"q_{j}"]) + (7.5 * np.pi if j == 2 else 0.0) for j in (1, 2, 3)}
     draft = drafted(tmp_path, text(good() | degrees))

@@ -28,7 +28,8 @@ def test_a_name_alone_states_no_unit(tmp_path: Path) -> None:
 @pytest.mark.parametrize("line", [
     "# joint angles in degrees, joint torques in Nm", "# units: deg, Nm", "# q [deg], tau [Nm]", "% q in deg",
     "# Winkel in Grad; Momente in Nm", "# angles en degrés", "# positions are in degrees and torques in N m",
-    "# tool pose in mm and rad; joints in deg", "# mounted at 1.57 rad, joints in deg", "Units: degrees / Nm"])
+    "# tool pose in mm and rad; joints in deg", "# 关节角度（度），力矩（牛米）",
+    "# mounted at 1.57 rad, joints in deg", "Units: degrees / Nm"])
 def test_a_line_that_states_degrees_is_believed(tmp_path: Path, line: str) -> None:
     draft = drafted(tmp_path, line + "\n")
     assert 'q = { columns = "q_{j}", unit = "deg" }' in draft
