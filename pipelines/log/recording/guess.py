@@ -60,9 +60,10 @@ _ONE_UNIT = frozenset({"q", "qpos", "jpos", "effort", "efforts"})  # mechanics, 
 _SHARE = 0.02  # of a bound: a number that keeps 0..1, and comes near both, is a share of an opening or of a range
 _ANGLES, _NAMED = ("rad", "deg", "rev"), "as named"  # what positions may be in where no unit is named; else that
 _MOTOR_SIDE = re.compile(r"(motor|rotor|drive)[ _-]*(side|shaft|seit)|before the gear", re.IGNORECASE)
-_ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
+_ONE_JOINT = """[robot]                                 # check: one joint, about the z axis
 name = "one-joint"
-gravity = [0.0, 0.0, -9.81]
+# gravity: [0.0, 0.0, -9.81] on a vertical axis, where it does no work; [0.0, -9.81, 0.0] on a horizontal one
+gravity = "FILL IN"
 
 [robot.kinematics]
 convention = "dh"
@@ -183,6 +184,7 @@ class _Drafting:
             return [*lines, ""]
         known = self.reading.q.group or self.reading.tau.group
         if not arm.files and known and self.n == 1 and not self.reading.sisters:
+            self.blanks.append("robot.gravity")
             return _ONE_JOINT.split("\n")
         which = "robot.toml, a URDF, or a shipped name"
         if arm.files:

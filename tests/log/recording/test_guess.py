@@ -80,14 +80,15 @@ def test_a_held_torque_is_drafted_as_a_command(tmp_path: Path) -> None:
 
 def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) -> None:
     draft = guess_recipe(shared / "real" / "odrive" / "slow2_nocomp_0.csv")
-    assert draft.blanks == ("drive.torque_constant",)
-    recipe = parse_recipe(draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551"))
+    assert draft.blanks == ("robot.gravity", "drive.torque_constant")
+    text_ = draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551")
+    text_ = text_.replace('gravity = "FILL IN"', "gravity = [0.0, 0.0, -9.81]")
+    recipe = parse_recipe(text_)
     assert (recipe.time.column, recipe.time.unit) == ("t_s", "s")
     assert (recipe.signals["q"].unit, recipe.signals["q"].counts_per_rev) == ("counts", 8192)
     assert recipe.signals["tau"].unit == "A"
     assert recipe.resample is not None
     assert recipe.resample.rate == 400.0
-    text_ = draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551")
     (tmp_path / "recipe.toml").write_text(text_)
     from pipelines.import_log import STAGE, Settings
     from pipelines.stage import Request, run_stage
@@ -95,6 +96,15 @@ def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) ->
     request = Request((), tmp_path / "out", no_report=True)
     outcome = run_stage(STAGE, request, Settings(recipe=str(tmp_path / "recipe.toml"), source=shared / "real" / "odrive"))
     assert outcome.result.logs[0].samples == 4000
+
+
+def test_the_axis_of_one_joint_without_a_robot_is_asked_for(tmp_path: Path) -> None:
+    named = {"t [s]": good()["t"], "angle [rad]": good()["q_1"], "torque [Nm]": good()["tau_1"]}
+    draft = draft_recipe(write(tmp_path, text(named)))
+    assert draft.blanks == ("robot.gravity",)
+    assert "[0.0, 0.0, -9.81] on a vertical axis" in draft.text
+    with pytest.raises(UsageError, match="gravity"):
+        parse_recipe(draft.text)
 
 
 @pytest.mark.parametrize("name", ["pos_read_data.csv", "curr_data.csv"])
