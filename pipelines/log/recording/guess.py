@@ -586,10 +586,10 @@ def _unit_of_joint(named: str | None, guessed: str, first: str | None) -> str:
 
 
 def _is_share(values: Array) -> bool:
-    """Tell whether numbers keep 0..1, 0..100 or these and their negatives, and come near both ends, as a joint hardly does."""
+    """Tell whether numbers keep 0..1, 0..100 or these and their negatives, and reach the upper end, as a joint hardly does."""
     low, high = float(values.min()), float(values.max())
     full = 1.0 if max(high, -low) <= 1.0 + _SHARE else 100.0
-    near = 0.7 * full < high <= (1.0 + _SHARE) * full
+    near = (1.0 - _SHARE) * full <= high <= (1.0 + _SHARE) * full
     return near and (-_SHARE * full <= low < 0.3 * full or -(1.0 + _SHARE) * full <= low < -0.7 * full)
 
 

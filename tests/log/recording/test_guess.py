@@ -129,6 +129,12 @@ def test_units_in_wide_brackets_are_read(tmp_path: Path, brackets: str, encoding
     assert 'q = { columns = "关节{j}角度", unit = "deg" }' in draft
 
 
+@pytest.mark.parametrize(("top", "shares"), [(0.83, False), (1.0, True)])
+def test_a_joint_is_a_share_of_a_range_only_where_it_reaches_its_end(tmp_path: Path, top: float, shares: bool) -> None:
+    opening = top * np.abs(np.sin(3.0 * good()["t"]))
+    assert ("a gripper's opening" in drafted(tmp_path, "# q in rad\n" + text(good() | {"q_3": opening}))) is shares
+
+
 def test_one_joint_at_a_quarter_turn_is_chance_and_no_gear(tmp_path: Path) -> None:
     degrees = {f"q_{j}": np.rad2deg(good()[f"q_{j}"]) + (7.5 * np.pi if j == 2 else 0.0) for j in (1, 2, 3)}
     draft = drafted(tmp_path, text(good() | degrees))
