@@ -179,3 +179,12 @@ def test_files_of_one_joint_each_are_pointed_out(tmp_path: Path) -> None:
     draft = drafted(tmp_path, "", columns, "drive_id1.csv")
     assert "one file a joint? beside this one are drive_id2.csv" in draft
     assert "robot.use" in guess_recipe(tmp_path / "drive_id1.csv").blanks
+
+
+def test_a_comment_above_labelled_lines_states_their_units(tmp_path: Path) -> None:
+    c = good()
+    rows = [f"t: {c['t'][k]:.3f} q: [{c['q_1'][k]:.6f}, {c['q_2'][k]:.6f}] tau: [{c['tau_1'][k]:.6f}, {c['tau_2'][k]:.6f}]"
+            for k in range(600)]
+    draft = guess_recipe(write(tmp_path, "\n".join(["# simulator, q in degrees, tau in Nm", *rows]) + "\n", "log.txt"))
+    assert 'unit = "deg"' in draft.text
+    assert draft.blanks == ("robot.use",)
