@@ -373,6 +373,8 @@ def filled(draft: str, answer: Answer, run: Run) -> str | None:
         robot["use"] = "truth/arm.urdf"
     if ASK in str(robot.get("tip_link", "")):
         robot["tip_link"] = f"link_{run.n}"
+    if ASK in str(robot.get("gravity", "")):
+        robot["gravity"] = [0.0, -9.81, 0.0]
     column = time.get("column")
     known = {plain(name): unit for name, unit in answer.time.items()}
     if isinstance(column, str) and ASK in time.get("unit", ""):

@@ -258,3 +258,8 @@ def test_the_child_goes_with_its_program(tmp_path: Path, end: str) -> None:
                 continue
         return
     pytest.fail("the child lives on")
+
+
+def test_arrow_reserves_no_memory_that_a_child_may_not_use() -> None:
+    code = "import pipelines.log.files, pyarrow; print(pyarrow.default_memory_pool().backend_name)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "system\n"

@@ -157,9 +157,6 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
     if slope is not None and (found := _by_velocity(slope, speed)) is not None and not (
             side != "motor" and _beyond(q, joints, found.value)):
         return found, further
-    if turns := quarter_turns(q):
-        return Guess("rad", "likely", f"starts at {', '.join(f'{x}' for x in turns.values())} times pi/2: "
-                     "motor side, and these are likely its gear ratios for [drive]"), further
     if _whole(q) and span > 10.0:
         return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
     far = float(np.abs(q).max())  # neither -1..1 nor, of which it would be 6 %, -100..100
@@ -168,6 +165,9 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
     unit, proved = best_unit(fits or {})
     if proved:
         return Guess(unit, "likely", f"the torque follows from the motion by the robot's links if it is in {unit}"), further
+    if turns := quarter_turns(q):
+        return Guess("", "unsure", f"it starts at {', '.join(map(str, turns.values()))} times pi/2: by chance, or radians of the "
+                     "motor side, and these are the gear ratios?"), further
     return _by_limits(q, joints, message if unit in ("", "rad") else "") or _by_size(far, message), further
 
 
@@ -236,11 +236,12 @@ def quarter_turns(q: Array) -> dict[int, int]:
     """Robots rest at right angles: a motor then stands at its gear ratio times quarter turns, in rad.
 
     Returns:
-        joint (from 0) -> quarter turns at the start, of those that stand far from zero; empty where one is at none.
+        joint (from 0) -> quarter turns at the start, of those that stand far from zero; empty where one is at none, or
+        only one does, as by chance.
     """
     far = np.flatnonzero(np.abs(q[0]) > 4.0 * math.pi)
     start = q[0][far] / (0.5 * math.pi)
-    if start.size == 0 or np.abs(start - np.round(start)).max() > 2e-3:
+    if start.size < 2 or np.abs(start - np.round(start)).max() > 2e-3:
         return {}
     return {int(j): int(x) for j, x in zip(far, np.round(start), strict=True)}
 

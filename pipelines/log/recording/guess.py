@@ -60,9 +60,10 @@ _ONE_UNIT = frozenset({"q", "qpos", "jpos", "effort", "efforts"})  # mechanics, 
 _SHARE = 0.02  # of a bound: a number that keeps 0..1, and comes near both, is a share of an opening or of a range
 _ANGLES, _NAMED = ("rad", "deg", "rev"), "as named"  # what positions may be in where no unit is named; else that
 _MOTOR_SIDE = re.compile(r"(motor|rotor|drive)[ _-]*(side|shaft|seit)|before the gear", re.IGNORECASE)
-_ONE_JOINT = """[robot]                                 # check: one joint on a vertical axis, where gravity does no work
+_ONE_JOINT = """[robot]                                 # check: one joint, about the z axis
 name = "one-joint"
-gravity = [0.0, 0.0, -9.81]
+# gravity: [0.0, 0.0, -9.81] on a vertical axis, where it does no work; [0.0, -9.81, 0.0] on a horizontal one
+gravity = "FILL IN"
 
 [robot.kinematics]
 convention = "dh"
@@ -143,10 +144,10 @@ class _Drafting:
         elif not math.isfinite(self.rate) and self.stated is None:
             self.rate, self.rate_guess = self._rate_of_velocity()
         self.current = tau is not None and tau.quantity == "current"
+        self.at_turns = False  # positions of no unit start at quarter turns of motors
         self.fits: dict[str, LinkFit] = {}  # by the unit of the positions
         self.fits = self._fits()
         self.links = self._links()
-        self.ratios: dict[int, int] = {}  # joint (from 0) -> gear ratio, where the positions show one
 
     def note(self, what: str, guess: Guess) -> str:
         """Return the comment behind a guessed value: confidence, evidence, and what to check."""
@@ -183,6 +184,7 @@ class _Drafting:
             return [*lines, ""]
         known = self.reading.q.group or self.reading.tau.group
         if not arm.files and known and self.n == 1 and not self.reading.sisters:
+            self.blanks.append("robot.gravity")
             return _ONE_JOINT.split("\n")
         which = "robot.toml, a URDF, or a shipped name"
         if arm.files:
@@ -315,8 +317,7 @@ class _Drafting:
             for j in turning:
                 units[j] = _unit_of_joint(named[j], guess.value, first)
             why.append(guess)
-            if guess.value == "rad" and "times pi/2" in guess.why:
-                self.ratios = quarter_turns(self.q)
+            self.at_turns = not guess.value and bool(quarter_turns(self.q))
         for j in (j for j in range(self.n) if j not in turning):
             guess = slide_unit(self.q[:, j], named[j], self.joints[j])
             units[j] = guess.value
@@ -513,17 +514,10 @@ class _Drafting:
         return [f"    # one file a joint? beside this one are {files}: join them, one column a joint"] if sisters else []
 
     def _drive(self) -> list[str]:
-        """Return [drive]: ratios that the positions show, a blank where they are named the motor's, else a comment."""
+        """Return [drive]: a blank where positions are named the motor's, or start as a motor's do, else a comment."""
         group = self.reading.q.group
-        if self.ratios:
-            ratios = ", ".join(f"{abs(self.ratios[j])}.0" if j in self.ratios else f'"{BLANK}"' for j in range(self.n))
-            unknown = ""
-            if len(self.ratios) < self.n:
-                unknown = f"; those marked {self.blank('drive.transmission')} were near zero: from the data sheet"
-            lines = ["[drive]                  # check: likely, positions start at these numbers of quarter turns: motor side",
-                     f"transmission = [{ratios}]   # check: sign, + where motor and joint turn alike{unknown}"]
-        elif group and (self._noted_motor or (group.motor and "theta" not in group.words and not self._followed)):
-            lines = ["[drive]                  # of motors, by name or note: q_motor = N q_joint, tau_joint = N^T tau_motor",
+        if group and (self.at_turns or self._noted_motor or (group.motor and "theta" not in group.words and not self._followed)):
+            lines = ["[drive]                  # of motors, by name, note or start: q_motor = N q_joint, tau_joint = N^T tau_motor",
                      f'transmission = "{self.blank("drive.transmission")}"   # gear ratio of each joint; '
                      "remove [drive] where they are the joints'", *self._stated_gear()]
         else:
@@ -592,10 +586,10 @@ def _unit_of_joint(named: str | None, guessed: str, first: str | None) -> str:
 
 
 def _is_share(values: Array) -> bool:
-    """Tell whether numbers keep 0..1, 0..100 or these and their negatives, and come near both ends, as a joint hardly does."""
+    """Tell whether numbers keep 0..1, 0..100 or these and their negatives, and reach the upper end, as a joint hardly does."""
     low, high = float(values.min()), float(values.max())
     full = 1.0 if max(high, -low) <= 1.0 + _SHARE else 100.0
-    near = 0.7 * full < high <= (1.0 + _SHARE) * full
+    near = (1.0 - _SHARE) * full <= high <= (1.0 + _SHARE) * full
     return near and (-_SHARE * full <= low < 0.3 * full or -(1.0 + _SHARE) * full <= low < -0.7 * full)
 
 

@@ -18,6 +18,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.recording.dialect import MISSING, Dialect, cells_of, holds_number, is_number
+from pipelines.log.recording.vocabulary import narrow_signs
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["FORMULA", "Header", "find_header", "names_and_units", "split_unit", "without_repeats"]
@@ -148,7 +149,7 @@ def _names_above(
                 continue
             of_units = _are_units(fitted)
             if of_units:  # "unit" is what the line is called
-                said = [cell.strip("[]() ") for cell in fitted]
+                said = [narrow_signs(cell).strip("[]() ") for cell in fitted]
                 units = tuple("" if "unit" in cell.lower() else cell for cell in said)
                 unit_line = number
             if _words([fitted[j] for j in numeric]) or _counted(fitted, numeric):
@@ -240,23 +241,25 @@ def _counted(cells: Sequence[str], numeric: Sequence[int]) -> bool:
 
 def _are_units(cells: Sequence[str]) -> bool:
     """Tell whether most of the cells that say something are units of measurement."""
-    said = [cell.strip("[]() ") for cell in cells if cell.strip("[]() ").lower() not in _NO_UNIT]
+    bare = [narrow_signs(cell).strip("[]() ") for cell in cells]
+    said = [cell for cell in bare if cell.lower() not in _NO_UNIT]
     known = sum(canonical_unit(cell) in UNITS or cell == "counts" for cell in said)
     return bool(said) and known > 0.5 * len(said)
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """Return ("q1", "deg") for "q1 [deg]", "q1 (deg)", "q1, deg" or "q1 / deg"; an index in brackets is no unit."""
-    text = name.strip()
+    """Return ("q1", "deg") for "q1 [deg]", "q1（deg）", "q1, deg" or "q1 / deg"; an index in brackets is no unit."""
+    whole = name.strip()
+    text = narrow_signs(whole)
     if (behind := _BEHIND_SIGN.fullmatch(text)) and canonical_unit(behind[2]) in UNITS:
-        return behind[1], behind[2]
+        return whole[: behind.end(1)], behind[2]
     stem, bracket, rest = text.rpartition(max("[(", key=text.rfind))
     unit = rest[:-1].strip()
     if not bracket or not stem.strip() or rest[-1:] not in ("]", ")") or not 0 < len(unit) <= 20:
-        return text, ""
+        return whole, ""
     if set(unit) & set("[]()") or set(unit) <= set("0123456789 ,:"):
-        return text, ""
-    return stem.strip(), unit
+        return whole, ""
+    return whole[: len(stem)].strip(), unit
 
 
 def names_and_units(

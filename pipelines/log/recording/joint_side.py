@@ -162,7 +162,7 @@ def joint_side(part: Recording, recipe: Recipe, units: Mapping[str, tuple[str, .
     if not trust_units and "q" in signals:
         _refuse_degrees(part, signals["q"].values, units["q"], robot)
     turns = quarter_turns(part.signals["q"]) if "q" in part.signals and set(units["q"]) <= {"deg", "°"} else {}
-    if len(turns) > 1:
+    if turns:
         starts = ", ".join(map(str, turns.values()))
         checks.append(Check.of("S07", "warn", f"declared in degrees, but the numbers start at {starts} times "
                                "pi/2, digit by digit: radians of the motor side?", where=f"{part.where}, signal q",

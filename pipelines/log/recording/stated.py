@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from pipelines.log.recording.column_names import read_name, words_of
-from pipelines.log.recording.vocabulary import WORDS, plain_letters
+from pipelines.log.recording.vocabulary import WORDS, narrow_signs, plain_letters
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = ["Statement", "stated_counts", "stated_gear", "stated_rate", "stated_scale", "stated_unit"]
@@ -30,6 +30,7 @@ _SCALE = (re.compile(rf"{_NUMBER}\s*([^\W\d][^\s\d/]*){_PER}(?:one )?{_COUNT}\b"
           re.compile(rf"(?<![\w.])1 ?{_COUNT}\s*(?:=|is|corresponds to|equals)\s*{_NUMBER}\s*([^\W\d][^\s\d,;]*)"))  # fmt: skip
 _RATIO = re.compile(r"(?<![\d:.])(\d+(?:[.,]\d+)?)\s*:\s*(\d+(?:[.,]\d+)?)(?![\d:])")
 _QUANTITY = re.compile(rf"{_NUMBER}\s*(k?hz|fps|sps|[mµμu]?s(?:ec\w*)?|milli\w+|micro\w+|毫秒|ミリ秒|秒)?(?![\w/])")
+_FRACTION = re.compile(r"(?<![\w./])1\.?0* ?/ ?(\d+)\.?0*(?![\w./])(?: ?s(?:ec\w*)?\b)?")  # of a second, as programs write a step
 _THINNED = re.compile(r"decimat\w*+\W++(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)|jede[rn]? \d")
 _GENERIC = frozenset({
     "all", "alle", "are", "base", "column", "columns", "data", "each", "einheit", "einheiten", "in", "is", "of",
@@ -71,7 +72,7 @@ class Statement:
 def _clauses(notes: Sequence[str]) -> Iterator[str]:
     """Yield the parts of lines that say one thing each; a line of two cells is a name and its value."""
     for line in notes:
-        text = line.strip().lstrip("#%/*!;\"' ").strip(" ,;\t\"'")[:_LONGEST]
+        text = narrow_signs(line).strip().lstrip("#%/*!;\"' ").strip(" ,;\t\"'")[:_LONGEST]
         cells = [cell.strip() for cell in re.split(r"[;\t]|,(?!\d)|(?<=[^\W\d]),", text) if cell.strip()]
         if len(cells) > 1 and all(re.fullmatch(r"[+-]?\d\S*( ?[^\W\d]+)?", cell) for cell in cells[1 : 2 + (len(cells) > 3)]):
             yield " ".join(cells)
@@ -90,13 +91,13 @@ def _words(clause: str) -> set[str]:
 
 
 def _units(clause: str) -> Iterator[tuple[str, str]]:
-    """Yield (unit, words before it) of the units in a clause that stand for themselves, not behind a number.
+    """Yield (unit, words before it but for other units) of the units in a clause that stand for themselves, not behind a number.
 
     A single letter is one in brackets or behind "in", "unit" or a colon; the clause "Nm" is a unit alone.
     """
     pieces = re.findall(r"[\[(][^\])(\[]{1,20}[\])]|[^\s\[\]()]+", clause)
     pieces = [piece for piece in pieces if re.search(r"[\w°/]", piece)]
-    k = 0
+    k, words = 0, list[str]()
     while k < len(pieces):
         for length in (3, 2, 1):
             said = pieces[k : k + length]
@@ -107,9 +108,11 @@ def _units(clause: str) -> Iterator[tuple[str, str]]:
             number = any(re.match(r"[+-]?\d", word) for word in (before.strip("=:±~"), behind)) or before in _OF_EACH
             named = bare[:1] in "[(" or re.fullmatch(r"in|en|em|units?|einheit(?:en)?|.*[:=]", before) or len(pieces) == 1
             if len(said) == length and unit in UNITS and not number and (named or (len(unit) > 1 and bare.lower() != "min")):
-                yield unit, " ".join(pieces[:k])
+                yield unit, " ".join(words)
                 k += length - 1
                 break
+        else:
+            words.append(pieces[k])
         k += 1
 
 
@@ -148,7 +151,7 @@ def stated_rate(notes: Sequence[str]) -> Statement | None:
     """Return the rate of the samples [Hz] that the file states as such, or by their interval; nan where it states two."""
     found: dict[float, str] = {}
     for clause in _clauses(notes):
-        text = plain_letters(clause).lower()
+        text = _FRACTION.sub(r"\1 hz", plain_letters(clause).lower())
         if _THINNED.search(text):
             found.setdefault(math.nan, clause)
         if not _SAMPLED.search(text) or _NOT_SAMPLED.search(text):

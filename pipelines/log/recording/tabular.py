@@ -61,7 +61,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
     if not lines:
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy="record again, or copy the file again")
     if given == TextFormat() and (labelled := labelled_lines(lines)) is not None:
-        return _labelled(labelled, source, checks)
+        return _labelled(labelled, source, checks, tuple(line for _, line in _above(text, labelled.rows[0][0])))
     dialect = find_dialect(lines, source, given)
     if dialect.width > _WIDEST:
         raise InputRejected("F16", f"{dialect.width} cells in a line, {dialect.words}: not a table of columns", where=source,
@@ -86,8 +86,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
                                "again", where=f"{source}, line {again[0]}", remedy="none where the clock goes on"))
     kept, columns, words, labels = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
     columns = without_repeats(columns, header, source)
-    above = list(enumerate(text.split("\n", body[0][0])[: body[0][0] - 1], start=1))[-_MOST_NOTES:]
-    notes = tuple(line for number, line in above if number != header.line)
+    notes = tuple(line for number, line in _above(text, body[0][0]) if number != header.line)
     lines_kept = np.array([number for number, _ in kept], dtype=np.int64)
     # Counted over the lines of data alone: an empty line or a comment between them loses no sample.
     rows = np.searchsorted(np.array([number for number, _ in body], dtype=np.int64), lines_kept)
@@ -101,7 +100,12 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
                     cycles={name: label for name, label in labels.items() if isinstance(label, tuple)})
 
 
-def _labelled(found: LabelledLines, source: str, checks: list[Check]) -> RawTable:
+def _above(text: str, first: int) -> list[Line]:
+    """The last lines above line `first` with their numbers."""
+    return list(enumerate(text.split("\n", first)[: first - 1], start=1))[-_MOST_NOTES:]
+
+
+def _labelled(found: LabelledLines, source: str, checks: list[Check], notes: tuple[str, ...]) -> RawTable:
     """F09: lines of another form are left out; they are notes between the samples."""
     if found.others:
         checks.append(Check.of("F09", "warn", f"{found.others} lines without the numbers of the others left out", where=source,
@@ -112,7 +116,7 @@ def _labelled(found: LabelledLines, source: str, checks: list[Check]) -> RawTabl
     lines = np.array([number for number, _ in body], dtype=np.int64)[keep]
     columns = {name: values[keep] for name, values in columns.items()}
     return RawTable(source, columns, np.arange(lines.size), text=words, lines=lines,
-                    units={name: units[name] for name in columns if name in units}, checks=tuple(checks))
+                    units={name: units[name] for name in columns if name in units}, checks=tuple(checks), notes=notes)
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:

@@ -11,7 +11,7 @@ import re
 import unicodedata
 from collections.abc import Mapping
 
-__all__ = ["ALL_WORDS", "QUANTITIES", "WORDS", "plain_letters"]
+__all__ = ["ALL_WORDS", "QUANTITIES", "WORDS", "narrow_signs", "plain_letters"]
 
 # Words of no language: symbols, abbreviations and the words of programs. English among them.
 _ENGLISH = {
@@ -265,14 +265,19 @@ _KOREAN = {
     "joint": "관절 축",
     "noise": "값",
 }
+_NARROW = {wide: wide - 0xFEE0 for wide in range(0xFF01, 0xFF5F) if chr(wide) != "，"} | str.maketrans("【】〔〕", "[][]")
 _LANGUAGES = (_ENGLISH, _GERMAN, _FRENCH, _SPANISH, _ITALIAN, _PORTUGUESE, _DUTCH, _SWEDISH, _POLISH, _CZECH, _TURKISH,
               _RUSSIAN, _CHINESE, _JAPANESE, _KOREAN)  # fmt: skip
 
 
+def narrow_signs(text: str) -> str:
+    """Return a text with wide Latin letters and signs (Ａ, （, １, 【) as narrow ones, each in its place."""
+    return text.translate(_NARROW)
+
+
 def plain_letters(text: str) -> str:
     """Return a text without accents, wide Latin letters and signs (Ａ, （, １) as narrow ones; a dotted φ is dφ."""
-    narrow = "".join(unicodedata.normalize("NFKC", c) if "\uff01" <= c <= "\uff5e" else c for c in text)
-    apart = unicodedata.normalize("NFD", narrow)
+    apart = unicodedata.normalize("NFD", narrow_signs(text))
     apart = re.sub("([α-ω])\u0307", r"d\1", re.sub("([α-ω])\u0308", r"dd\1", apart))
     bare = "".join(c for c in apart if not "\u0300" <= c <= "\u036f")
     return unicodedata.normalize("NFC", bare).replace("ß", "ss").replace("ł", "l").replace("Ł", "L").replace("ı", "i")

@@ -80,14 +80,15 @@ def test_a_held_torque_is_drafted_as_a_command(tmp_path: Path) -> None:
 
 def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) -> None:
     draft = guess_recipe(shared / "real" / "odrive" / "slow2_nocomp_0.csv")
-    assert draft.blanks == ("drive.torque_constant",)
-    recipe = parse_recipe(draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551"))
+    assert draft.blanks == ("robot.gravity", "drive.torque_constant")
+    text_ = draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551")
+    text_ = text_.replace('gravity = "FILL IN"', "gravity = [0.0, 0.0, -9.81]")
+    recipe = parse_recipe(text_)
     assert (recipe.time.column, recipe.time.unit) == ("t_s", "s")
     assert (recipe.signals["q"].unit, recipe.signals["q"].counts_per_rev) == ("counts", 8192)
     assert recipe.signals["tau"].unit == "A"
     assert recipe.resample is not None
     assert recipe.resample.rate == 400.0
-    text_ = draft.text.replace('torque_constant = "FILL IN"', "torque_constant = 0.0551")
     (tmp_path / "recipe.toml").write_text(text_)
     from pipelines.import_log import STAGE, Settings
     from pipelines.stage import Request, run_stage
@@ -97,18 +98,48 @@ def test_the_odrive_draft_is_the_shipped_recipe(shared: Path, tmp_path: Path) ->
     assert outcome.result.logs[0].samples == 4000
 
 
+def test_the_axis_of_one_joint_without_a_robot_is_asked_for(tmp_path: Path) -> None:
+    named = {"t [s]": good()["t"], "angle [rad]": good()["q_1"], "torque [Nm]": good()["tau_1"]}
+    draft = draft_recipe(write(tmp_path, text(named)))
+    assert draft.blanks == ("robot.gravity",)
+    assert "[0.0, 0.0, -9.81] on a vertical axis" in draft.text
+    with pytest.raises(UsageError, match="gravity"):
+        parse_recipe(draft.text)
+
+
 @pytest.mark.parametrize("name", ["pos_read_data.csv", "curr_data.csv"])
 def test_the_tx40_draft_finds_both_files_and_the_motor_side(shared: Path, name: str) -> None:
     draft = guess_recipe(shared / "real" / "tx40" / name)
-    assert draft.blanks == ("time.rate", "signals.tau.unit", "drive.transmission")  # the file is named after a current
-    assert 'transmission = ["FILL IN", 32.0, 45.0, "FILL IN", "FILL IN", "FILL IN"]' in draft.text
-    filled = draft.text.replace('rate = "FILL IN"', "rate = 5000").replace('unit = "FILL IN"', 'unit = "N m"')
-    recipe = parse_recipe(filled.replace('"FILL IN"', "40.0"))
+    assert draft.blanks == ("time.rate", "signals.q.unit", "signals.tau.unit", "drive.transmission")  # named after a current
+    filled = draft.text.replace('rate = "FILL IN"', "rate = 5000").replace('unit = "FILL IN"', 'unit = "rad"', 1)
+    filled = filled.replace('unit = "FILL IN"', 'unit = "N m"')
+    recipe = parse_recipe(filled.replace('"FILL IN"', str([40.0] * 6)))
     assert recipe.robot["use"] == "tx40.urdf"
     assert recipe.log.match == "pos_read_data.csv"
     assert (recipe.signals["q"].columns, recipe.signals["q"].unit, recipe.signals["tau"].file) == ("Joint_{j}", "rad",
                                                                                                    "curr_data.csv")
-    assert "starts at 32, -45 times pi/2" in draft.text
+    assert "starts at 32, -45 times pi/2: by chance, or radians of the motor side" in draft.text
+
+
+@pytest.mark.parametrize("brackets", ["（°）", "［deg］", "【度】", " （deg)"])
+@pytest.mark.parametrize("encoding", ["utf-8", "gb18030"])
+def test_units_in_wide_brackets_are_read(tmp_path: Path, brackets: str, encoding: str) -> None:
+    named = {f"关节{name[-1]}角度{brackets}" if name[0] == "q" else name: values for name, values in good().items()}
+    draft = draft_recipe(write(tmp_path, text(named).encode(encoding))).text
+    assert 'q = { columns = "关节{j}角度", unit = "deg" }' in draft
+
+
+@pytest.mark.parametrize(("top", "shares"), [(0.83, False), (1.0, True)])
+def test_a_joint_is_a_share_of_a_range_only_where_it_reaches_its_end(tmp_path: Path, top: float, shares: bool) -> None:
+    opening = top * np.abs(np.sin(3.0 * good()["t"]))
+    assert ("a gripper's opening" in drafted(tmp_path, "# q in rad\n" + text(good() | {"q_3": opening}))) is shares
+
+
+def test_one_joint_at_a_quarter_turn_is_chance_and_no_gear(tmp_path: Path) -> None:
+    degrees = {f"q_{j}": np.rad2deg(good()[f"q_{j}"]) + (7.5 * np.pi if j == 2 else 0.0) for j in (1, 2, 3)}
+    draft = drafted(tmp_path, text(good() | degrees))
+    assert 'columns = "q_{j}", unit = "FILL IN"' in draft
+    assert "# transmission = [100.0, 100.0, 100.0]" in draft
 
 
 def test_a_map_is_recognised(shared: Path) -> None:
@@ -163,7 +194,8 @@ def test_names_that_are_toml_are_quoted(tmp_path: Path) -> None:
     columns = good()
     odd = {"t": columns["t"], 'pos "1" \\ (rad)': columns["q_1"], "tau #1 (Nm)": columns["tau_1"]}
     draft = guess_recipe(write(tmp_path, text(odd).replace('pos "1"', "pos '1'")))
-    assert parse_recipe(draft.text).signals["q"].column
+    text_ = draft.text.replace('gravity = "FILL IN"', "gravity = [0.0, 0.0, -9.81]")
+    assert parse_recipe(text_).signals["q"].column
 
 
 def test_nanoseconds_since_1970_are_a_time(tmp_path: Path) -> None:

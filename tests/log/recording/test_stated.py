@@ -28,7 +28,8 @@ def test_a_name_alone_states_no_unit(tmp_path: Path) -> None:
 @pytest.mark.parametrize("line", [
     "# joint angles in degrees, joint torques in Nm", "# units: deg, Nm", "# q [deg], tau [Nm]", "% q in deg",
     "# Winkel in Grad; Momente in Nm", "# angles en degrés", "# positions are in degrees and torques in N m",
-    "# tool pose in mm and rad; joints in deg", "# mounted at 1.57 rad, joints in deg", "Units: degrees / Nm"])
+    "# tool pose in mm and rad; joints in deg", "# units deg deg/s Nm", "# 关节角度（度），力矩（牛米）",
+    "# mounted at 1.57 rad, joints in deg", "Units: degrees / Nm"])
 def test_a_line_that_states_degrees_is_believed(tmp_path: Path, line: str) -> None:
     draft = drafted(tmp_path, line + "\n")
     assert 'q = { columns = "q_{j}", unit = "deg" }' in draft
@@ -45,7 +46,8 @@ def test_a_line_that_states_no_unit_of_the_joints_leaves_it_open(tmp_path: Path,
 @pytest.mark.parametrize(("line", "rate"), [
     ("Sampling interval : 8 msec", 125.0), ("% fs = 2000 Hz", 2000.0), ("サンプリング周期,8ms", 125.0), ("fps = 30", 30.0),
     ("physics_dt = 0.005", 200.0), ("Abtastrate: 1 kHz", 1000.0), ("Sample Time;0,004;s", 250.0), ("sample_time_ms = 4", 250.0),
-    ("# low-pass filter 20 Hz, logged at 250 Hz", 250.0), ("SampleTime[ms]\t2\t2", 500.0)])
+    ("# low-pass filter 20 Hz, logged at 250 Hz", 250.0), ("SampleTime[ms]\t2\t2", 500.0),
+    ("p.setTimeStep(1./240.)", 240.0), ("dt = 1/50 s", 50.0)])
 def test_a_rate_is_read_from_its_line(line: str, rate: float) -> None:
     found = stated_rate([line])
     assert found is not None
@@ -177,3 +179,12 @@ def test_files_of_one_joint_each_are_pointed_out(tmp_path: Path) -> None:
     draft = drafted(tmp_path, "", columns, "drive_id1.csv")
     assert "one file a joint? beside this one are drive_id2.csv" in draft
     assert "robot.use" in guess_recipe(tmp_path / "drive_id1.csv").blanks
+
+
+def test_a_comment_above_labelled_lines_states_their_units(tmp_path: Path) -> None:
+    c = good()
+    rows = [f"t: {c['t'][k]:.3f} q: [{c['q_1'][k]:.6f}, {c['q_2'][k]:.6f}] tau: [{c['tau_1'][k]:.6f}, {c['tau_2'][k]:.6f}]"
+            for k in range(600)]
+    draft = guess_recipe(write(tmp_path, "\n".join(["# simulator, q in degrees, tau in Nm", *rows]) + "\n", "log.txt"))
+    assert 'unit = "deg"' in draft.text
+    assert draft.blanks == ("robot.use",)
