@@ -14,6 +14,7 @@ class DiagnosisConfig:
     """All deciding numbers of the diagnosis; `benchmarks.sensitivity` varies each by ½ and 2."""
 
     cutoff_hz: float | None = None  # zero-phase low-pass of all rows; None: as `recipe`
+    lowest_hz: float = 10.0  # of a low-pass that is found: blocks and whitening need rows enough
     highest_hz: float = 25.0  # of a low-pass that is found: above it quantised positions dominate
     alpha: float = 0.01  # family-wise error of screening, all candidates together
     set_alpha: float = 0.05  # of the model confidence set (Hansen, Lunde & Nason 2011)
@@ -41,7 +42,7 @@ class DiagnosisConfig:
         2.0  # mean square residual of a joint over the baseline's, from which it is too large
     )
     misfit: float = (
-        0.01  # share of a joint's torque that repeats, and no cause explains, which is a fault
+        0.01  # share of a joint's torque that repeats or wanders, and no cause explains: a fault
     )
 
     def recipe(
@@ -58,5 +59,6 @@ class DiagnosisConfig:
             decimation=decimation,
             min_speed=min_speed,
             orders=self.ripple_orders,
+            lowest_hz=self.lowest_hz,
             highest_hz=self.highest_hz,
         )

@@ -1,6 +1,6 @@
 """Rows of a session and of its reference, whitened and weighted, and their nominal model.
 
-dataset = load(prepare(logs, settings))
+dataset = load(prepare(logs, recipe))
 dataset.later.y, dataset.later.nominal        the rows that are diagnosed
 dataset.reference                             the rows of role "reference"
 """

@@ -248,10 +248,12 @@ def _confused(later: Later, end: State, config: DiagnosisConfig) -> str:
     """Return why torque that wanders may look like a cause; "" where it cannot.
 
     In closed loop the drive answers such a torque a moment later, and so do the motion and its
-    record (Ljung 1999, 13.4): only a load that comes again with the motion is told from it, and one
-    of a moment that is larger than it comes by chance.
+    record (Ljung 1999, 13.4): only a load is told from it that comes again with the motion, or is
+    larger, at its moment, than chance makes it.
     """
     slow = _wandering(later)
+    if slow.max() <= config.misfit:
+        return ""
     lasting = slow**2 * _torque_squared(later)  # variance of means over a block
     bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
     told = np.zeros(len(slow), dtype=np.bool_)
@@ -259,9 +261,9 @@ def _confused(later: Later, end: State, config: DiagnosisConfig) -> str:
         if one.log is not None:
             motion = later.rows.data.logs[one.log - later.rows.data.first].motion
             size = np.abs(one.effect.torque(motion, end.model.nominal, one.values)).max(axis=0)
-            chance = lasting * config.block / one.values["duration"]
-            told |= np.sum(size**2 / np.maximum(chance, 1e-300)) < bound
-        elif one.effect.acts_on not in ("load", "body"):
+            chance = 2.0 * lasting * config.block / one.values["duration"]  # of a half sine
+            told |= np.sum(size**2 / chance) < bound
+        elif one.effect.acts_on != "load":
             told |= (np.arange(len(slow)) + 1 == one.effect.joint) | (one.effect.joint is None)
     slow = slow * told
     return _wanders(slow) if slow.max() > config.misfit else ""

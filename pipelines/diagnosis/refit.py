@@ -1,7 +1,7 @@
 """Exact fits to the later rows: Levenberg-Marquardt under the prior; score of each block.
 
-later = Later.of(dataset, dictionary, prior)
-state = later.start(config)
+later = Later.of(dataset, dictionary, prior, config)
+state = later.start()
 state = later.fit(state.with_effect(...))
 """
 

@@ -185,7 +185,7 @@ class DetectionLimit:
     parameter: str  # whose value it is
     minimum: Value
     at: dict[str, Value] = field(default_factory=dict)  # non-linear numbers for which it is: order
-    way: Literal["injected", "analytic"] = "analytic"
+    way: Literal["injected", "analytic"] = "analytic"  # hidden in logs and found, or worked out
     identifiability: float = float("nan")  # part of its columns that the model cannot absorb
     or_less: bool = False  # the smaller the parameter, the larger the cause: of a saturation, say
 
@@ -367,7 +367,7 @@ class Extension:
     data_quality: tuple[Check, ...]
     model: ModelFile | None  # None where nothing was accepted
     laws_of: str = ""  # model file whose friction laws were taken; empty: Coulomb and viscous
-    fewer_terms: tuple[FewerTerms, ...] = ()
+    fewer_terms: tuple[FewerTerms, ...] = ()  # friction laws with more terms than the logs tell
     revolute: tuple[bool, ...] = ()  # which joints turn; the others slide
     derived: tuple[tuple[str, ExperimentLog], ...] = field(
         default=(), metadata=NOT_STORED, repr=False

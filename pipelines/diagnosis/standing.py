@@ -4,9 +4,9 @@
     standing.effects                       causes of the library, with their numbers
 
 The diagnosis itself has columns for all of it (`prior`). A model for simulation has causes instead:
-those that together predict the reference best, one after the other by the predictive score, as long
-as each pays on blocks of time, no shape without a name predicts better, a joint is left too much
-without it, and later logs do not go where the reference says nothing of it.
+the most significant ones, one after the other, as long as each pays on blocks of time, no shape
+without a name predicts better, a joint is left too much without it, and later logs do not go where
+the reference says nothing of it.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def _reference(later: Later, config: DiagnosisConfig) -> Later:
 
 
 def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Candidate | None:
-    """Return the cause that predicts best, None where none pays."""
+    """Return the first cause that is possible, None where it does not pay."""
     every = best_of(own.screened(state))
     best = _first(own, state, every, later, config)
     if best is None:

@@ -9,21 +9,23 @@ import numpy as np
 import pytest
 
 from benchmarks.other_plants.drawn import drawn
-from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.model.estimation.logs import motions_of, with_cutoff
+from pipelines.model.estimation.conditioning import wanted_cutoff
+from pipelines.model.estimation.logs import Recipe, motions_of, with_cutoff
 from pipelines.model.motion import Reconstruction
 from tests.diagnosis.arms import hidden
 from tests.diagnosis.asking import causes, diagnosed, effects
 
 
-def test_rows_hold_ripple_of_the_fastest_joint() -> None:
-    """24 periods a turn at ω rad/s are 24 ω / 2π Hz, where that is more than five times the motion's frequency."""
-    recipe = DiagnosisConfig(highest_hz=np.inf).recipe()
+@pytest.mark.parametrize(("orders", "lowest", "highest", "band"), [
+    (100, 0.0, np.inf, "ripple"), (100, 0.0, 25.0, "highest"), (0, 40.0, np.inf, "lowest"), (0, 0.0, np.inf, "motion")])
+def test_the_band_of_rows_is_that_of_motion_and_ripple(orders: int, lowest: float, highest: float, band: str) -> None:
+    """100 periods a turn at ω rad/s are 100 ω / 2π Hz."""
+    recipe = Recipe(orders=orders, lowest_hz=lowest, highest_hz=highest)
     motions = motions_of([hidden(1)], Reconstruction())
-    fastest = np.abs(motions[0][1].motion.dq).max()
-    found = with_cutoff(recipe, motions).cutoff_hz
-    assert found is not None
-    assert found >= 24.0 * fastest / (2.0 * np.pi) * 0.999
+    log, found = motions[0]
+    wanted = {"ripple": 100.0 * np.abs(found.motion.dq).max() / (2.0 * np.pi), "highest": 25.0, "lowest": 40.0,
+              "motion": wanted_cutoff(found.motion, 1.0 / log.sample_time)}
+    assert with_cutoff(recipe, motions).cutoff_hz == pytest.approx(wanted[band])
 
 
 @pytest.mark.slow

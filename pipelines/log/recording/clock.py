@@ -30,10 +30,10 @@ def counted_on(stamps: Array) -> tuple[Array, float]:
     """
     steps = np.diff(stamps)
     falls, rises = steps[steps < 0], steps[steps > 0]
-    if not falls.size or not rises.size or stamps.min() < 0.0:
+    if not falls.size or not rises.size or np.nanmin(stamps) < 0.0:
         return stamps, 0.0
     near = 3.0 * float(np.median(rises))
-    fits = [full for full in _FULL if stamps.max() < full and ((falls + full > 0.0) & (falls + full <= near)).all()]
+    fits = [full for full in _FULL if np.nanmax(stamps) < full and ((falls + full > 0.0) & (falls + full <= near)).all()]
     full = fits[0] if fits else 0.0
     return stamps + full * np.concatenate([[0.0], np.cumsum(steps < 0)]), full
 

@@ -247,7 +247,7 @@ class _Drafting:
         near = round_rate(1.005 * rate) if math.isfinite(rate) else math.nan
         guess = Guess(f"{near:g} Hz", "likely", "the recorded velocity is that often the step of the position from sample to "
                       "sample, if both are in one unit of angle")
-        return near if abs(rate / near - 1.0) < 5e-3 else math.nan, guess
+        return (near, guess) if abs(rate / near - 1.0) < 5e-3 else (math.nan, Guess("", "unsure", ""))
 
     def _one_unit_of_angle(self) -> bool:
         """Tell whether a velocity without a clock is in the positions' unit: both name it, or are called q and dq."""

@@ -39,7 +39,7 @@ _GENERIC = frozenset({
 })  # fmt: skip
 _UNIT_OF_NAME = re.compile(r"[a-z].*[\[(_ ](k?hz|[mµμu]?s)(?:[\])]|\b)(?=[^a-z]*$)")
 _GEARS = frozenset({
-    "gear", "gears", "gearbox", "gearing", "reduction", "reducer", "planetary", "harmonic", "ratio", "getriebe",
+    "gear", "gears", "gearbox", "gearing", "reduction", "reducer", "planetary", "harmonic", "getriebe",
     "untersetzung", "ubersetzung", "reducteur", "reductor", "riduttore", "riduzione", "reduccion", "减速比", "減速比",
 })  # fmt: skip
 _SAMPLED = re.compile(r"sampl|\bf_?s\b|\bt_?s\b|\bdt\b|_dt\b|\bfps\b|\brate\b|logg|record|acqui|scan|abtast|takt|zyklus|cycle|"
@@ -47,17 +47,20 @@ _SAMPLED = re.compile(r"sampl|\bf_?s\b|\bt_?s\b|\bdt\b|_dt\b|\bfps\b|\brate\b|lo
                       r"probkow|vzorkov|ornekleme|дискрет|采样|サンプリング|샘플링|interval|period|timestep|time step|"
                       r"step_?(?:size|time)|delta_x")  # fmt: skip
 _NOT_SAMPLED = re.compile(r"filter|cut.?off|low.?pass|pwm|bandwidth|excit|sine|chirp|resonan|control|servo|count\b|duration|start|"
-                          r"baud|regel|frequency of|trajectory|camera|buffer|update|inner|current loop")  # fmt: skip
+                          r"offset|length|fourier|\bfor\b|baud|regel|"
+                          r"frequency of|trajectory|camera|buffer|update|inner|current loop")  # fmt: skip
 _VOID = frozenset({
     "before", "but", "conversion", "convert", "converted", "display", "displayed", "either", "except", "from", "gui",
     "kein", "likely", "maybe", "multiply", "nicht", "no", "non", "not", "or", "originally", "pas", "plot", "plots", "print",
+    "home", "initial", "offset", "start", "zero",
     "printed", "probably", "raw", "show", "shown", "shows", "todo", "unknown", "was", "were",
 })  # fmt: skip
 _SI = re.compile(r"\bsi[ -](?:base )?(?:units?|einheiten|unites?)\b|\b(?:units?|einheiten|unites?|unidades|unita)\W+(?:\w+ )?si\b")
 _SI_UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "current": "A", "time": "s"}
 _LONGEST = 300  # characters of a line that is read
 _OF_EACH = frozenset({"per", "pro", "par", "por", "je", "a", "/", "1"})
-_STEPS = ("dt", "ts", "step", "time", "interval", "period")
+_STEPS = ("dt", "ts", "step", "interval", "period")
+_SLOWEST, _FASTEST = 1.0, 1e5  # [Hz] what robots are recorded at
 
 
 @dataclass(frozen=True)
@@ -158,7 +161,8 @@ def stated_rate(notes: Sequence[str]) -> Statement | None:
             continue
         named = _UNIT_OF_NAME.search(text)
         for number, unit in _QUANTITY.findall(text):
-            if rate := _rate_of(_number(number), unit or (named[1] if named else ""), text):
+            rate = _rate_of(_number(number), unit or (named[1] if named else ""), text)
+            if _SLOWEST <= rate <= _FASTEST:
                 found.setdefault(rate, clause)
     if not found:
         return None
@@ -177,7 +181,7 @@ def _rate_of(number: float, unit: str, text: str) -> float:
     interval = bool(set(re.findall(r"[a-z]+", text)) & set(_STEPS))
     if unit:
         known = UNITS.get(canonical_unit(unit))
-        return 1.0 / (number * known.factor) if known is not None else 0.0
+        return 1.0 / (number * known.factor) if known is not None and known.quantity == "time" else 0.0
     if interval:  # a step without a unit is in s, as programs write it
         return 1.0 / number if number < 1.0 else 0.0
     return number if re.search(r"rate|fps|\bf_?s\b|freq", text) and number >= 1.0 else 0.0

@@ -40,7 +40,8 @@ class Recipe:
     min_speed: tuple[float, ...] = (0.0,)
     known: Callable[[Motion], Array] | None = None  # torque (samples, joints) [N m] that is subtracted: of a given friction
     orders: int = 0  # [1/rev] of a torque that the cut-off lets through at the fastest speed, where it is found
-    highest_hz: float = np.inf  # of a cut-off that is found
+    lowest_hz: float = 0.0  # of a cut-off that is found
+    highest_hz: float = np.inf
     found: bool = False  # the cut-off, or that there is none, came of the fitted logs; one of a lower rate does without
 
 
@@ -113,13 +114,14 @@ def fit_logs(motions: Motions, columns: Columns, recipe: Recipe, weighted: bool 
 
 
 def with_cutoff(recipe: Recipe, motions: Motions) -> Recipe:
-    """`recipe` with the cut-off for these logs, where none is given: the highest that any of them asks for."""
+    """`recipe` with the cut-off for these logs, where none is given: the highest that any of them, or ripple, asks for."""
     if recipe.found or recipe.cutoff_hz is not None:
         return recipe
     rates = [1.0 / log.sample_time for log, _ in motions]
     asked = [wanted_cutoff(found.motion, rate) for (_, found), rate in zip(motions, rates, strict=True)]
     turning = [np.abs(found.motion.dq[:, list(log.robot.revolute)]).max(initial=0.0) for log, found in motions]
-    highest = min(max(*asked, recipe.orders * max(turning) / (2.0 * np.pi)), recipe.highest_hz)
+    ripple = recipe.orders * max(turning) / (2.0 * np.pi)
+    highest = min(max(*asked, ripple, recipe.lowest_hz), recipe.highest_hz)
     felt = any(cutoff_at(highest, rate) is not None for rate in rates)
     return replace(recipe, cutoff_hz=highest if felt else None, found=True)
 
