@@ -93,9 +93,10 @@ def robust_covariance(equations: Iterable[Block], solution: Solution, longest: i
     for transformed in (alone,) if alone is not None else (_transform(block, length) for block in equations):
         meat += _meat(transformed, solution.weights, noises[transformed.noise])
     covariance = solution.bread @ meat @ solution.bread
-    inflation = np.sqrt(np.diag(covariance) / np.where(plain > 0.0, plain, 1.0))
-    covariance[~solution.determined] = covariance[:, ~solution.determined] = np.inf
-    return Robust(covariance, False, np.where(solution.determined, inflation, 1.0), orders)
+    determined = solution.determined & (np.diag(covariance) >= 0.0)  # below 0 by rounding, of numbers next to undetermined
+    inflation = np.sqrt(np.maximum(np.diag(covariance), 0.0) / np.where(plain > 0.0, plain, 1.0))
+    covariance[~determined] = covariance[:, ~determined] = np.inf
+    return Robust(covariance, False, np.where(determined, inflation, 1.0), orders)
 
 
 @dataclass(frozen=True, eq=False)

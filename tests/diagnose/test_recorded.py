@@ -63,6 +63,7 @@ def test_a_rotor_of_seven_pole_pairs_cogs_seven_times_a_turn(shared: Path) -> No
     assert found.after_rms.validate[0] < 0.95 * found.residual_rms.validate[0]
 
 
+@pytest.mark.slow
 def test_a_joint_that_creeps_out_of_its_rest_was_not_touched(shared: Path) -> None:
     """Friction of joint 3 remembers how long it stood: a force at the tip would move the other joints in proportion."""
     logs = [read_parts(path)[0] for path in sorted((shared / "real" / "kr300" / "logs").glob("*.h5"))]

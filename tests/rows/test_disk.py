@@ -83,7 +83,7 @@ class Writer:
 
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(test_every_stage, "_stage", lambda _: replace(stage, compute=remember))
-            _, outcome = test_every_stage._run(module, tmp_path, samples, no_report=True)
+            _, outcome = test_every_stage._run(module, tmp_path, samples)
         self.known, self.out = known, outcome.folder
         self.stage: Stage[Any, Any] = replace(stage, read=lambda request, settings: known["inputs"])
         assert self.write(lambda: failing("fsync", 0, -1))[0] is None
