@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 from pipelines.errors import InputRejected, did_you_mean
@@ -83,6 +82,9 @@ _WORDS: Final = ((r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"), (r"\bmilli[
                  (r"\boz(?=[ -])", "ozf"), (r"(?<=f)-", " "), (r"^([mcuk]?)n[ .-]?m$", r"\1N m"))  # fmt: skip
 
 
+_NO_WORDS: Final = re.compile(r"[013-9]|^.?$")  # of a unit; "s2" has a digit
+
+
 def _turned(name: str) -> str:
     """Return "lbf ft" of "ft-lb": people write the arm on either side."""
     arm, force = re.split("[ -]", name)
@@ -92,10 +94,9 @@ def _turned(name: str) -> str:
 def canonical_unit(unit: str) -> str:
     """`unit` as `UNITS` spells it: "Nm" and "N·m" are "N m"."""
     name = " ".join(str(unit).translate(_SPELLINGS).split())
-    return _ALIASES.get(name) or (name if name in UNITS else _in_words(name))
+    return _ALIASES.get(name) or (name if name in UNITS or _NO_WORDS.search(name) else _in_words(name))
 
 
-@lru_cache(maxsize=1024)
 def _in_words(name: str) -> str:
     """Return the unit of "degrees per second", "Newton metres" or "DEG/SEC"; any other name as it is."""
     plain = name.lower()
