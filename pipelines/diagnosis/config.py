@@ -22,6 +22,8 @@ class DiagnosisConfig:
     blocks_together: int = 3  # length of the moving blocks of the bootstrap, in blocks
     resamples: int = 400  # of the bootstrap
     friction_drift: float = 0.3  # relative std of friction between sessions
+    healthy: float = 0.001  # share of a joint's torque in which a healthy machine differs from any
+    # model: every drive ripples by a thousandth
     relevance: float = 0.02  # share of a cause's effect to which no law is exact
     variance_prior: float = 2.0  # pseudo-observations by which a variance is shrunk to its family's
     em_rounds: int = 8  # of the variance components; more change them by less than a tenth

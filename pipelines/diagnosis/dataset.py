@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import pairwise
 from typing import Any
 
@@ -124,18 +124,27 @@ class Rows:
         return self.signal(model.torque(self.data))
 
     def mixed(self, model: Exact) -> Table | None:
-        """Return the nominal columns as drives pass them on; None if no drive mixes or scales."""
+        """Return the slopes by the nominal numbers beside the effects; None: they are `nominal`.
+
+        A drive may mix or scale what it passes on, and what drifts is a share of the friction at
+        its joint.
+        """
         every = [mixing(one.effect, one.values, self.n_joints) for one in model.effects]
         found = [one for one in every if one is not None]
-        if not found:
+        shares = [one for one in model.effects if one.drifts]
+        if not found and not shares:
             return None
         columns, kept = model.columns, list(model.columns.kept)
-        matrix = np.linalg.multi_dot([*reversed(found), np.eye(self.n_joints)])
+        matrix = reduce(np.matmul, reversed(found), np.eye(self.n_joints))
 
         def linear(motion: Motion) -> Array:
             rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
             laws = [law.columns(motion, columns.arm) for law in columns.laws]
-            return np.asarray(matrix @ np.concatenate([rigid, *laws], axis=2))
+            table = np.concatenate([rigid, *laws], axis=2)
+            for one in shares:
+                for number in model.friction_at(one.effect.joint):
+                    table[:, :, number] += model.slope_of(one, number, motion)
+            return np.asarray(matrix @ table)
 
         return self.table(self.data.lay(linear))
 

@@ -81,8 +81,8 @@ class _Shape:
 def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
     """Return the limits beside the model that was found."""
     shapes: dict[Key, list[_Shape]] = {}
-    norms = np.r_[later.base.norms, state.effects.norms]
-    cross = np.concatenate([later.cross, state.effects.gram(later.candidates)])
+    norms = np.r_[state.known.base.norms, state.effects.norms]
+    cross = later.beside(state)
     solved = state.factor.solve(cross)
     for group, square in zip(later.dictionary.groups, later.squares, strict=True):
         at, family = group.columns, later.dictionary.families.get(group.key)

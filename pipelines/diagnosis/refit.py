@@ -39,6 +39,7 @@ class State:
     model: Exact
     theta: Array  # nominal and standing numbers, scaled
     belief: Belief  # before the rows
+    known: Belief  # the same beside the effects, where slopes by nominal numbers are other ones
     residual: tuple[Array, ...]  # of each joint, in units of the noise
     effects: Table  # slopes by the numbers of the effects, of unit length
     lasting: (
@@ -60,20 +61,21 @@ class State:
         """(blocks,) squared error of each block, predicted from all the others.
 
         The numbers of an event cannot be predicted from other times: they are taken as known, and
-        the selection charges them.
+        the selection charges them. Slopes by nominal numbers are those without effects, whose
+        blocks are known: effects change them by the share that they add.
         """
         return self.belief.losses(self.effects.take(self.lasting), self.residual)
 
     @property
     def slope(self) -> Array:
         """(k,) of -cost / 2 by all numbers."""
-        own = self.belief.slope(self.theta, self.residual)
+        own = self.known.slope(self.theta, self.residual)
         return np.asarray(np.r_[own, self.effects.moments(self.residual)])
 
     @cached_property
     def factor(self) -> Arrow:
         """The factor of the information P of all numbers, with the rows."""
-        return self.belief.beside(self.effects)
+        return self.known.beside(self.effects)
 
     @property
     def mean_squares(self) -> Array:
@@ -179,17 +181,24 @@ class Later:
         lasting = np.flatnonzero(
             [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
         )
-        return State(model, theta, belief, residual, effects, lasting, self._read_off(model))
+        known, price_paid = self._exact(belief, model), self._read_off(model)
+        return State(model, theta, belief, known, residual, effects, lasting, price_paid)
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
-        cross = np.concatenate([self.cross, state.effects.gram(self.candidates)])
+        cross = self.beside(state)
         left = state.factor.solve(state.slope)  # zero where the fit has settled
         moments = self.candidates.moments(state.residual) - cross.T @ left
         found = screen(self.dictionary.groups, state.factor, cross, self.squares, moments)
         if self.dataset.reference is not None:  # else base parameters are free anyway
             found = [self._freely(state, one) for one in found]
         return [self._charged(one) if one.group.reads_torque else one for one in found]
+
+    def beside(self, state: State) -> Array:
+        """Return the products of the slopes by all numbers of a state with the candidates."""
+        base = state.known.base
+        nominal = self.cross if base is self.base else base.gram(self.candidates)
+        return np.concatenate([nominal, state.effects.gram(self.candidates)])
 
     def _freely(self, state: State, one: Screened) -> Screened:
         """Return the candidate beside base parameters that it moves by unknown numbers, free."""
@@ -354,9 +363,9 @@ class Later:
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""
         more = Table.stacked([state.effects, columns.scaled(1.0 / _unit(columns.norms))])
-        slope = state.belief.slope(state.theta, state.residual)
-        step = state.belief.beside(more).solve(np.r_[slope, more.moments(state.residual)])
-        torque = Table.stacked([self.base, more]).times(step)
+        slope = state.known.slope(state.theta, state.residual)
+        step = state.known.beside(more).solve(np.r_[slope, more.moments(state.residual)])
+        torque = Table.stacked([state.known.base, more]).times(step)
         residual = tuple(r - t for r, t in zip(state.residual, torque, strict=True))
         lasting = np.append(state.lasting, np.arange(state.effects.width, more.width))
         return replace(

@@ -148,8 +148,7 @@ def _round(
     tried = [
         one
         for one in _refitted(later, state, promising, responses, touch, config)
-        if _loss(later, one.state) < _loss(later, state)
-        and not (one.event and one.gain < config.relevance * explained)
+        if not (one.event and one.gain < config.relevance * explained)
     ]
     others = _unnamed(later, state, significant, bool(responses))
     seen = Round(
@@ -184,11 +183,15 @@ def _significant(
 
     No law is exact: at the joints of the causes found so far, and of what stands since the
     reference, what remains of these is larger than the noise, and a further cause has to gain more
-    than a share of what they explain there.
+    than a share of what they explain there. Without reference logs a healthy machine differs from
+    any model by a share of its torque as well.
     """
     rows = later.rows.count
     known = later.shares @ (explained * later.acting(state) + later.standing)
-    inexact = dict(zip(later.dictionary.groups, config.relevance * known, strict=True))
+    least = config.relevance * known
+    if later.dataset.reference is None:
+        least += config.healthy**2 * later.shares @ np.array([float(y @ y) for y in later.rows.y])
+    inexact = dict(zip(later.dictionary.groups, least, strict=True))
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
@@ -239,11 +242,18 @@ def _nearly(
     others: Mapping[Key, State],
     config: DiagnosisConfig,
 ) -> list[Candidate]:
-    """Return the cause that explains as much as any unnamed shape, as far as laws are exact."""
-    best = min(tried, key=lambda one: _loss(later, one.state))
-    free = min(_loss(later, other) for other in others.values())
-    missing = _loss(later, best.state) - free
-    return [best] if missing < config.relevance * (_loss(later, state) - free) else []
+    """Return the cause that explains as much as any unnamed shape, as far as laws are exact.
+
+    What a model explains is the cost that it saves, less ln(rows) for each number (Schwarz 1978).
+    """
+    number = np.log(later.rows.count)
+    saved = [state.cost - one.state.cost - one.numbers * number for one in tried]
+    best = int(np.argmax(saved))
+    free = max(
+        state.cost - one.cost - (one.effects.width - state.effects.width) * number
+        for one in others.values()
+    )
+    return [tried[best]] if free - saved[best] < config.relevance * free else []
 
 
 def _promising(
@@ -401,18 +411,16 @@ def _other_form(
         other = _candidate(
             later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes), config
         )
-        if (
-            other is not None
-            and other.possible
-            and _loss(later, other.state) < _loss(later, best.state)
-        ):
+        if other is None or not other.possible:
+            continue
+        if _total(later, other) < _total(later, best):
             best = other
     return best
 
 
-def _loss(later: Later, state: State) -> float:
-    """Return the squared predictive error and what the prior says against the numbers."""
-    return float(state.losses.sum()) + state.cost - state.rss
+def _total(later: Later, one: Candidate) -> float:
+    """Return the predictive score of all blocks."""
+    return float(_scores(later, one.state, one.numbers).sum())
 
 
 def _backward(

@@ -194,10 +194,10 @@ class Trained:
             return np.asarray(self.judge.y - done.model.torque(self.judge))
         first, size = len(done.model.beta), self._sizes(state)
         lasting = np.r_[np.arange(first), first + state.lasting]
-        columns = Table.stacked([self.later.base, state.effects]).take(lasting)
+        columns = Table.stacked([state.known.base, state.effects]).take(lasting)
         own = _fitted(self.later, state, done.names)
         slopes = (done.slopes[own] / size[:, None])[lasting]
-        info = state.belief.information(state.effects)[np.ix_(lasting, lasting)]
+        info = state.known.information(state.effects)[np.ix_(lasting, lasting)]
         block, left = done.data.blocks(self.blocks), done.left.copy()
         parts = [block[done.data.joint == j] for j in range(done.data.n_joints)]
         for b in range(int(block.max()) + 1):
@@ -297,7 +297,7 @@ def covariance(later: Later, state: State) -> Array:
     """
     slopes, _ = later.slopes(state)
     size = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
-    columns = Table.stacked([later.base, state.effects])
+    columns = Table.stacked([state.known.base, state.effects])
     white = state.factor.solve(np.eye(columns.width))
     count = len(later.block_rows)
     scores = np.zeros((columns.width, count))

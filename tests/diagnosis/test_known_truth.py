@@ -22,6 +22,7 @@ from tests.diagnosis.asking import answered, causes, diagnosed, effects
 from tests.diagnosis.rotor import turned
 from tests.faulty import dropped
 from tests.healthy import with_signal
+from tests.model.estimation.experiments import VISCOUS
 
 Load = Callable[[Motion], Array]  # torque (samples, joints) [N m] that a motion costs beside
 
@@ -44,6 +45,22 @@ def test_cogging_is_found_at_its_joint_with_its_numbers() -> None:
     assert values["amplitude"] == pytest.approx(0.1, rel=0.03)
     assert values["phase"] == pytest.approx(0.6, abs=0.05)
     assert (found.after_rms.identify < np.array([0.012, 0.006, 0.004])).all()
+
+
+def warming(motion: Motion) -> Array:
+    """Joint 2 has 6 N m s/rad of viscous friction more, and loses seven tenths of all it has, with a time constant of 2 s."""
+    out, more = np.zeros_like(motion.q), 6.0
+    out[:, 1] = (more + 0.7 * (VISCOUS[1] + more) * np.expm1(-motion.t / 2.0)) * motion.dq[:, 1]
+    return out
+
+
+def test_a_joint_that_loses_most_of_its_viscous_friction_tells_how_much_and_how_fast() -> None:
+    """Both numbers and the friction itself are unknown, and their product acts."""
+    found = diagnosed(*logs(warming), exclude=but("viscous_drift", "quadratic_drag", "load_friction"))
+    assert causes(found) == [("viscous_drift", 2)]
+    (drift,) = effects(found)
+    assert drift.values["relative_change"] == pytest.approx(-0.7, abs=0.02)
+    assert drift.values["time_constant"] == pytest.approx(2.0, rel=0.05)
 
 
 def both(motion: Motion) -> Array:

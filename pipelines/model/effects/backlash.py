@@ -20,7 +20,7 @@ __all__ = ["Backlash"]
 
 _FLANK_HZ = 80.0  # of the link on a closed flank, the motor locked: stiff beside what an arm is moved at
 _LINK = 0.1  # of the inertia that the joint feels: what stays with the link at least
-_TIGHT = 1e-5  # [rad] what no gear is tighter than
+_TIGHT = 1.5e-4  # [rad] half an arc minute: what precise gears have, by the data sheets of strain wave and cycloidal ones
 _NOTHING = 1e-6  # [N m] that leave the link in the middle of the gap at first
 _THICKEST = 1e6  # [N m s/rad], or [N s/m]
 # More shapes than these share the slopes of the rigid torque, which cost less then and miss a thousandth of a gap of 6.6 mrad.
@@ -63,7 +63,7 @@ class Backlash(Fast):
         return self.several([self], motion, arm)[0]
 
     def possible(self, values: Values) -> bool:
-        """A gap of nothing is none."""
+        """A gap that precise gears have is no fault."""
         return super().possible(values) and values["gap"] > _TIGHT
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:

@@ -76,6 +76,11 @@ class Named:
         return len(self.free_shapes) + (len(self.amplitudes) if self.free_amplitudes else 0)
 
     @property
+    def drifts(self) -> bool:
+        """Return whether it drifts in the session: its torque is a share of the friction at its joint."""
+        return self.effect.clock == "session"
+
+    @property
     def possible(self) -> bool:
         """Return whether every number lies in its range, amplitudes of derived sign apart."""
         return self.effect.possible(self.values)
@@ -196,6 +201,18 @@ class Exact:
         rows = several_rows(data, [one.effect.at(one.values) for one in several], self.nominal)
         return [np.asarray(one.effect.amplitudes(one.values) @ self._of_log(data, one, own))
                 for one, own in zip(several, rows, strict=True)]
+
+    def friction_at(self, joint: int | None) -> list[int]:
+        """Which numbers of `beta` are amplitudes of friction laws of a joint."""
+        owners = [law.joint for law in self.columns.laws for q in law.parameters if not q.shape]
+        return [len(self.columns.kept) + k for k, owner in enumerate(owners) if owner == joint]
+
+    def slope_of(self, one: Named, number: int, motion: Motion) -> Array:
+        """(samples, joints) slope of the torque of an effect by number `number` of `beta`."""
+        moved = self.beta.copy()
+        moved[number] += _DIFFERENCE
+        there, here = (one.effect.torque(motion, arm, one.values) for arm in (replace(self, beta=moved).nominal, self.nominal))
+        return np.asarray((there - here) / _DIFFERENCE)
 
     def columns_of(self, data: Data, one: Named) -> Array:
         """(k, rows) the same of each of its amplitudes."""
