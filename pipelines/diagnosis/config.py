@@ -26,7 +26,6 @@ class DiagnosisConfig:
     # model: every drive ripples by a thousandth
     relevance: float = 0.02  # share of a cause's effect to which no law is exact
     variance_prior: float = 2.0  # pseudo-observations by which a variance is shrunk to its family's
-    em_rounds: int = 8  # of the variance components; more change them by less than a tenth
     refits: int = 4  # candidates that are refitted exactly in a round
     promising: float = 0.3  # of the best screening gain, from which a candidate is refitted
     causes: int = 4  # most causes in one session
