@@ -28,8 +28,8 @@ __all__ = ["Components", "components", "settle"]
 
 _FLAT = 1e-10  # numerics: of a column's information
 _ROUNDS = 2  # numerics: of generalised least squares; a third changes the noise by a fiftieth
-_MAXIMISED = 8  # numerics: rounds of it; more change the variances by less than a tenth
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
+_MAXIMISED = 8  # numerics: rounds of it; more change the variances by less than a tenth
 
 
 @dataclass(frozen=True, eq=False)
