@@ -13,7 +13,19 @@ import pandas as pd
 from scipy.io import savemat
 
 from benchmarks.import_layouts import (
-    UNITS, Answer, Signal, anywhere, current, layout, recorded, si, stamps, state, table, values, wide,
+    UNITS,
+    Answer,
+    Signal,
+    anywhere,
+    current,
+    layout,
+    recorded,
+    si,
+    stamps,
+    state,
+    table,
+    values,
+    wide,
 )  # fmt: skip
 from benchmarks.recorded_arm import FOUR, IIWA, LEG, SEVEN, SIX, THREE, TWO, UR, Arm, Run
 

@@ -146,6 +146,9 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
         if not problem and slope is not None and (found := _by_velocity(slope, speed)) and (
                 UNITS[found.value] != UNITS[named]):
             problem = f"but {found.why}"
+        unit, proved = best_unit(fits or {})
+        if not problem and proved and unit in _TURNING and UNITS[unit] != UNITS[named]:
+            problem = f"but the torque follows from the motion by the robot's links if it is in {unit}"
         if problem:
             return Guess("", "unsure", f"its name or header says '{named}', {problem}: another unit, or the motor's side?"), further
         return Guess(named, "sure" if named != "rad" or span <= _WIDEST else "unsure",

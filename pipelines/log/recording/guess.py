@@ -402,10 +402,9 @@ class _Drafting:
         if words and not (signal == "tau" and confirmed):
             return f"what does '{clean(min(words), 40)}' say of it?"
         named = any(self._named(group, self.reading.torque_table))
-        best = min(self.fits.values(), key=lambda fit: fit.left, default=None)
-        if exchanged := next((fit.exchanged for fit in (links, best) if fit is not None and fit.exchanged is not None), None):
-            first, second = exchanged[0] + 1, exchanged[1] + 1
-            return f"the robot's own links agree far better with joints {first} and {second} exchanged: in which order are they?"
+        best = self.fits.get(_NAMED) or min(self.fits.values(), key=lambda fit: fit.left, default=None)
+        if otherwise := next((fit.otherwise for fit in (links, best) if fit is not None and fit.otherwise), ""):
+            return f"the robot's own links agree far better with {otherwise}"
         if links is not None and not links.followed and (signal == "q" or not named):
             return ("torque and motion do not agree by the robot's own links: "
                     "other torques, or the order, unit or zero of the joints?")
@@ -473,9 +472,10 @@ class _Drafting:
             return {}
         named = self._position_units(group)[0]
         units = {unit: [unit] * self.n for unit in _ANGLES}
-        units = {_NAMED: named} if any(self._named(group, self.reading.table)) else units
-        if not {unit for each in units.values() for unit in each} <= UNITS.keys():
-            return {}
+        if any(self._named(group, self.reading.table)):
+            if not set(named) <= UNITS.keys():
+                return {}
+            units |= {_NAMED: named}
         factors = {key: np.array([UNITS[unit].factor for unit in each]) for key, each in units.items()}
         return fits_by_unit(partial(self.model, robot), q, self.tau, t, factors)
 
