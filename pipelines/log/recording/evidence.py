@@ -143,12 +143,7 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
         return _counts(q, span, wrap, named, counts)
     if named in _TURNING:
         problem = "" if side == "motor" else _beyond(q, joints, named)
-        if not problem and slope is not None and (found := _by_velocity(slope, speed)) and (
-                UNITS[found.value] != UNITS[named]):
-            problem = f"but {found.why}"
-        unit, proved = best_unit(fits or {})
-        if not problem and proved and unit in _TURNING and UNITS[unit] != UNITS[named]:
-            problem = f"but the torque follows from the motion by the robot's links if it is in {unit}"
+        problem = problem or _denied(named, slope, speed, fits or {})
         if problem:
             return Guess("", "unsure", f"its name or header says '{named}', {problem}: another unit, or the motor's side?"), further
         return Guess(named, "sure" if named != "rad" or span <= _WIDEST else "unsure",
@@ -172,6 +167,16 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
         return Guess("", "unsure", f"it starts at {', '.join(map(str, turns.values()))} times pi/2: by chance, or radians of the "
                      "motor side, and these are the gear ratios?"), further
     return _by_limits(q, joints, message if unit in ("", "rad") else "") or _by_size(far, message), further
+
+
+def _denied(named: str, slope: Slope | None, speed: str | None, fits: Mapping[str, LinkFit]) -> str:
+    """Say what speaks against a unit that is named: a recorded velocity, or the torque; "" where nothing does."""
+    if slope is not None and (found := _by_velocity(slope, speed)) is not None and UNITS[found.value] != UNITS[named]:
+        return f"but {found.why}"
+    unit, proved = best_unit(fits)
+    if proved and unit in _TURNING and UNITS[unit] != UNITS[named]:
+        return f"but the torque follows from the motion by the robot's links if it is in {unit}"
+    return ""
 
 
 def unknown_unit(named: str) -> Guess:
