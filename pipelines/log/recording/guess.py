@@ -26,7 +26,7 @@ from pipelines.log.recording.reading import arm_beside, companion_for, read_reco
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.recording.sound import lost_numbers, sound_samples
 from pipelines.log.recording.sources import read_table
-from pipelines.log.recording.stated import stated_gear, stated_scale
+from pipelines.log.recording.stated import stated_gear, stated_of_some_joints, stated_scale
 from pipelines.log.units import UNITS
 
 __all__ = ["Draft", "guess_recipe"]
@@ -110,7 +110,7 @@ class _Drafting:
         lines += [f"# {clean(check.message, 200)}." for check in table.checks if check.level != "ok"]
         lines += [f"# Go through every \"check:\" and fill in what says {BLANK}; then: rrrid import RECIPE.toml --source FOLDER",
                   ""]
-        lines += [*self._robot(), *self._log(), *self._time(), "[signals]", *self._position(), *self._velocity(),
+        lines += [*self._robot(), *self._log(), *self._time(), "[signals]", *self._remarks(), *self._position(), *self._velocity(),
                   *self._torque(), "", *self._drive(), *self._missing(), *self._resample()]
         return Draft("\n".join(lines) + "\n", tuple(self.evidence), tuple(self.blanks))
 
@@ -195,6 +195,12 @@ class _Drafting:
         return [f"# check: likely a map and no log, {name} goes on in even steps of {np.mean(steps):.4g};",
                 "#     then delete [log], [time] and [signals], and write",
                 f"#     [[table]] match = {file}, columns = {{ position = {{ column = …, unit = … }}, … }}"]
+
+    def _remarks(self) -> list[str]:
+        """Return comments with the sentences of the file about some joints alone: a zero, a sign, a coupling."""
+        said = [clean(line, 200) for line in stated_of_some_joints(self.reading.table.notes, self.found.n)[:3]]
+        self.evidence += [f"joints: the file says '{line}'" for line in said]
+        return [f"# check: the file says '{line}': do the numbers below need it?" for line in said]
 
     def _position(self) -> list[str]:
         choice = self.reading.q
