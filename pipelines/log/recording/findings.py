@@ -177,11 +177,14 @@ class Findings:
             return {}
         named = self.position_units(group)[0]
         units = {unit: [unit] * self.n for unit in _ANGLES}
+        sizes = {unit: known.factor for unit, known in UNITS.items()}
+        if self._counts_of_turn > 0.0:
+            sizes["counts"] = 2.0 * math.pi / self._counts_of_turn
         if any(self.named(group, self.reading.table)):
-            if not set(named) <= UNITS.keys():
+            if not set(named) <= sizes.keys():
                 return {}
             units |= {_NAMED: named}
-        factors = {key: np.array([UNITS[unit].factor for unit in each]) for key, each in units.items()}
+        factors = {key: np.array([sizes[unit] for unit in each]) for key, each in units.items()}
         return fits_by_unit(partial(self.model, robot), q, self.tau, t, factors)
 
     def _links(self) -> LinkFit | None:

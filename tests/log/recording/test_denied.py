@@ -41,6 +41,15 @@ def test_degrees_that_are_degrees_stay(tmp_path: Path) -> None:
     assert 'unit = "deg" }\n    # sure, named so' in draft
 
 
+@pytest.mark.parametrize(("gear", "unit"), [(1.0, "counts"), (80.0, "FILL IN")])
+def test_counts_of_a_motor_are_not_taken_for_the_joints(tmp_path: Path, gear: float, unit: str) -> None:
+    """So many counts make a turn as the file states: of the motor, where the joint would leave its limits by far."""
+    head = "# encoder: 65536 counts/rev\n"
+    draft = _draft(tmp_path, lambda run: _block("q# [counts]", np.round(run.q * gear * 65536 / 2 / np.pi)) | _block(NM, run.tau),
+                   head=head)
+    assert f'q = {{ columns = "q{{j}}", unit = "{unit}", counts_per_rev = 65536 }}' in draft
+
+
 @pytest.mark.parametrize("side", ["joint", "drive"])
 @pytest.mark.parametrize(("arm", "joint"), [(SIX, 3), (TWO, 2)])
 def test_an_angle_that_is_counted_from_another_link_is_asked_about(tmp_path: Path, arm: Arm, joint: int, side: str) -> None:
