@@ -224,9 +224,12 @@ def clock_as_stated(
     clock: Clock, q: Array | None, slope: Slope | None, notes: Sequence[str], stated: Statement | None
 ) -> tuple[str, Guess]:
     """Return the unit of a clock as `unit_of_clock` does, with what the file states of it and of the rate."""
-    if not clock.paired and not clock.units[0] and (said := stated_unit(notes, "time")) and said.value:
+    said = stated_unit(notes, "time") if not clock.paired and not clock.units[0] else None
+    if said is not None and said.value:
         clock = replace(clock, units=(said.value,))
     unit, guess = unit_of_clock(clock, q, slope)
+    if said is not None and said.value and guess.confidence == "sure":
+        guess = replace(guess, confidence="likely", why=guess.why.replace("named so", f"the file states {said.words}"))
     if not clock.units[0] and (ticks := stated_scale(notes, "time")):
         return "", Guess("", "unsure", f"the file states '{ticks[0].words}'")
     if stated is None or clock.paired or guess.confidence == "sure" or unit == "sample":

@@ -15,7 +15,7 @@ from pipelines.log.units import UNITS, canonical_unit
 __all__ = ["MISSING", "WITH_UNIT", "Dialect", "TextFormat", "cells_of", "decode", "find_dialect", "holds_number", "is_number",
            "lines_of"]
 
-MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "-nan", "-NaN", "-",
+MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "missing", "-nan", "-NaN", "-",
                      "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"})
 _NUMBER = re.compile(r"[+-]?(\d++\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|Inf|INF|infinity|Infinity)")
 WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")

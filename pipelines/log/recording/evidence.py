@@ -140,12 +140,10 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
     wrap = rollover(q)
     further = f", wrap = {wrap:g}" if wrap is not None else ""
     if named == "counts" or (named is None and span > 2000.0 and _whole(q)):
-        return _counts(q, span, wrap, named, counts)
+        return _counts(q, wrap, named, counts, () if side == "motor" else joints)
     if named in _TURNING:
-        problem = "" if side == "motor" else _beyond(q, joints, named)
-        if not problem and slope is not None and (found := _by_velocity(slope, speed)) and (
-                UNITS[found.value] != UNITS[named]):
-            problem = f"but {found.why}"
+        problem = "" if side == "motor" else _beyond(q, joints, _TURNING[named])
+        problem = problem or _denied(named, slope, speed, fits or {})
         if problem:
             return Guess("", "unsure", f"its name or header says '{named}', {problem}: another unit, or the motor's side?"), further
         return Guess(named, "sure" if named != "rad" or span <= _WIDEST else "unsure",
@@ -155,7 +153,7 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
     if wrap in (360.0, 2.0 * math.pi):
         return Guess("deg" if wrap == 360.0 else "rad", "likely", f"it starts again after {wrap:.4g}, one turn"), further
     if slope is not None and (found := _by_velocity(slope, speed)) is not None and not (
-            side != "motor" and _beyond(q, joints, found.value)):
+            side != "motor" and _beyond(q, joints, _TURNING[found.value])):
         return found, further
     if _whole(q) and span > 10.0:
         return Guess("", "unsure", f"whole numbers over a range of {span:.5g}: counts, or whole degrees?"), further
@@ -171,6 +169,16 @@ def position_unit(q: Array, slope: Slope | None, named: str | None, joints: Sequ
     return _by_limits(q, joints, message if unit in ("", "rad") else "") or _by_size(far, message), further
 
 
+def _denied(named: str, slope: Slope | None, speed: str | None, fits: Mapping[str, LinkFit]) -> str:
+    """Say what speaks against a unit that is named: a recorded velocity, or the torque; "" where nothing does."""
+    if slope is not None and (found := _by_velocity(slope, speed)) is not None and UNITS[found.value] != UNITS[named]:
+        return f"but {found.why}"
+    unit, proved = best_unit(fits)
+    if proved and unit in _TURNING and UNITS[unit] != UNITS[named]:
+        return f"but the torque follows from the motion by the robot's links if it is in {unit}"
+    return ""
+
+
 def unknown_unit(named: str) -> Guess:
     """An open unit: what the file says is no unit of the signal."""
     return Guess("", "unsure", f"its name or header says '{named}', which is no unit that import knows here")
@@ -183,10 +191,10 @@ def _inside(q: Array, joint: Joint) -> bool:
     return bool(q.min() >= low - slack and q.max() <= high + slack)
 
 
-def _beyond(q: Array, joints: Sequence[Joint], unit: str) -> str:
+def _beyond(q: Array, joints: Sequence[Joint], factor: float) -> str:
     """Say that a joint would move over more than twice its range, as no joint does; "" where none would."""
     for values, joint in zip(q.T, joints, strict=False):
-        span, room = float(np.ptp(values)) * _TURNING[unit], joint.position[1] - joint.position[0]
+        span, room = float(np.ptp(values)) * factor, joint.position[1] - joint.position[0]
         if math.isfinite(room) and span > 2.0 * room:
             return f"but joint '{joint.name}' would move over {span:.4g} rad where its limits leave {room:.4g}"
     return ""
@@ -258,25 +266,31 @@ def held(tau: Array, q: Array) -> Guess:
                  "the drive was commanded, to be held until the next sample")
 
 
-def _counts(q: Array, span: float, wrap: float | None, named: str | None, stated: float) -> tuple[Guess, str]:
-    why = "named so" if named else f"whole numbers over a range of {span:.5g}"
-    if stated == 0.0:
-        return Guess("counts", "likely", f"{why}; the file states several numbers for a turn"), f', counts_per_rev = "{BLANK}"'
-    if math.isfinite(stated):
-        again = f", wrap = {stated:g}" if wrap is not None and abs(wrap / stated - 1.0) < 0.1 else ""
-        guess = Guess("counts", "likely", f"{why}; so many make a turn as the file states")
-        return guess, f", counts_per_rev = {stated:.10g}{again}"
-    if wrap is not None:
-        return (Guess("counts", "sure" if named else "likely", f"{why}; it starts again after {wrap:g}, taken for a revolution"),
-                f", counts_per_rev = {wrap:g}, wrap = {wrap:g}")
+def _counts(q: Array, wrap: float | None, named: str | None, stated: float, joints: Sequence[Joint]) -> tuple[Guess, str]:
+    """Return the unit of counts and how many make a turn: as stated, as they start again, or over which they range."""
+    span = float(np.ptp(q, axis=0).max())
     near = min(_RESOLUTIONS, key=lambda r: abs(span - r))
-    if abs(span / near - 1.0) < _ONE_TURN:
-        return (Guess("counts", "likely", f"{why}; the range of {span:.5g} is likely one revolution of {near}; "
-                      "add wrap where the counter starts again"), f", counts_per_rev = {near}")
-    if named is None:
+    why, turn, again = "named so" if named else f"whole numbers over a range of {span:.5g}", math.nan, None
+    if stated == 0.0:
+        why += "; the file states several numbers for a turn"
+    elif math.isfinite(stated):
+        turn, again = stated, stated if wrap is not None and abs(wrap / stated - 1.0) < 0.1 else None
+        why += "; so many make a turn as the file states"
+    elif wrap is not None:
+        turn = again = wrap
+        why += f"; it starts again after {wrap:g}, taken for a revolution"
+    elif abs(span / near - 1.0) < _ONE_TURN:
+        turn = near
+        why += f"; the range of {span:.5g} is likely one revolution of {near}; add wrap where the counter starts again"
+    elif named is None:
         return Guess("", "unsure", f"{why}: counts (then add counts_per_rev), or thousandths of a degree?"), ""
-    return (Guess("counts", "likely", f"{why}; the counts of a revolution are in the encoder's data sheet"),
-            f', counts_per_rev = "{BLANK}"')
+    else:
+        why += "; the counts of a revolution are in the encoder's data sheet"
+    further = f", counts_per_rev = {turn:.10g}" if math.isfinite(turn) else f', counts_per_rev = "{BLANK}"'
+    further += f", wrap = {again:.10g}" if again is not None else ""
+    if math.isfinite(turn) and (problem := _beyond(q, joints, 2.0 * math.pi / turn)):
+        return Guess("", "unsure", f"{why}; {problem}: turns of the motor, then [drive]?"), further
+    return Guess("counts", "sure" if named and turn == wrap and not math.isfinite(stated) else "likely", why), further
 
 
 def units_of_ratio(factor: float, tolerance: float = 0.1) -> tuple[str, str] | None:

@@ -4,14 +4,15 @@ Weight and inertia of the links follow from the description; friction is fitted,
 
     tau = a·tau_links(q, dq, ddq) + F sign(dq) + B dq + c
 
-The torque agrees with one unit of position and with one order of the joints, if with any.
+The torque agrees with one unit of position, with one order of the joints and with angles that are counted from
+the link before or, behind parallel links, from the one before that, if with any.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,7 +55,7 @@ class LinkFit:
     varies: bool  # the links' torque changes over the motion, so that the others say something
     left: float  # share of the torque's change that links and friction leave open, mean of the joints
     signs: Array  # (joints,) -1 where weight and friction both have the other sign, 1 where both have the links', else 0
-    exchanged: tuple[int, int] | None = None  # two joints (from 0) that would explain it better the other way round
+    otherwise: str = ""  # what would explain it far better: two joints exchanged, or an angle counted from another link
 
 
 def fits_by_unit(
@@ -73,7 +74,7 @@ def fits_by_unit(
         every = max(1, len(torque) // config.samples_of_orders)
         some = (motion[0][::every], motion[1][::every], motion[2][::every])
         found[unit] = replace(fit_of_links(torque, links, motion[1], config),
-                              exchanged=_exchanged(model, some, torque[::every], config))
+                              otherwise=_otherwise(model, some, torque[::every], config))
     return found
 
 
@@ -134,29 +135,51 @@ def _left(rest: Array, links: Array, tau: Array) -> float:
     return float(np.mean(((rest - gain * links) ** 2).mean(axis=0) / size))
 
 
-def _exchanged(
-    model: TorqueModel, motion: tuple[Array, Array, Array], tau: Array, config: Config
-) -> tuple[int, int] | None:
-    """Return the two joints that explain the torque far better when they are exchanged, in the motion or the torque alone."""
-    q, dq, ddq = motion
-    n = tau.shape[1]
-    links = model(q, dq, ddq)
-    if n < 2 or links is None:
-        return None
-    best = config.better * _left(_without_friction(tau, dq, config), _without_friction(links, dq, config), tau)
-    found: tuple[int, int] | None = None
-    for a, b in itertools.combinations(range(n), 2):
-        order = np.arange(n)
-        order[[a, b]] = b, a
-        other = model(q[:, order], dq[:, order], ddq[:, order])
-        candidates = [(tau[:, order], links, dq)]
-        if other is not None:
-            candidates.append((tau[:, order], other, dq[:, order]))
-        for torque, by_links, speed in candidates:
-            left = _left(_without_friction(torque, speed, config), _without_friction(by_links, speed, config), torque)
-            if left < best:
-                best, found = left, (a, b)
+def _otherwise(model: TorqueModel, motion: tuple[Array, Array, Array], tau: Array, config: Config) -> str:
+    """Return under which other meaning of the joints the links explain the torque far better; "" where under none."""
+    dq = motion[1]
+    links = model(*motion)
+    if links is None:
+        return ""
+    best, found = config.better * _left_of(tau, links, dq, config), ""
+    for words, candidates in itertools.chain(_exchanged(model, motion, links, tau), _coupled(model, motion, tau)):
+        left = min((_left_of(*candidate, config) for candidate in candidates), default=math.inf)
+        if left < best:
+            best, found = left, words
     return found
+
+
+_Meanings = Iterator[tuple[str, list[tuple[Array, Array, Array]]]]  # words, and torque, links' torque, speed (samples, joints)
+
+
+def _exchanged(model: TorqueModel, motion: tuple[Array, Array, Array], links: Array, tau: Array) -> _Meanings:
+    """Yield each two joints the other way round, in the torque alone or in the motion as well."""
+    for a, b in itertools.combinations(range(tau.shape[1]), 2):
+        order = np.arange(tau.shape[1])
+        order[[a, b]] = b, a
+        q, dq, ddq = (x[:, order] for x in motion)
+        other = model(q, dq, ddq)
+        both = [] if other is None else [(tau[:, order], other, dq)]
+        yield f"joints {a + 1} and {b + 1} exchanged: in which order are they?", [(tau[:, order], links, motion[1]), *both]
+
+
+def _coupled(model: TorqueModel, motion: tuple[Array, Array, Array], tau: Array) -> _Meanings:
+    """Yield each joint counted from the link before the last, with either sign of that one's angle: q' = N q.
+
+    The torque is the joints' or, where a drive turns the joint by such a rod, N^T times the drives'.
+    """
+    for a, sign in itertools.product(range(tau.shape[1] - 1), (1.0, -1.0)):
+        back = np.eye(tau.shape[1])  # N^-1
+        back[a + 1, a] = -sign
+        q, dq, ddq = (x @ back.T for x in motion)
+        links = model(q, dq, ddq)
+        words = f"joint {a + 2} counted from link {a}, not from link {a + 1}: is it, or are two drives coupled?"
+        if links is not None:
+            yield words, [(tau, links, dq), (tau, links @ back, motion[1])]
+
+
+def _left_of(tau: Array, links: Array, dq: Array, config: Config) -> float:
+    return _left(_without_friction(tau, dq, config), _without_friction(links, dq, config), tau)
 
 
 def unlike_links(fit: LinkFit, factor: float, named: bool, config: Config = Config()) -> str:

@@ -7,6 +7,7 @@ things (the tool's pose, a filter) states nothing of the joints, and one with a 
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Iterator, Sequence
@@ -16,7 +17,7 @@ from pipelines.log.recording.column_names import read_name, words_of
 from pipelines.log.recording.vocabulary import WORDS, narrow_signs, plain_letters
 from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["Statement", "stated_counts", "stated_gear", "stated_rate", "stated_scale", "stated_unit"]
+__all__ = ["Statement", "stated_counts", "stated_gear", "stated_of_some_joints", "stated_rate", "stated_scale", "stated_unit"]
 
 _NUMBER = r"(?<![\w.,:])([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?![\d:])"
 _COUNT = r"(?:counts?|ticks?|cnts?|cts|steps?|incs?|increments?|inkremente?|incrementi?|lsb|units?|digits?|bits?)"
@@ -185,6 +186,18 @@ def _rate_of(number: float, unit: str, text: str) -> float:
     if interval:  # a step without a unit is in s, as programs write it
         return 1.0 / number if number < 1.0 else 0.0
     return number if re.search(r"rate|fps|\bf_?s\b|freq", text) and number >= 1.0 else 0.0
+
+
+def stated_of_some_joints(notes: Sequence[str], n: int) -> list[str]:
+    """Return the sentences about some of `n` joints alone, by number, and not about a unit: what they say, a person must read."""
+    of_joint, found = WORDS["joint"] | {"q"}, []
+    for line in notes:
+        words = words_of(line[:_LONGEST])
+        numbers = {number for word, number in itertools.pairwise(words) if word in of_joint and number.isdecimal()}
+        told = {word for word in words if not word.isdecimal()} - of_joint - WORDS["noise"]
+        if 0 < len(numbers) < n and len(told) > 2 and not any(any(_units(clause)) for clause in _clauses([line])):
+            found.append(line.strip("#%/*!;\"' \t,")[:_LONGEST])
+    return found
 
 
 def stated_counts(notes: Sequence[str]) -> Statement | None:

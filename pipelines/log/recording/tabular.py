@@ -84,6 +84,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
         body = [line for line in body if line[1] != head]
         checks.append(Check.of("F16", "warn", f"the header comes again in {len(again)} lines, left out: the recorder was started "
                                "again", where=f"{source}, line {again[0]}", remedy="none where the clock goes on"))
+    _refuse_further_table(body, dialect, text, source)
     kept, columns, words, labels = _numbers(body, text.endswith("\n"), dialect, names, source, checks)
     columns = without_repeats(columns, header, source)
     notes = tuple(line for number, line in _above(text, body[0][0]) if number != header.line)
@@ -279,6 +280,21 @@ def _clock_times(cells: list[str]) -> tuple[Array, str] | None:
     half = 1.0 if max(hours) > 12 or any(m[5] for m in found if m is not None) else 0.5  # of a day, after which they start again
     again = np.diff(seconds) < -0.5 * half * 86400.0
     return seconds + half * 86400.0 * np.concatenate([[0.0], np.cumsum(again)]), "s"
+
+
+def _refuse_further_table(body: list[Line], dialect: Dialect, text: str, source: str) -> None:
+    """F16: a line of other names than those above the table is no damage, a table of other columns begins at it."""
+    for number, line in body:
+        if not line.lstrip(" \"'")[:1].isalpha():
+            continue
+        names = cells_of(line, dialect.delimiter)
+        words = [name for name in names if name not in MISSING and not is_number(name)]
+        if not 1 < len(names) == len(words) == dialect.width < 2 * len(set(words)):
+            continue
+        if names in [cells_of(above, dialect.delimiter) for _, above in _above(text, body[0][0])]:
+            continue  # the recorder was started again
+        raise InputRejected("F16", f"a further table begins, of {', '.join(names[:3])[:60]} …", where=f"{source}, line {number}",
+                            remedy="save each table in a file of its own")
 
 
 def _refuse_formulas(line: Line, cells: list[str], names: tuple[str, ...], source: str) -> None:

@@ -161,6 +161,21 @@ def test_f09_much_damage_is_refused() -> None:
         parse("\n".join(rows) + "\n")
 
 
+def test_f16_a_further_table_below_the_first_is_refused_with_its_line() -> None:
+    """Its numbers would go on under the names of the first."""
+    rows = lines()
+    names = ",".join(f"other_{k}" for k in range(7))
+    with pytest.raises(InputRejected, match=r"RRID-F16.*line 602.*a further table begins, of other_0.*file of its own"):
+        parse("\n".join([*rows[:601], names, *rows[601:]]) + "\n")
+
+
+def test_cells_that_julia_left_missing_are_no_numbers() -> None:
+    rows = lines()
+    for k in range(100, 130):
+        rows[k] = rows[k].rsplit(",", 1)[0] + ",missing"
+    assert int(np.isnan(parse("\n".join(rows) + "\n").columns["tau_3"]).sum()) == 30
+
+
 def test_s03_two_columns_of_one_name_are_both_named() -> None:
     with pytest.raises(InputRejected, match=r"RRID-S03.*line 1.*columns 2 and 3 are both named 'q_1'"):
         parse(text(good()).replace("q_2", "q_1", 1))
