@@ -183,22 +183,31 @@ def _significant(
 
     No law is exact: at the joints of the causes found so far, and of what stands since the
     reference, what remains of these is larger than the noise, and a further cause has to gain more
-    than a share of what they explain there. Without reference logs a healthy machine differs from
-    any model by a share of its torque as well.
+    than a share of what they explain there.
     """
     rows = later.rows.count
     known = later.shares @ (explained * later.acting(state) + later.standing)
-    least = config.relevance * known
-    if later.dataset.reference is None:
-        least += config.healthy**2 * later.shares @ np.array([float(y @ y) for y in later.rows.y])
-    inexact = dict(zip(later.dictionary.groups, least, strict=True))
+    inexact = dict(zip(later.dictionary.groups, config.relevance * known, strict=True))
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
         if (key not in taken or later.again(key))
         and one.gain > inexact[one.group]
         and one.gain > baseline.threshold(one.group, one.freedom, rows)
+        and not _slight(later, one, config)
     }
+
+
+def _slight(later: Later, one: Screened, config: DiagnosisConfig) -> bool:
+    """Return whether its torque is as small beside a joint's as healthy machines have some.
+
+    Reference logs tell what this machine has.
+    """
+    if later.dataset.reference is not None:
+        return False
+    torque = later.candidates.take(one.group.columns).times(one.amplitudes)
+    power = ((float(x @ x), float(y @ y)) for x, y in zip(torque, later.rows.y, strict=True))
+    return all(own < config.healthy**2 * whole for own, whole in power)
 
 
 def _contest(
