@@ -15,13 +15,14 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.blocks import impulse_toeplitz
 
-__all__ = ["LowPass", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "fast_length", "passed_both_ways",
-           "thinned", "zero_phase"]
+__all__ = ["LowPass", "ample", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "fast_length",
+           "passed_both_ways", "thinned", "zero_phase"]
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _BLOCK = 48
+_AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed at least
 _KEEP = 4.0  # samples left per period of the cut-off: the filter is down by 2 × 6 dB per octave and order at the new Nyquist
 
 
@@ -116,8 +117,17 @@ def _carry(across: Complex, drive: Array) -> Array:
 
 
 def choose_decimation(cutoff_hz: float, rate: float) -> int:
-    """Every how many samples are enough after a low-pass at `cutoff_hz`: at least four a period of the cut-off stay."""
-    return max(1, int(rate / (_KEEP * cutoff_hz) + 1e-9))
+    """Every how many samples are enough after a low-pass at `cutoff_hz`: at least four a period of the cut-off stay.
+
+    A multiple of `ample`, so that columns computed at that step hold every sample that stays.
+    """
+    most, step = max(1, int(rate / (_KEEP * cutoff_hz) + 1e-9)), ample(cutoff_hz, rate)
+    return most - most % step
+
+
+def ample(cutoff_hz: float, rate: float) -> int:
+    """Every how many samples a column is computed before a low-pass at `cutoff_hz`: what it lets through shows no difference."""
+    return max(1, int(rate / (_AMPLE * cutoff_hz)))
 
 
 def centre_hold(command: Array) -> Array:

@@ -32,7 +32,7 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.rigid.body import Motion
-from pipelines.signal.filters import fast_length, passed_both_ways, thinned
+from pipelines.signal.filters import ample, fast_length, passed_both_ways, thinned
 from pipelines.signal.prediction import prediction_errors, prediction_weights
 
 __all__ = ["PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "run_of"]
@@ -43,7 +43,6 @@ Mask = npt.NDArray[np.bool_]
 PAD = 4.0  # periods of the cut-off by which a stretch is continued
 _END = 1.0  # periods of the cut-off left out at either end of a stretch
 _AT_ONCE = 8  # numerics: channels, which stay near the processor
-_AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed at least
 _ORDER = 20  # rows: as far as the noise of the low-pass reaches, and a fifth of a second
 _RIDGE = 1e-4  # of the noise's power: what the low-pass keeps back is not brought back by more
 _ROOM = 192 << 20  # [bytes]
@@ -395,5 +394,4 @@ def _skipped(equations: LogEquations) -> int:
         return 1
     step = equations.found.good.log.sample_time
     highest = min(how.cutoff_hz, 0.5 / (step * how.decimation))  # rows further apart than the low-pass asks for show less
-    most = int(1.0 / (_AMPLE * highest * step))
-    return max((k for k in range(1, max(most, 1) + 1) if how.decimation % k == 0), default=1)
+    return max(k for k in range(1, ample(highest, 1.0 / step) + 1) if how.decimation % k == 0)
