@@ -34,7 +34,7 @@ def sweeping(seed: int) -> ExperimentLog:
     return record(machine, [], [experiments.free(machine, seed, duration=8.0)], seed=seed)[0]
 
 
-@pytest.mark.parametrize("seed", seeds(10, 2))
+@pytest.mark.parametrize("seed", seeds(10))
 @pytest.mark.parametrize("joint", [1, 2, 3])
 def test_a_joint_that_reverses_alone_is_plausible(seed: int, joint: int) -> None:
     """30 logs of 10 machines, whose held joints' torque their neighbour's motion explains better than their own."""
