@@ -138,6 +138,7 @@ def test_friction_that_jumps_is_named_with_its_instant() -> None:
     assert np.all(apart <= 0.01 * np.abs(machine.friction(speed)))
 
 
+@pytest.mark.slow
 def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve() -> None:
     """A free choice of laws finds the step, and the curve before it beyond the speeds that were driven before."""
     machine = MACHINES["ordered"]
