@@ -58,6 +58,7 @@ def both(motion: Motion) -> Array:
     return out
 
 
+@pytest.mark.slow
 def test_the_largest_number_of_causes_hides_none(tmp_path: Path) -> None:
     """Of two causes one is named, and the result says that the search ended before the other."""
     folder = written(tmp_path, short(both))

@@ -153,6 +153,7 @@ def test_causes_that_no_model_takes_are_refused(causes: tuple[str, ...], words: 
     assert words in str(refused.value).lower()
 
 
+@pytest.mark.slow
 def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_say(tmp_path: Path) -> None:
     """They were there to be asked: nobody is told to name some."""
     folder = written(tmp_path / "logs", (*session(seconds=2.0), *healthy_again(session(seconds=2.0, seed=5))))
