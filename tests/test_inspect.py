@@ -172,6 +172,7 @@ def test_a_recorded_arm_is_in_order(tx40: ExperimentLog, tmp_path: Path) -> None
     assert _codes(tx40, tmp_path) == []
 
 
+@pytest.mark.slow
 def test_swapped_torques_of_a_recorded_arm_are_named(tx40: ExperimentLog, tmp_path: Path) -> None:
     """Columns 1 and 4."""
     swapped = _codes(with_signal(tx40, tau=tx40.tau[:, [3, 1, 2, 0, 4, 5]]), tmp_path)

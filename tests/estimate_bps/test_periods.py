@@ -190,6 +190,7 @@ def test_a_log_of_one_period_beside_one_of_five_counts_for_its_own() -> None:
     np.testing.assert_allclose(rms, np.sqrt((only(both).residual**2 * 5 + (NOISE / 5) ** 2) / 6), rtol=0.4)
 
 
+@pytest.mark.slow
 def test_derived_logs_give_what_recordings_give(tmp_path: Path) -> None:
     """Averaged or not: `reconstruct` and then `estimate-bps` on its logs is `estimate-bps` on the recordings, bit for bit."""
     direct = contents(stage(tmp_path / "h5", periodic(0, 2)).folder)

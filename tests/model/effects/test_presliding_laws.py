@@ -107,7 +107,7 @@ def fitted(law: Law) -> tuple[Presliding, float]:
                  marks=pytest.mark.slow),
     pytest.param(integrated(lambda z, s: max(1.0 - s * z, 0.0) ** 0.5 / DISTANCE), 0.0, {}, 0.02, marks=pytest.mark.slow),
     pytest.param(integrated(dupont), 0.0, {"distance": DISTANCE}, 0.02, marks=pytest.mark.slow),
-    (maxwell_slip, 1.0, {}, 0.03),
+    pytest.param(maxwell_slip, 1.0, {}, 0.03, marks=pytest.mark.slow),
     pytest.param(breaking_away, 0.0, {"distance": DISTANCE, "breakaway": 0.5, "breakaway_speed": 0.1}, 0.02,
                  marks=pytest.mark.slow),
 ], ids=["dahl", "lugre", "dahl of exponent one half", "dupont", "maxwell slip", "lugre with breakaway"])

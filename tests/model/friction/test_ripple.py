@@ -141,6 +141,7 @@ def test_value_and_deviation_end_at_one_place(rippled: JointFit) -> None:
     assert "0.0000302 ± 0.0000096 kg m^2" in check.message
 
 
+@pytest.mark.slow
 def test_friction_by_position_of_a_joint_that_goes_one_way_is_no_ripple() -> None:
     """What turns with the motion is not told from what does not where it never turns."""
     rng, truth = np.random.default_rng(9), TRUTHS["coulomb+viscous"]
