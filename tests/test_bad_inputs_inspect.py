@@ -22,7 +22,12 @@ __all__ = ["command"]
 _FIRST = {fault.code: fault for fault in reversed(FAULTS)}  # of every row the first case
 
 
-@pytest.mark.parametrize("fault", [pytest.param(f, marks=pytest.mark.row(f.row[:3]), id=f.row.replace(" ", "-")) for f in FAULTS])
+def _marks(fault: Fault) -> list[pytest.MarkDecorator]:
+    """Its row; further cases of a row are run by name."""
+    return [pytest.mark.row(fault.row[:3]), *([] if fault is _FIRST[fault.code] else [pytest.mark.slow])]
+
+
+@pytest.mark.parametrize("fault", [pytest.param(f, marks=_marks(f), id=f.row.replace(" ", "-")) for f in FAULTS])
 def test_every_fault_is_named_placed_and_answered(fault: Fault, tmp_path: Path, command: Command) -> None:
     """Code, level, place, a number or a word of what is wrong, a remedy, the exit code; and nothing else is claimed."""
     write_log(tmp_path / "log.h5", fault.make(good_log()))

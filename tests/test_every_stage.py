@@ -40,7 +40,7 @@ MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if pa
 # The sample logs a stage is run on here: few of every kind it reads. Any other stage takes them all.
 _FEW = ("excitation-1", "excitation-2", "hold-1")
 LOGS = {"inspect": _FEW, "convert": ("excitation-1", "hold-1"), "reconstruct": ("excitation-1", "hold-1"), "estimate_bps": _FEW,
-        "fit_friction": ("friction-3",), "run": ("excitation-1", "friction-3"), "validate_writing": _FEW}
+        "fit_friction": ("friction-3",), "run": ("excitation-1", "hold-1"), "validate_writing": ("excitation-1", "excitation-2")}
 FORBIDDEN = {"open", "print", "read_text", "write_text", "read_bytes", "write_bytes", "open_log", "write_log", "savefig"}
 
 
@@ -83,7 +83,7 @@ def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
     if module == "frf":
         settings, paths = dataclasses.replace(settings, high=60.0), (samples / "rrr-healthy/frf-1-1.h5",)
     if module == "run":
-        settings = dataclasses.replace(settings, skip=("diagnose", "extend"))
+        settings = dataclasses.replace(settings, skip=("fit-friction", "validate-writing", "diagnose", "extend"))
     if module in ("diagnose", "extend"):
         paths = (written(tmp_path / "brief", session("cogging", 1, 2.0, 1)),)
         more: dict[str, Any] = {"exclude": but("cogging"), "max_causes": 1} if module == "diagnose" else {

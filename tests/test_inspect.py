@@ -118,7 +118,7 @@ def test_the_report_of_a_broken_log_is_drawn(row: str, tmp_path: Path) -> None:
     assert outcome.report.tone in ("bad", "attention")
 
 
-@pytest.mark.parametrize("every", [4, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("every", [12, pytest.param(1, marks=pytest.mark.slow)])
 def test_every_fault_has_a_report(every: int) -> None:
     """Words and tables for each; nothing is drawn here."""
     from pipelines.log.files import Opened
@@ -143,9 +143,11 @@ def test_another_robot_must_have_as_many_joints(tmp_path: Path) -> None:
     assert [(c.code, c.level) for c in outcome.result.checks] == [("RRID-S02", "reject")]
 
 
-def test_sample_logs_are_in_order(samples: Path, tmp_path: Path) -> None:
-    logs = sorted(p for p in samples.glob("*") if (p.is_dir() and any(p.glob("*.h5"))))
-    outcome = run_stage(inspect.STAGE, Request(tuple(logs), out=tmp_path / "out", check=True, no_report=True), inspect.Settings())
+@pytest.mark.parametrize("session", ["rrr-closed-form", *(pytest.param(name, marks=pytest.mark.slow) for name in (
+    "rrr-healthy", "rrr-changed"))])
+def test_sample_logs_are_in_order(session: str, samples: Path, tmp_path: Path) -> None:
+    request = Request((samples / session,), out=tmp_path / "out", check=True, no_report=True)
+    outcome = run_stage(inspect.STAGE, request, inspect.Settings())
     assert [c for c in outcome.result.checks if c.level != "ok"] == []
     assert outcome.exit_code == 0
     assert "in order" in outcome.report.verdict
@@ -170,12 +172,17 @@ def test_a_recorded_arm_is_in_order(tx40: ExperimentLog, tmp_path: Path) -> None
     assert _codes(tx40, tmp_path) == []
 
 
-def test_mix_ups_in_a_recorded_arm_are_named(tx40: ExperimentLog, tmp_path: Path) -> None:
-    """Columns 1 and 4 of the torque swapped, and joint 3's torque with the other sign."""
-    swapped = _codes(with_signal(tx40, tau=tx40.tau[:, [3, 1, 2, 0, 4, 5]]), tmp_path / "..")
+@pytest.mark.slow
+def test_swapped_torques_of_a_recorded_arm_are_named(tx40: ExperimentLog, tmp_path: Path) -> None:
+    """Columns 1 and 4."""
+    swapped = _codes(with_signal(tx40, tau=tx40.tau[:, [3, 1, 2, 0, 4, 5]]), tmp_path)
     assert [code for code, _ in swapped] == ["RRID-S13"]
     assert "tau: columns 1,4 fit swapped" in swapped[0][1]
-    flipped = _codes(with_signal(tx40, tau=tx40.tau * [1, 1, -1, 1, 1, 1]), tmp_path / "..")
+
+
+@pytest.mark.slow
+def test_a_flipped_torque_of_a_recorded_arm_is_named(tx40: ExperimentLog, tmp_path: Path) -> None:
+    flipped = _codes(with_signal(tx40, tau=tx40.tau * [1, 1, -1, 1, 1, 1]), tmp_path)
     assert [code for code, _ in flipped] == ["RRID-S14"]
     assert "joint 3" in flipped[0][1]
 

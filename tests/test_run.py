@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines import estimate_bps, run
+from pipelines import estimate_bps, fit_friction, run, validate_writing
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
 from pipelines.log.sessions import apart
@@ -19,8 +19,11 @@ from pipelines.stage import Outcome, Request, read_logs, run_stage
 from tests.cli.commands import rrrid
 from tests.diagnose.sessions import but, session, written
 
-WITHOUT = run.Settings(skip=("diagnose", "extend"))  # they are dear, and have tests of their own
-ESTIMATE = run.Settings(skip=("fit-friction", "reconstruct", "validate-writing", "frf", *WITHOUT.skip))
+# What is dear and has tests of its own is left out: diagnosis, the choice of a law of friction, simulated writing.
+WITHOUT = run.Settings({"fit-friction": fit_friction.Settings(law="three_sigmoid"),
+                        "validate-writing": validate_writing.Settings(simulate=False)}, ("diagnose", "extend"))
+ESTIMATE = run.Settings({"estimate-bps": estimate_bps.Settings(compare=False)},
+                        ("fit-friction", "reconstruct", "validate-writing", "frf", *WITHOUT.skip))
 
 
 @pytest.fixture(scope="module")

@@ -128,12 +128,13 @@ def test_provenance_knows_robot_seed_and_version(logs: Path) -> None:
 
 def test_a_result_does_not_depend_on_where_its_inputs_lie(tmp_path: Path) -> None:
     """The same folder at two places, one broken log in it: the same bytes of result and report, of every stage that reads logs."""
+    few = run.Settings(skip=("fit-friction", "estimate-bps", "validate-writing", "frf", "diagnose", "extend"))
     contents = []
     for place in ("here", "over there/deep"):
         folder = tmp_path / place / "logs"
         write_log(folder / "a.h5", small_log())
         (folder / "b.parquet").write_bytes(b"PAR1 broken")
-        for stage, settings in ((inspect.STAGE, inspect.Settings()), (run.STAGE, run.Settings())):
+        for stage, settings in ((inspect.STAGE, inspect.Settings()), (run.STAGE, few)):
             out = run_stage(stage, Request((folder,), out=tmp_path / place / stage.name), settings).folder  # type: ignore[arg-type]
             assert str(tmp_path) not in (out / "result.json").read_text() + (out / "report.html").read_text()
             assert "b.parquet" in (out / "result.json").read_text()

@@ -16,7 +16,7 @@ from pipelines.bench.plant import Recording, run
 from pipelines.errors import UsageError
 from tests.bench.machines import sway, unrounded
 
-SECONDS = 0.4
+SECONDS = 0.15
 
 
 @lru_cache

@@ -70,9 +70,11 @@ def explained(recording: Recording, arm: Arm) -> Measured:
     return Measured(recording.t[:-1] + 0.5 * SAMPLE_TIME, q, v, ddq, tau, rigid, tau - rigid - friction)
 
 
-def measured(*faults: Fault, arm: Arm | None = None) -> Measured:
-    """Two seconds to and fro at up to 3 rad/s."""
-    return explained(run(machine(), Decentralised(), sway(2.0, hz=0.6, amplitude=0.7), faults), arm or arm_of(machine().robot))
+SWAY = sway(2.0, hz=0.6, amplitude=0.7)  # to and fro at up to 3 rad/s
+
+
+def measured(*faults: Fault) -> Measured:
+    return explained(run(machine(), Decentralised(), SWAY, faults), arm_of(machine().robot))
 
 
 def turned(v: np.ndarray) -> np.ndarray:
@@ -153,7 +155,7 @@ def test_a_load_touches_no_other_row() -> None:
         assert np.abs(other).max() < 4e-3, name
 
 
-@pytest.mark.parametrize("joint", [1, 2, 3])
+@pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_the_main_harmonic_of_wear_is_the_answers(joint: int) -> None:
     """Friction over one whole turn in one direction: its Fourier coefficient at the order has the amplitude and phase told."""
     fault, j = make("position_friction", machine(), joint, seed=3), joint - 1
@@ -202,11 +204,11 @@ def test_a_longer_link_is_a_longer_link() -> None:
     bodies = [Solid.of_link(joint.link) for joint in robot.joints if joint.link is not None]
     bodies[1] = replace(bodies[1], com=bodies[1].com - np.array([error, 0.0, 0.0]))
     longer = with_links(replace(robot, joints=tuple(joints)), [body.as_link() for body in bodies])
-    by_drawing, by_truth = (measured(LinkLength(None, error, 2), arm=arm_of(one)).load[20:] for one in (robot, longer))
-    m = measured(LinkLength(None, error, 2))
-    moving = (np.abs(m.dq) > 0.1)[20:]
-    assert np.abs(np.where(moving, by_truth, 0.0)).max() < 2e-3
-    assert np.abs(np.where(moving, by_drawing, 0.0)).max() > 0.1
+    recording = run(machine(), Decentralised(), SWAY, [LinkLength(None, error, 2)])
+    by_drawing, by_truth = (explained(recording, arm_of(one)) for one in (robot, longer))
+    moving = (np.abs(by_truth.dq) > 0.1)[20:]
+    assert np.abs(np.where(moving, by_truth.load[20:], 0.0)).max() < 2e-3
+    assert np.abs(np.where(moving, by_drawing.load[20:], 0.0)).max() > 0.1
 
 
 def test_an_encoder_follows_its_neighbour() -> None:

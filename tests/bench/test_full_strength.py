@@ -13,7 +13,8 @@ from pipelines.bench.controllers import Decentralised
 from pipelines.bench.fault import Fault, Parameters
 from pipelines.bench.faults import fault_names, find_fault, make
 from pipelines.bench.machine import Machine, machine_of, paper_machine
-from pipelines.bench.plant import run
+from pipelines.bench.plant import Recording, run
+from pipelines.bench.reference import Reference
 from pipelines.bench.references import sweeps
 from pipelines.errors import UsageError
 from pipelines.log.robot import Joint, RobotDescription
@@ -97,12 +98,18 @@ def gantry() -> Machine:
     return machine_of(RobotDescription("gantry", (0.0, 0.0, -9.81), "dh", joints), seed=2)
 
 
-@pytest.mark.parametrize("name", fault_names())
-def test_a_slide_can_have_every_fault(name: str) -> None:
-    """It moves or loads the machine, and no more than a machine survives: less than 10 cm."""
+@pytest.fixture(scope="module")
+def sound() -> tuple[Machine, Reference, Recording]:
+    """The gantry in order, and what it was to follow."""
     machine = gantry()
     reference = sweeps(machine, np.random.default_rng(1), 0.2)
-    well = run(machine, Decentralised(), reference)
+    return machine, reference, run(machine, Decentralised(), reference)
+
+
+@pytest.mark.parametrize("name", fault_names())
+def test_a_slide_can_have_every_fault(name: str, sound: tuple[Machine, Reference, Recording]) -> None:
+    """It moves or loads the machine, and no more than a machine survives: less than 10 cm."""
+    machine, reference, well = sound
     peak = tuple(np.abs(well.tau).max(axis=0).tolist())
     sick = run(machine, Decentralised(), reference, [make(name, machine, 1, 3, peak_torque=peak, duration=0.2)])
     if name != "link_length":  # where on a slide the next joint sits, neither inertia nor weight tells

@@ -70,8 +70,8 @@ def test_a_hostile_text_costs_little(name: str) -> None:
 
 @pytest.mark.usefixtures("_warm")
 def test_mutations_cost_little() -> None:
-    """Of 120 damaged texts none takes 5 s or 500 MB, or ends in an internal error (`python -m benchmarks.mutations`: of 10,000)."""
-    for k, (kind, text) in enumerate(mutations(120, seed=51)):
+    """Of 40 damaged texts none takes 5 s or 500 MB, or ends in an internal error (`python -m benchmarks.mutations`: of 10,000)."""
+    for k, (kind, text) in enumerate(mutations(40, seed=51)):
         reading = read_apart(kind, text)
         assert not reading.outcome.startswith("internal"), (k, reading.outcome)
         assert reading.seconds < SECONDS, k
@@ -92,7 +92,7 @@ def test_healthy_toml_is_within_the_bounds() -> None:
             parse_toml(text)
 
 
-@pytest.mark.parametrize("pattern", ["{x:(a+)+}!.csv", "*a" * 20 + "!"])
+@pytest.mark.parametrize("pattern", ["{x:(a+)+}!.csv", pytest.param("*a" * 20 + "!", marks=pytest.mark.slow)])
 def test_a_pattern_cannot_hang_the_import(pattern: str, tmp_path: Path) -> None:
     """An expression that would take ages is refused after 3 s; healthy ones give their groups as before."""
     began = time.monotonic()

@@ -24,6 +24,7 @@ def test_what_moves_base_parameters_as_well_is_no_payload(cause: str, joint: int
     assert [one.key for one in found.decision.causes] == [(cause, joint)]
 
 
+@pytest.mark.slow
 def test_a_longer_link_is_screened_beside_the_masses_that_it_moves() -> None:
     """What screening says that it saves is what a fit saves, in which how heavy each link is stays free."""
     config, logs = DiagnosisConfig(), (*healthy_again(session()), *session("link_length"))

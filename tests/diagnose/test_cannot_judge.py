@@ -72,6 +72,7 @@ def test_a_model_that_leaves_next_to_nothing_needs_no_floor() -> None:
     assert asked(undescribed(session())).verdict == "no-fault-found"
 
 
+@pytest.mark.slow
 def test_reference_logs_are_a_noise_floor() -> None:
     """The same friction before and after: nothing has changed, however much of it no model has."""
     logs = rubbing(undescribed(session()), 1.0)

@@ -112,6 +112,7 @@ def test_odrive_error_on_runs_that_chose_nothing(odrive: tuple[Selection, list[J
     assert last["slower_nocomp_0"] <= 0.12
 
 
+@pytest.mark.slow
 @pytest.mark.xfail(strict=True, reason="the second cause is an offset, and not the lag of the current")
 def test_odrive_in_brief(shared: Path) -> None:
     """The two greatest causes, in the order of their size: the ripple of seven pole pairs, and the lag of the logged current."""

@@ -73,8 +73,8 @@ def test_a_cause_is_named_with_its_joint_and_its_numbers(rippled: Outcome[diagno
 SILENT = pytest.mark.xfail(strict=True, reason="two logs of 3 s name nothing without a reference")
 
 
-@pytest.mark.parametrize("seconds", [pytest.param(3.0, marks=SILENT),
-                                     pytest.param(10.0, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seconds", [pytest.param(3.0, marks=SILENT), 10.0])
 def test_a_cause_is_named_without_reference_logs(seconds: float, tmp_path: Path) -> None:
     """Of two logs of so many seconds, blocks of which are held out."""
     found = asked(written(tmp_path / "logs", session("cogging", 2, seconds)), tmp_path / "out")

@@ -26,5 +26,6 @@ def test_something_is_wrong_that_has_no_name(cause: str, joint: int) -> None:
     assert f"joint {joint}" in found.reason
 
 
+@pytest.mark.slow
 def test_nothing_is_wrong_with_the_same_arm_in_order() -> None:
     assert diagnosed().verdict == "no-fault-found"

@@ -32,10 +32,10 @@ class _Arm:
     place: tuple[str, int]
 
 
-def _arm(shared: Path, number: str) -> _Arm:
+def _arm(shared: Path, number: str, names: str = "*") -> _Arm:
     answers = json.loads((shared / "plant-b/answers.json").read_text(encoding="utf-8"))
     (truth,) = answers[f"arm-{number}"]["truth"]
-    paths = sorted((shared / f"plant-b/arm-{number}").glob("*.h5"))
+    paths = sorted((shared / f"plant-b/arm-{number}").glob(f"{names}.h5"))
     config = DiagnosisConfig()
     settings = config.recipe()
     prepared = prepare(Logs.by_role([read_parts(path)[0] for path in paths]), settings)
@@ -47,8 +47,8 @@ def _arm(shared: Path, number: str) -> _Arm:
 
 @pytest.fixture(scope="module")
 def lagging(shared: Path) -> _Arm:
-    """An arm whose drive of joint 2 lags by 5.3 ms."""
-    return _arm(shared, "09")
+    """An arm whose drive of joint 2 lags by 5.3 ms, and its excitations."""
+    return _arm(shared, "09", "*-1")
 
 
 def _only(arm: _Arm) -> Finding:

@@ -21,7 +21,7 @@ from tests.diagnosis.arms import arm, hidden, wave
 from tests.diagnosis.asking import answered, causes, diagnosed, effects
 from tests.diagnosis.rotor import turned
 from tests.faulty import dropped
-from tests.healthy import with_signal
+from tests.healthy import rows, with_signal
 from tests.model.estimation.experiments import VISCOUS
 
 Load = Callable[[Motion], Array]  # torque (samples, joints) [N m] that a motion costs beside
@@ -36,9 +36,14 @@ def logs(load: Load | None = None) -> tuple[ExperimentLog, ...]:
     return tuple(hidden(seed, load, role) for seed, role in roles)
 
 
+def short(load: Load) -> list[ExperimentLog]:
+    """Four seconds of a log to fit and of one that judges."""
+    return [rows(replace(log, period=None), slice(0, 4000)) for log in logs(load)[1:]]
+
+
 def test_cogging_is_found_at_its_joint_with_its_numbers() -> None:
     """And what is left is the noise of the drives, 20, 10 and 5 mN m, as far as the low-pass lets it through."""
-    found = answered(Logs.by_role(logs(wave)), exclude=but(*FEW))
+    found = answered(Logs.by_role(short(wave)), exclude=but("cogging", "torque_offset", "quadratic_drag"))
     assert [(one.cause, one.joint) for one in found.findings] == [("cogging", 2)]
     values = {name: one.value for name, one in found.findings[0].parameters.items()}
     assert values["order"] == pytest.approx(11.0, abs=0.01)
@@ -70,9 +75,10 @@ def both(motion: Motion) -> Array:
     return out
 
 
+@pytest.mark.slow
 def test_the_largest_number_of_causes_hides_none(tmp_path: Path) -> None:
     """Of two causes one is named, and the result says that the search ended before the other."""
-    folder = written(tmp_path, [replace(log, period=None) for log in logs(both)])
+    folder = written(tmp_path, short(both))
     settings = diagnose.Settings(exclude=but("cogging", "quadratic_drag"), max_causes=1, skip_sanity_checks=True)
     found = diagnose.compute(diagnose.read(Request((folder,)), settings), settings, whole=False)
     assert [(one.cause, one.joint) for one in found.findings] == [("quadratic_drag", 1)]

@@ -23,7 +23,7 @@ from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered, causes, diagnosed
 
 FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
-SECONDS, NUMBER = 5.0, 7
+SECONDS, NUMBER = 3.0, 7
 
 
 @lru_cache(maxsize=1)

@@ -22,6 +22,7 @@ def orders(hidden: Mapping[float, float], *wanted: Wanted) -> list[float]:
     return sorted(acting.values["order"] for acting in found.arm.effects)
 
 
+@pytest.mark.slow
 def test_what_acts_once_is_found_once() -> None:
     assert orders({7.0: 0.05}, Wanted(Cogging(joint=1))) == [7.0]
 

@@ -20,9 +20,9 @@ from tests.healthy import with_signal
 _ALONE = ("01", "03", "05", "06", "07", "08", "09", "10", "12", "15", "16")
 
 
-def _found(shared: Path, arm: str) -> tuple[Diagnosis, dict[str, Any]]:
+def _found(shared: Path, arm: str, names: str = "*") -> tuple[Diagnosis, dict[str, Any]]:
     answers = json.loads((shared / "plant-b/answers.json").read_text(encoding="utf-8"))
-    logs = [read_parts(path)[0] for path in sorted((shared / f"plant-b/arm-{arm}").glob("*.h5"))]
+    logs = [read_parts(path)[0] for path in sorted((shared / f"plant-b/arm-{arm}").glob(f"{names}.h5"))]
     return diagnose(logs), answers[f"arm-{arm}"]
 
 
@@ -37,8 +37,10 @@ def test_a_cause_is_named_with_its_joint(shared: Path, arm: str) -> None:
     assert key[1] in (truth["joint"], None)  # the joint of a link stands among its numbers
 
 
-def test_a_healthy_arm_has_no_fault(shared: Path) -> None:
-    found, _ = _found(shared, "14")
+@pytest.mark.parametrize("names", ["*-1", pytest.param("*", marks=pytest.mark.slow)])
+def test_a_healthy_arm_has_no_fault(shared: Path, names: str) -> None:
+    """By its excitations, and by all of its logs."""
+    found, _ = _found(shared, "14", names)
     assert found.decision.verdict == "no-fault-found"
 
 

@@ -22,7 +22,7 @@ from pipelines.stage import Request, run_stage
 from tests.estimate_bps.test_other_arms import COULOMB, an_arm, deviations, estimated, recorded
 
 
-@pytest.mark.parametrize("case", ["a", "b"])
+@pytest.mark.parametrize("case", ["a", pytest.param("b", marks=pytest.mark.slow)])
 def test_uneven_sampling_and_noisy_stamps_cost_no_accuracy(case: str) -> None:
     """Arm of five joints at 200 Hz: std as with even samples, and the truth within two for most parameters."""
     one = draw(3)

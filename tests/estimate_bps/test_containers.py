@@ -22,17 +22,16 @@ from tests.model.estimation.experiments import experiment, truth
 
 def test_derived_logs_give_what_recordings_give(good: ExperimentLog, held_out: ExperimentLog, tmp_path: Path) -> None:
     """`reconstruct` and then `estimate-bps` on its logs: the same result, series and model, in either container and mixed."""
-    settings = replace(SYMMETRIC, compare=True)
-    direct = contents(stage(tmp_path / "h5", good, held_out, settings=settings).folder)
-    assert contents(stage(tmp_path / "parquet", good, held_out, settings=settings, suffix="parquet").folder) == direct
+    direct = contents(stage(tmp_path / "h5", good, held_out).folder)
+    assert contents(stage(tmp_path / "parquet", good, held_out, suffix="parquet").folder) == direct
     request = Request((tmp_path / "h5/logs",), out=tmp_path / "motion", no_report=True, format="parquet")
-    motion = run_stage(reconstruct.STAGE, request, settings.reconstruction)
+    motion = run_stage(reconstruct.STAGE, request, SYMMETRIC.reconstruction)
     again = Request((motion.folder,), out=tmp_path / "again", no_report=True)
-    assert contents(run_stage(estimate_bps.STAGE, again, settings).folder) == direct
+    assert contents(run_stage(estimate_bps.STAGE, again, SYMMETRIC).folder) == direct
     write_log(tmp_path / "mixed/logs/one.h5", open_log(next((motion.folder / "logs").glob("*-0.parquet"))).log)
     write_log(tmp_path / "mixed/logs/two.parquet", held_out)
     mixed = Request((tmp_path / "mixed/logs",), out=tmp_path / "mixed/out", no_report=True)
-    assert contents(run_stage(estimate_bps.STAGE, mixed, settings).folder) == direct
+    assert contents(run_stage(estimate_bps.STAGE, mixed, SYMMETRIC).folder) == direct
 
 
 def test_its_own_logs_give_the_same_again(good: ExperimentLog, tmp_path: Path) -> None:

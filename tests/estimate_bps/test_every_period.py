@@ -62,11 +62,11 @@ def test_both_ways_know_as_much(spoil: Callable[[int], Spoil | None]) -> None:
 
 
 def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
-    """0.1 N m at the waist beside the noise of a mean of five, whichever way: the first sentence says the same."""
+    """0.1 N m at the waist beside the noise of a mean of three, whichever way: the first sentence says the same."""
     def ripple(q: Array, tau: Array) -> None:
         tau[:, 0] += 0.1 * np.sqrt(2.0) * np.sin(7.0 * q[:, 0])
 
-    both = [estimated(periodic(0, 5, spoil=ripple), average=average) for average in (True, False)]
+    both = [estimated(periodic(0, 3, spoil=ripple), average=average) for average in (True, False)]
     mean, every = map(only, both)
     assert (mean.averaged, every.averaged) == (True, False)
     assert every.residual[0] == pytest.approx(0.1, rel=0.3)

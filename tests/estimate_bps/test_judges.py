@@ -118,8 +118,8 @@ def test_the_command_line(good: ExperimentLog, held_out: ExperimentLog, tmp_path
     assert (missing.returncode, "RRID-C04" in missing.stderr) == (2, True)
 
 
-@pytest.mark.parametrize("min_speed", [0.0, 0.5])
-@pytest.mark.parametrize("alone", [True, False])
+@pytest.mark.parametrize(("alone", "min_speed"), [
+    (True, 0.5), (False, 0.0), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((True, 0.0), (False, 0.5)))])
 def test_all_ways_are_judged_by_the_same_equations(alone: bool, min_speed: float, good: ExperimentLog, held_out: ExperimentLog,
                                                    tmp_path: Path) -> None:
     settings = replace(SYMMETRIC, compare=True, min_speed=(min_speed,))

@@ -77,7 +77,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(name, marks=pytest.mark.slow if name == "32-wall-mounted" else ()) for name in CASES]
+)
 def test_a_field_case_is_named_and_refused_with_its_repair(
     case: str, shared: Path, tmp_path: Path
 ) -> None:

@@ -9,7 +9,9 @@ from benchmarks.torque_boundary import KINDS, judged
 SEEDS = (pytest.param(103, marks=pytest.mark.slow), 108)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=pytest.mark.slow if kind == "permuted" else ()) for kind in KINDS]
+)
 @pytest.mark.parametrize("seed", SEEDS)
 def test_no_field_is_wrong_and_what_is_told_is_what_was_logged(seed: int, kind: str) -> None:
     """Sign, gravity, friction, direction and order; the gate closes where the description is

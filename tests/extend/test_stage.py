@@ -32,7 +32,7 @@ def extended(folder: Path, out: Path, *causes: str, model: Path | None = None) -
 def rippled(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome[extend.Extension]]:
     """Cogging at joint 2; extended by that and by a drag that is not there."""
     place = tmp_path_factory.mktemp("extend")
-    folder = written(place / "logs", session("cogging", 2))
+    folder = written(place / "logs", session("cogging", 2, 2.0))
     return folder, extended(folder, place / "out", "cogging:2", "quadratic_drag:1")
 
 
@@ -49,7 +49,7 @@ def test_what_is_there_is_accepted_and_what_is_not_is_refused(rippled: tuple[Pat
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="accepted on logs of 3 s")
+@pytest.mark.xfail(strict=True, reason="accepted on logs of 2 s")
 def test_a_hump_that_is_not_there_is_refused_beside_a_ripple(
     rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path
 ) -> None:
@@ -79,8 +79,8 @@ def test_the_gain_is_that_of_diagnose(rippled: tuple[Path, Outcome[extend.Extens
     stored = json.loads((rippled[1].folder / "result.json").read_text())
     gain = stored["gain"]
     assert set(gain) == {"validate_torque_rms", "simulated_position_rms", "simulation", "simulated_span", "tip_error_rms"}
-    assert gain["simulated_span"] == [{"log": "excitation-2", "seconds": pytest.approx(3.0, abs=2e-3)}]  # all of it
-    assert "over the first 3 s of excitation-2" in rippled[1].report.verdict
+    assert gain["simulated_span"] == [{"log": "excitation-2", "seconds": pytest.approx(2.0, abs=2e-3)}]  # all of it
+    assert "over the first 2 s of excitation-2" in rippled[1].report.verdict
     assert gain["validate_torque_rms"]["ci95"][1][1] < 0.0
     assert gain["simulated_position_rms"]["after"][1] < 0.5 * gain["simulated_position_rms"]["before"][1]
 
@@ -108,22 +108,18 @@ def test_a_model_keeps_its_effects(rippled: tuple[Path, Outcome[extend.Extension
     assert [(one.cause, one.joint) for one in again.findings] == [("cogging", 2)]
 
 
-def test_nothing_is_written_where_nothing_is_accepted(tmp_path: Path) -> None:
-    outcome = extended(written(tmp_path / "logs", session()), tmp_path / "out", "quadratic_drag:1")
-    assert (outcome.result.findings, outcome.result.model, outcome.exit_code) == ((), None, 1)
-    assert not (outcome.folder / "model.json").exists()
-    assert "no model was written" in outcome.report.verdict
-
-
 def test_a_refused_extension_keeps_the_accepted_model(rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path,
                                                       monkeypatch: pytest.MonkeyPatch) -> None:
     """In the default folder: the newest outcome lies there and has no model; the earlier one lies beside it as it was, its report
     can be drawn again, and nobody who asks the default folder for a model gets one."""
     folder, earlier = rippled
     monkeypatch.chdir(tmp_path)
-    place = Path("runs") / session()[0].robot_name / "logs/extend"
+    place = Path("runs") / session(seconds=2.0)[0].robot_name / "logs/extend"
     shutil.copytree(earlier.folder, place)
-    refused = run_stage(extend.STAGE, Request((folder,), no_report=True), extend.Settings(causes=("quadratic_drag:1",)))
+    settings = extend.Settings(causes=("quadratic_drag:1",))
+    refused = run_stage(extend.STAGE, Request((folder,), no_report=True, check=True), settings)
+    assert (refused.result.findings, refused.result.model, refused.exit_code) == ((), None, 1)
+    assert "no model was written" in refused.report.verdict
     aside = place.with_name("extend-cogging-2")
     assert (refused.folder, refused.result.accepted, (place / "model.json").exists()) == (place, False, False)
     assert [str(aside) in c.message for c in refused.checks if c.code == "RRID-C05"] == [True]
@@ -151,15 +147,16 @@ def test_a_start_is_where_the_search_begins() -> None:
 def test_causes_that_no_model_takes_are_refused(causes: tuple[str, ...], words: str, tmp_path: Path,
                                                 monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(extend, "examined", lambda *given: ((),))  # what is wrong with the logs is no matter here
-    folder = written(tmp_path / "logs", [replace(session()[0], role="identify")])
+    folder = written(tmp_path / "logs", [replace(session(seconds=1.0)[0], role="identify")])
     with pytest.raises(UsageError) as refused:
         extended(folder, tmp_path / "out", *causes)
     assert words in str(refused.value).lower()
 
 
+@pytest.mark.slow
 def test_a_load_that_the_reference_logs_do_not_show_is_refused_with_what_they_say(tmp_path: Path) -> None:
     """They were there to be asked: nobody is told to name some."""
-    folder = written(tmp_path / "logs", (*session(), *healthy_again(session(seed=5))))
+    folder = written(tmp_path / "logs", (*session(seconds=2.0), *healthy_again(session(seconds=2.0, seed=5))))
     outcome = extended(folder, tmp_path / "out", "payload")
     ((cause, reason),) = [(one.cause, one.reason) for one in outcome.result.rejected]
     assert (cause, outcome.result.findings, outcome.exit_code) == ("payload", (), 1)
@@ -173,7 +170,7 @@ def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], wo
                                                  monkeypatch: pytest.MonkeyPatch) -> None:
     """C02, by the option's name, before any log is examined."""
     monkeypatch.setattr(extend, "examined", lambda *given: pytest.fail("was not refused at once"))
-    folder = written(tmp_path / "logs", session())
+    folder = written(tmp_path / "logs", session(seconds=2.0))
     with pytest.raises(UsageError) as refused:
         run_stage(extend.STAGE, Request((folder,), out=tmp_path / "out", no_report=True),
                   extend.Settings(causes=("cogging:2",), **settings))  # type: ignore[arg-type]

@@ -54,6 +54,7 @@ def test_rests_do_not_count_as_sliding(shared: Path, tmp_path: Path) -> None:
     assert joint["drift"] is None
 
 
+@pytest.mark.slow
 def test_a_coarse_encoder_is_given_longer_windows(shared: Path, tmp_path: Path) -> None:
     """Case 26: 2 mrad a count. The inertia is 0.5 kg m² within two of its standard deviations, and these are below 2 %."""
     (joint,) = fitted(shared, tmp_path, "26", "coulomb+viscous")["joints"]
@@ -138,6 +139,7 @@ def test_friction_that_jumps_is_named_with_its_instant() -> None:
     assert np.all(apart <= 0.01 * np.abs(machine.friction(speed)))
 
 
+@pytest.mark.slow
 def test_a_step_between_speeds_driven_in_order_is_no_bend_of_the_curve() -> None:
     """A free choice of laws finds the step, and the curve before it beyond the speeds that were driven before."""
     machine = MACHINES["ordered"]

@@ -49,7 +49,7 @@ def gates(result: Result) -> dict[str, Check]:
 
 @pytest.fixture(scope="module")
 def good() -> ExperimentLog:
-    return recorded("coulomb+viscous", 4)
+    return recorded("coulomb+viscous", 4, duration=10.0)
 
 
 @pytest.fixture(scope="module")
@@ -121,8 +121,7 @@ def test_the_derived_log_holds_the_friction(outcome: Outcome[Result]) -> None:
 @pytest.mark.parametrize("method", ["varpro", pytest.param("output-error", marks=pytest.mark.slow), "ekf"])
 def test_three_methods(method: str) -> None:
     """Each gives inertia to 1 % and the curve to 1.2 % on a log of its own."""
-    law = None if method != "ekf" else "three_sigmoid"
-    (joint,) = computed(recorded("three_sigmoid", 5), settings=Settings(law=law or "three_sigmoid", method=method)).joints
+    (joint,) = computed(recorded("three_sigmoid", 5, duration=10.0), settings=Settings(law="three_sigmoid", method=method)).joints
     assert joint.method == method
     assert joint.inertia.value == pytest.approx(INERTIA, rel=0.01)
     assert relative(joint.series.curve, TRUTHS["three_sigmoid"].curve(joint.series.speed)) < 0.012

@@ -90,6 +90,7 @@ def test_a_spring_in_a_joint_under_pd(shared: Path) -> None:
     assert one.parameters["motor_inertia"].value == pytest.approx(truth["drive_inertia"], rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_gap_is_no_spring(shared: Path) -> None:
     """Joint 2 with a gap of 2.2 mrad: left open, with gap and spring among the candidates."""
     found = _found(shared, "04", (2,))

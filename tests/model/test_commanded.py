@@ -96,7 +96,7 @@ def test_a_torque_of_another_clock_is_told_with_its_time(late: int, words: str) 
     assert all(f"tau of joint 2 is stamped {words} the controller" in message for _, message in found)
 
 
-@pytest.mark.parametrize("time_constant", [5e-3, 1e-2, 3e-2])
+@pytest.mark.parametrize("time_constant", [5e-3, *(pytest.param(x, marks=pytest.mark.slow) for x in (1e-2, 3e-2))])
 def test_a_recorder_that_smooths_is_a_cause_and_no_other_clock(time_constant: float) -> None:
     """As late as a shift of so many milliseconds, and not the same: `diagnose` names it."""
     log = recorded()

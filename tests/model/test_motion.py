@@ -116,7 +116,7 @@ def refused_or_found(log: ExperimentLog, method: str) -> Reconstructed | None:
 
 
 @pytest.mark.parametrize("row", [f.row for f in FAULTS if f.row[0] in "TD"])
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", [pytest.param(m, marks=() if m == "smoother" else pytest.mark.slow) for m in METHODS])
 def test_whatever_is_wrong_with_a_log(row: str, method: str) -> None:
     """Rows T and D: the motion is finite at every sample, or the log is refused with a code; NumPy warns of nothing."""
     fault = next(f for f in FAULTS if f.row == row)

@@ -34,8 +34,8 @@ def sweeping(seed: int) -> ExperimentLog:
     return record(machine, [], [experiments.free(machine, seed, duration=8.0)], seed=seed)[0]
 
 
-@pytest.mark.parametrize("seed", seeds(10, 2))
-@pytest.mark.parametrize("joint", [1, 2, 3])
+@pytest.mark.parametrize("seed", seeds(10))
+@pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_a_joint_that_reverses_alone_is_plausible(seed: int, joint: int) -> None:
     """30 logs of 10 machines, whose held joints' torque their neighbour's motion explains better than their own."""
     assert alarms(reversing(seed, joint)) == []
@@ -55,7 +55,7 @@ def test_swapped_torques_of_sweeps_are_named(seed: int, pair: tuple[int, int]) -
     assert found.startswith(f"RRID-S13 tau: columns {pair[0] + 1},{pair[1] + 1} fit swapped")
 
 
-@pytest.mark.parametrize("joint", [1, 2, 3])
+@pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
 def test_the_flipped_torque_of_a_joint_that_moves_alone_is_named(joint: int) -> None:
     log = reversing(2, joint)
     found = alarms(with_signal(log, tau=log.tau * np.where(np.arange(1, 4) == joint, -1.0, 1.0)))

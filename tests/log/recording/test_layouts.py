@@ -16,7 +16,7 @@ RIGHT = {
 
 
 LAYOUTS = [
-    pytest.param(layout, id=layout.name, marks=pytest.mark.slow if k % 4 and layout.name not in RIGHT else ())
+    pytest.param(layout, id=layout.name, marks=pytest.mark.slow if k % 12 and layout.name not in RIGHT else ())
     for k, layout in enumerate(load())
 ]
 

@@ -62,7 +62,13 @@ def motion_of(seed: int, moving: Array | None = None) -> Fourier:
 
 def experiment(seed: int, role: str = "identify", moving: Array | None = None, duration: float = 10.0) -> ExperimentLog:
     """10 s at 1 kHz: encoders of 1e-5 rad, torque noise of 20, 10, 5 mN m, torque averaged over each sample."""
-    return recorded(arm(), motion_of(seed, moving), duration, np.random.default_rng([4, seed]), name=f"excitation-{seed}",
+    return _experiment(seed, role, None if moving is None else tuple(moving.tolist()), duration)
+
+
+@lru_cache(maxsize=16)
+def _experiment(seed: int, role: str, moving: tuple[float, ...] | None, duration: float) -> ExperimentLog:
+    motion = motion_of(seed, None if moving is None else np.array(moving))
+    return recorded(arm(), motion, duration, np.random.default_rng([4, seed]), name=f"excitation-{seed}",
                     experiment="excitation", role=role, period=10.0)
 
 

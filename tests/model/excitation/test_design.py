@@ -114,6 +114,7 @@ def test_the_same_evaluations_give_the_same_design() -> None:
     assert one.trajectory.series.cosine.tobytes() != other.trajectory.series.cosine.tobytes()
 
 
+@pytest.mark.slow
 def test_an_interruption_keeps_the_best() -> None:
     """Stopped in the middle of the search, the design is the one that as many evaluations give."""
     task = _task(replace(Wishes(), harmonics=(12,)))

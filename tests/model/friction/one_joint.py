@@ -1,4 +1,4 @@
-"""A joint on its own, simulated here: friction written out, Runge-Kutta at 0.1 ms, encoder of 1e-5 rad, noise of the torque.
+"""A joint on its own, simulated here: friction written out, Runge-Kutta at 0.25 ms, encoder of 1e-5 rad, noise of the torque.
 
 Nothing of it is the project's: laws are plain functions of speed.
 """
@@ -68,7 +68,7 @@ def torque_plan(rng: np.random.Generator, duration: float, truth: Truth) -> Arra
 
 
 def driven(torque: Array, friction: Friction, inertia: float = INERTIA, gravity: tuple[float, float] = (SINE, COSINE),
-           start: tuple[float, float] = (0.0, 0.0), parts: int = 10, more: Callable[[float, float], float] | None = None) -> Array:
+           start: tuple[float, float] = (0.0, 0.0), parts: int = 4, more: Callable[[float, float], float] | None = None) -> Array:
     """Position and speed (samples, 2) under held torque (samples,).
 
     Args:

@@ -121,9 +121,15 @@ def test_a_hundred_and_twenty_waves_in_words() -> None:
         assert "about 120 cycles per revolution" in words
 
 
-def test_value_and_deviation_end_at_one_place() -> None:
+@pytest.fixture(scope="module")
+def rippled() -> JointFit:
+    """An eight times larger ripple than the one above."""
+    return fitted(held_back(lambda q, v: 8.0 * cogging(q, v), 4))
+
+
+def test_value_and_deviation_end_at_one_place(rippled: JointFit) -> None:
     """A deviation of 0.0004 needs the fourth place of its value, be it a zero."""
-    joint = joint_result(fitted(held_back(lambda q, v: 8.0 * cogging(q, v), 4)), "joint", "varpro")
+    joint = joint_result(rippled, "joint", "varpro")
     assert joint.ripple is not None
     ripple = replace(joint.ripple, inertia=Value(0.53002, 0.00037, "kg m^2"))
     (check,) = misfits((replace(joint, inertia=Value(0.5118, 0.0059, "kg m^2"), ripple=ripple),), "log")
@@ -135,6 +141,7 @@ def test_value_and_deviation_end_at_one_place() -> None:
     assert "0.0000302 ± 0.0000096 kg m^2" in check.message
 
 
+@pytest.mark.slow
 def test_friction_by_position_of_a_joint_that_goes_one_way_is_no_ripple() -> None:
     """What turns with the motion is not told from what does not where it never turns."""
     rng, truth = np.random.default_rng(9), TRUTHS["coulomb+viscous"]
@@ -146,12 +153,11 @@ def test_friction_by_position_of_a_joint_that_goes_one_way_is_no_ripple() -> Non
     assert fitted(as_log(np.round(states[:, 0] / ENCODER) * ENCODER, torque, "one-way")).ripple is None
 
 
-def test_inertia_is_right_again_with_the_ripple_known() -> None:
-    """An eight times larger ripple than the one above draws the inertia off; with the waves beside the law it is true to 1 %."""
-    found = fitted(held_back(lambda q, v: 8.0 * cogging(q, v), 4))
-    assert found.beside_ripple is not None
-    assert found.beside_ripple.beta[0] == pytest.approx(INERTIA, rel=0.01)
-    assert abs(found.fit.inertia - INERTIA) > 2.0 * abs(found.beside_ripple.beta[0] - INERTIA)
+def test_inertia_is_right_again_with_the_ripple_known(rippled: JointFit) -> None:
+    """The ripple draws the inertia off; with the waves beside the law it is true to 1 %."""
+    assert rippled.beside_ripple is not None
+    assert rippled.beside_ripple.beta[0] == pytest.approx(INERTIA, rel=0.01)
+    assert abs(rippled.fit.inertia - INERTIA) > 2.0 * abs(rippled.beside_ripple.beta[0] - INERTIA)
 
 
 @pytest.mark.parametrize(("law", "fit"), [pytest.param(law, fit, marks=() if (law, fit) == _FAST else pytest.mark.slow)

@@ -17,7 +17,7 @@ from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array
 from tests.model.friction.one_joint import INERTIA, JOINT, recorded
 
-T = np.arange(1500) * 1e-3
+T = np.arange(500) * 1e-3
 TORQUE = 2.0 * np.sin(2 * np.pi * 0.9 * T) + 0.6 * np.sin(2 * np.pi * 2.3 * T)
 
 

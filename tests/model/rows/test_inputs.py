@@ -12,7 +12,15 @@ from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import session
 from tests.healthy import with_signal
 
-FITTED, JUDGING = session()
+
+@pytest.fixture(scope="module")
+def fitted() -> ExperimentLog:
+    return session()[0]
+
+
+@pytest.fixture(scope="module")
+def judging() -> ExperimentLog:
+    return session()[1]
 
 
 def held(log: ExperimentLog, *joints: int) -> ExperimentLog:
@@ -21,34 +29,36 @@ def held(log: ExperimentLog, *joints: int) -> ExperimentLog:
     return with_signal(log, q=np.where(still, log.q[0], log.q))
 
 
-@pytest.mark.parametrize(("logs", "words"), [
-    (Logs((held(FITTED, 2),), (JUDGING,)), "joint 2 is held in the logs of role 'identify'"),
-    (Logs((FITTED,), (held(JUDGING, 1, 2, 3),)), "every joint is held in the logs of role 'validate'")])
-def test_logs_in_which_a_joint_does_not_move_say_nothing_of_it(logs: Logs, words: str) -> None:
+@pytest.mark.parametrize(("of_fitted", "of_judging", "words"), [
+    ((2,), (), "joint 2 is held in the logs of role 'identify'"),
+    ((), (1, 2, 3), "every joint is held in the logs of role 'validate'")])
+def test_logs_in_which_a_joint_does_not_move_say_nothing_of_it(
+        of_fitted: tuple[int, ...], of_judging: tuple[int, ...], words: str, fitted: ExperimentLog, judging: ExperimentLog) -> None:
     with pytest.raises(InputRejected, match=f"RRID-T08.*{words}, and moves in others"):
-        prepare(logs, Recipe())
+        prepare(Logs((held(fitted, *of_fitted),), (held(judging, *of_judging),)), Recipe())
 
 
-def test_a_joint_that_moves_in_one_of_them_is_fitted() -> None:
+def test_a_joint_that_moves_in_one_of_them_is_fitted(fitted: ExperimentLog, judging: ExperimentLog) -> None:
     """Free reversals of one joint after the other; and a log that judges only some."""
-    prepared = prepare(Logs((held(FITTED, 2), held(JUDGING, 1, 3)), (held(JUDGING, 3),)), Recipe())
+    prepared = prepare(Logs((held(fitted, 2), held(judging, 1, 3)), (held(judging, 3),)), Recipe())
     assert np.bincount(prepared.data.joint[prepared.data.counts], minlength=3).min() > 0
 
 
 @pytest.mark.parametrize("left", [0, 3])
-def test_a_log_of_which_saturated_torque_leaves_no_row_is_refused(left: int) -> None:
+def test_a_log_of_which_saturated_torque_leaves_no_row_is_refused(left: int, fitted: ExperimentLog) -> None:
     """Of a few samples between saturated ones none is left when they are thinned out."""
-    limit = np.array([joint.torque for joint in FITTED.robot.joints])
-    tau = np.tile(limit, (FITTED.n_samples, 1))
-    middle = slice(FITTED.n_samples // 2, FITTED.n_samples // 2 + left)
+    limit = np.array([joint.torque for joint in fitted.robot.joints])
+    tau = np.tile(limit, (fitted.n_samples, 1))
+    middle = slice(fitted.n_samples // 2, fitted.n_samples // 2 + left)
     tau[middle] = 0.5 * limit
     with pytest.raises(InputRejected, match="RRID-D05.*no sample is left: saturated torque touches"):
-        prepare(Logs((FITTED, with_signal(FITTED, tau=tau))), Recipe())
+        prepare(Logs((fitted, with_signal(fitted, tau=tau))), Recipe())
 
 
 @pytest.mark.parametrize(("settings", "words"), [
     (Recipe(min_speed=(20.0, 0.0, 0.0)), "no equation of joint 1 is left: its largest speed is"),
     (Recipe(cutoff_hz=1.0, decimation=200), "equations")])
-def test_too_few_equations_are_refused(settings: Recipe, words: str) -> None:
+def test_too_few_equations_are_refused(
+        settings: Recipe, words: str, fitted: ExperimentLog, judging: ExperimentLog) -> None:
     with pytest.raises(InputRejected, match=f"RRID-T08.*{words}"):
-        prepare(Logs((FITTED,), (JUDGING,)), settings)
+        prepare(Logs((fitted,), (judging,)), settings)

@@ -23,7 +23,7 @@ from pipelines.model.simulation import Noise, Plant, choose_step, run
 from pipelines.model.simulation.replicas import Simulated
 from tests.model.simulation.arms import KD, KP, experiment, rrr
 
-SAMPLES, FINE = 200, 32
+SAMPLES, FINE = 150, 16
 PD = Controller("pd", KP, KD, velocity="backward-difference")
 _SLIDES = Presliding(joint=2, distance=0.01, damping_time=0.004)
 _SPRING = Spring(joint=3, degree=1, highest=1)

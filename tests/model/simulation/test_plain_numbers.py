@@ -28,7 +28,7 @@ from pipelines.model.simulation.one_loop import OneLoop
 from pipelines.model.simulation.one_rrr import OneRRR
 from tests.model.simulation.arms import KD, KP, TS, experiment, rrr
 
-SAMPLES, MANY = 150, 9  # more replicas than are run one after the other
+SAMPLES, MANY = 100, 9  # more replicas than are run one after the other
 LAWS = {
     "Dahl": Presliding(joint=2, distance=0.01),
     "LuGre": Presliding(joint=2, distance=0.01, damping_time=0.004),
@@ -47,11 +47,18 @@ def plant(*more: Acting) -> Plant:
     return Plant.of(rrr().arm.extended(*more))
 
 
+ASKED = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
+NOISE = Noise(np.array([0.3, 0.2, 0.1]), np.array([1e-6, 2e-6, 3e-6]))
+
+
+def by_itself(arm: Plant) -> Array:
+    """(samples, joints) [rad] of one replica."""
+    return run(arm, ASKED, 4, NOISE, (7,)).true_q[0]
+
+
 def both(arm: Plant) -> tuple[Array, Array]:
     """(samples, joints) [rad] of one replica by itself, and of the same among many."""
-    asked = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
-    noise = Noise(np.array([0.3, 0.2, 0.1]), np.array([1e-6, 2e-6, 3e-6]))
-    return run(arm, asked, 4, noise, (7,)).true_q[0], run(arm, asked, 4, noise, (7, *range(MANY))).true_q[0]
+    return by_itself(arm), run(arm, ASKED, 4, NOISE, (7, *range(MANY))).true_q[0]
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -61,7 +68,7 @@ def test_alone_and_among_many(name: str) -> None:
     assert [joint for joint, _ in arm.own_memories] == [(LAWS[name].joint or 0) - 1]
     alone, among = both(arm)
     np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
-    assert np.abs(alone - both(plant())[0]).max() > 1e-4
+    assert np.abs(alone - by_itself(plant())).max() > 1e-4
 
 
 def test_several_memories_beside_a_load_without() -> None:
@@ -109,7 +116,7 @@ def test_loads_of_single_joints_beside_a_body_that_takes_arrays() -> None:
     assert len(arm.own_loads) == 2
     alone, among = both(arm)
     np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
-    assert np.abs(alone - both(leaning())[0]).max() > 1e-5
+    assert np.abs(alone - by_itself(leaning())).max() > 1e-5
 
 
 def test_an_arm_that_runs_away_says_so_whatever_its_loads_make_of_it() -> None:
@@ -125,8 +132,7 @@ def test_what_remembers_more_numbers_takes_arrays() -> None:
     assert len(arm.own_memories) == 1
     assert not OneRRR.fits(arm)
     assert OneHooked.fits(arm)
-    asked = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
-    assert not OneLoop.fits(arm, asked)
+    assert not OneLoop.fits(arm, ASKED)
     alone, among = both(arm)
     np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
 
@@ -148,7 +154,7 @@ def test_a_command_on_its_way_to_the_joints(names: tuple[str, ...]) -> None:
     assert len(arm.drives) == len(names)
     alone, among = both(arm)
     np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
-    assert np.abs(alone - both(plant(acting(LAWS["LuGre"])))[0]).max() > 1e-5
+    assert np.abs(alone - by_itself(plant(acting(LAWS["LuGre"])))).max() > 1e-5
 
 
 def test_the_order_of_drives_is_that_in_which_they_act() -> None:
@@ -168,19 +174,18 @@ def test_the_rate_of_a_number_is_that_of_an_array(name: str) -> None:
     assert memory is not None
     assert hooks.rate is not None
     assert hooks.load is not None
-    rng = np.random.default_rng(3)
+    rng, unmoved = np.random.default_rng(3), plant().prepared(1).motion(np.zeros(1), np.zeros((3, 1)), np.zeros((3, 1)))
     for v in (0.0, 1e-3, -1e-3, *rng.uniform(-2.0, 2.0, 20).tolist()):
         for u in (0.0, 1.0, -1.0, 1.0 + 1e-9, -1.2, *rng.uniform(-1.1, 1.1, 10).tolist()):
-            still = rrr_motion(v, law.joint or 0)
+            still = moving_alone(unmoved, v, law.joint or 0)
             rate = hooks.rate(still, np.zeros((1, 3)), np.array([[u]]))[0, 0]
             assert memory.rate(u, v) == pytest.approx(rate, rel=1e-12, abs=1e-15)
             load = hooks.load(still, np.array([[u]]))[0, (law.joint or 0) - 1]
             assert memory.load(u, memory.rate(u, v)) == pytest.approx(load, rel=1e-12, abs=1e-15)
 
 
-def rrr_motion(speed: float, joint: int) -> Motion:
+def moving_alone(unmoved: Motion, speed: float, joint: int) -> Motion:
     """One sample, in which joint number `joint` moves alone."""
-    moving = plant().prepared(1).motion(np.zeros(1), np.zeros((3, 1)), np.zeros((3, 1)))
     dq = np.zeros((1, 3))
     dq[0, joint - 1] = speed
-    return replace(moving, dq=dq)
+    return replace(unmoved, dq=dq)

@@ -57,7 +57,7 @@ def test_the_chosen_step_costs_a_tenth_of_noise_at_most(sharpness: float | None)
 def test_a_step_for_several_experiments_is_fine_enough_for_each() -> None:
     """A crawl takes fewer steps than a wave that reverses; of another sample time it has a step of its own."""
     arm, _ = dry(2000.0)
-    quick, crawl = experiment(PD, 600), experiment(PD, 600)
+    quick, crawl = experiment(PD, 250), experiment(PD, 250)
     crawl = replace(crawl, q_ref=crawl.q_ref[0] + 1e-3 * (crawl.q_ref - crawl.q_ref[0]), dq_ref=1e-3 * crawl.dq_ref)
     each = [choose_step(Plant.of(arm), one, NOISE).per_sample for one in (quick, crawl)]
     assert each[0] != each[1]
