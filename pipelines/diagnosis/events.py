@@ -19,7 +19,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import Event
 
-__all__ = ["DIRECTIONS", "Window", "standing_out"]
+__all__ = ["DIRECTIONS", "Window", "standing_out", "windows_of"]
 
 _TOUCHED = 0.01  # numerics: of the largest effect of a push, from which a row is touched by it
 DIRECTIONS = 3  # components of a force
@@ -55,19 +55,21 @@ def standing_out(
     at its moment.
     """
     best, gains = None, list[float]()
-    for log in range(len(rows.data.logs)):
-        there = best_window(rows, dictionary, arm, residual, log)
-        if there is None:
+    for log, one in enumerate(rows.data.logs):
+        windows = windows_of(rows, dictionary, arm, residual, log)
+        if not windows:
             continue
+        there = max(windows, key=lambda window: window.gain)
         best = there if best is None or there.gain > best.gain else best
-        rest = [np.where(np.isin(np.arange(len(r)), there.touched), 0.0, r) for r in residual]
-        for half in _halves(rows, log):
-            own = best_window(rows, dictionary, arm, [r * half for r in rest], log)
-            gains.append(0.0 if own is None else own.gain)
+        others = [w for w in windows if not np.isin(w.touched, there.touched).any()]
+        middle = there.rows.start + one.rows // 2
+        for half in (False, True):
+            own = [w.gain for w in others if (w.touched.mean() > middle) == half]
+            gains += [max(own)] if own else []
     if best is None or best.gain < config.relevance**2 * _power(rows, best.touched):
         return None
     bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
-    if best.gain <= max(bound, upper_point(gains, config.alpha)):
+    if best.gain <= max(bound, upper_point(gains, config.alpha) if gains else 0.0):
         return None
     return replace(best, free=_free(rows, best, residual))
 
@@ -93,24 +95,13 @@ def _power(rows: Rows, touched: Indices) -> float:
     return sum(float(y[touched] @ y[touched]) for y in rows.y)
 
 
-def _halves(rows: Rows, log: int) -> tuple[Array, Array]:
-    """Return the first and the second half of a log, 1 or 0 on each row of a joint."""
-    place = np.concatenate(
-        [
-            np.where(k == log, np.arange(one.rows) * 2 // max(one.rows, 1), -1)
-            for k, one in enumerate(rows.data.logs)
-        ]
-    )
-    return (place == 0).astype(np.float64), (place == 1).astype(np.float64)
-
-
-def best_window(
+def windows_of(
     rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], log: int
-) -> Window | None:
-    """Return the best window of a log."""
+) -> list[Window]:
+    """Return windows of a log in which the residual is large, with what a push explains there."""
     event = None if dictionary.event is None else dictionary.event.shapes[0]
     if not isinstance(event, Event):
-        return None
+        return []
     data, one = rows.data, rows.data.logs[log]
     first = sum(other.rows for other in data.logs[:log])
     weight = by_joint(rows.weight, rows.joint, rows.n_joints)
@@ -127,4 +118,4 @@ def best_window(
         push = np.tensordot(amplitudes, columns, 1)
         place = slice(first, first + one.rows)
         found.append(Window(gain, shape, amplitudes, data.first + log, touched, place, push))
-    return max(found, key=lambda window: window.gain, default=None)
+    return found

@@ -19,7 +19,7 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.events import best_window
+from pipelines.diagnosis.events import windows_of
 from pipelines.diagnosis.screening import best_of, screen
 from pipelines.diagnosis.table import Array, Arrow, Indices, Structure, Table
 from pipelines.model.arm import Arm
@@ -162,11 +162,12 @@ def _less_events(
     """Return a residual (rows of each joint) less the push that explains most of each log."""
     out = [r.copy() for r in left]
     for log in range(len(rows.data.logs)):
-        window = best_window(rows, dictionary, arm, left, log)
-        if window is None:
+        windows = windows_of(rows, dictionary, arm, left, log)
+        if not windows:
             continue
-        for own, push in zip(out, window.push, strict=True):
-            own[window.rows] -= push
+        best = max(windows, key=lambda window: window.gain)
+        for own, push in zip(out, best.push, strict=True):
+            own[best.rows] -= push
     return out
 
 
