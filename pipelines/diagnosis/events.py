@@ -117,5 +117,6 @@ def windows_of(
         touched = np.flatnonzero(size > _TOUCHED * size.max()) + first
         push = np.tensordot(amplitudes, columns, 1)
         place = slice(first, first + one.rows)
-        found.append(Window(gain, shape, amplitudes, data.first + log, touched, place, push))
+        if len(touched):
+            found.append(Window(gain, shape, amplitudes, data.first + log, touched, place, push))
     return found
