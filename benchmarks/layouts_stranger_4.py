@@ -97,7 +97,8 @@ def catman_ascii(folder: Path, run: Run) -> Answer:
     specs = "Zeit 1 - schnelle Messrate [s]=t; *Winkel_{} [°]=q°; *Drehmoment_{} [Nm]=tau; Temperatur_Öl [°C]=oil"
     head = "HBM_CATMAN_DATAFILE_40\nDatum:\t03.05.2024 14:02:11\nKommentar:\tDoppelpendel, Lauf 7\nPrüfer:\tMs\n"
     head += f"Anzahl Kanäle:\t6\nMaximale Kanallänge:\t{len(run.t)}\n\n"
-    how = {"head": head, "sep": "\t", "decimal": ",", "float_format": "%.6f", "encoding": "cp1252", "data": {"oil": 31.5 + 0.1 * run.t}}
+    how = {"head": head, "sep": "\t", "decimal": ",", "float_format": "%.6f", "encoding": "cp1252"}
+    how["data"] = {"oil": 31.5 + 0.1 * run.t}
     return recorded(folder, run, "lauf7.asc", {"Zeit 1 - schnelle Messrate [s]": "s"}, specs, **how)
 
 
