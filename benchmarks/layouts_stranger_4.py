@@ -115,7 +115,7 @@ def melfa_oscillograph(folder: Path, run: Run) -> Answer:
     right = {}
     for role, word in (("q_ref", "Position command"), ("q", "Position feedback")):
         right[role] = (Signal(names(f"J{{}} {word}", 4), ("deg,deg,mm,deg",)),)
-    state(right, "J{} Current feedback", range(1, 5), "current:%")
+    state(right, "J{} Current feedback", range(1, 5), "current:?")
     table(folder / "osc.csv", columns, float_format="%.4f")
     return Answer("osc.csv", {"Time [msec]": "*"}, right=right)
 
@@ -125,7 +125,7 @@ def rexroth_scope(folder: Path, run: Run) -> Answer:
     """IndraWorks oscilloscope: Sercos numbers, time from before the trigger, Deg, Rpm of the axis, % of rated torque."""
     specs = "Time [ms]=pre; *Axis{} S-0-0047 Position command value [Deg]=q_ref°;"
     specs += "*Axis{} S-0-0051 Position feedback value 1 [Deg]=q°; *Axis{} S-0-0040 Velocity feedback value [Rpm]=rpm:dq:rpm;"
-    specs += "*Axis{} S-0-0084 Torque/force feedback value [%]=load:current:%"
+    specs += "*Axis{} S-0-0084 Torque/force feedback value [%]=load:current:?"
     data = {"pre": 1e3 * run.t - 1000.0, "rpm": run.dq * 30 / np.pi, "load": percent(run)}
     head = "IndraWorks oscilloscope\nDate;03.05.2024\nTrigger;Axis1 S-0-0047;rising\nTime resolution;250 us\n\n"
     how = {"head": head, "sep": ";", "float_format": "%.5f"}
@@ -326,7 +326,7 @@ def tia_trace(folder: Path, run: Run) -> Answer:
 def rockwell_trend(folder: Path, run: Run) -> Answer:
     """Studio 5000 trend: lines of key and value, Header: and Data in the first column, 14:02:11;250; torque in %."""
     specs = "Date=stamp; Time=clock; *Axis{}.CommandPosition=q_ref°; *Axis{}.ActualPosition=q°; *Axis{}.ActualVelocity=dq°;"
-    specs += "*Axis{}.TorqueReference=load:current:%"
+    specs += "*Axis{}.TorqueReference=load:current:?"
     times = pd.Timestamp("2024-05-03 14:02:11.250") + pd.to_timedelta(values(run)["ms"], unit="ms")
     clock = np.array([f"{s:%H:%M:%S};{s.microsecond // 1000:03d}" for s in times])
     columns, right = wide(run, specs, stamp="05/03/2024", clock=clock, load=percent(run))
@@ -421,7 +421,7 @@ def power_pmac_gather(folder: Path, run: Run) -> Answer:
 def sysmac_trace(folder: Path, run: Run) -> Answer:
     """Omron Sysmac's data trace: MC_Axis000.Act.Pos in deg, .Cmd.Pos, .Act.Vel, .Act.Trq, which is in %; no unit."""
     specs = "Time[ms]=ms; *MC_Axis00{}.Cmd.Pos=q_ref°; *MC_Axis00{}.Act.Pos=q°; *MC_Axis00{}.Act.Vel=dq°;"
-    specs += "*MC_Axis00{}.Act.Trq=load:current:%"
+    specs += "*MC_Axis00{}.Act.Trq=load:current:?"
     head = "Data Trace,Trace0\nSampling,2ms\n\n"
     data = {"load": np.round(percent(run), 1)}
     return recorded(folder, run, "trace0.csv", {"Time[ms]": "ms"}, specs, range(6), joint_wise=True, data=data, head=head)
