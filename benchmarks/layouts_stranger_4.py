@@ -386,7 +386,7 @@ def newest_first(folder: Path, run: Run) -> Answer:
     specs = "ts=stamp; *j{}_pos_deg=q°; *j{}_vel_degs=dq°; *j{}_trq_nm=tau"
     columns, right = wide(run, specs, stamp=np.array([f"{s:%Y-%m-%dT%H:%M:%S}.{s.microsecond // 1000:03d}Z" for s in times]))
     pd.DataFrame(columns)[::-1].to_csv(folder / "query.csv", index=False, float_format="%.6f")
-    return Answer("query.csv", {"ts": "*"}, right=right)
+    return Answer("query.csv", {"ts": "*"}, right=right, table=False)  # a refusal that says so serves
 
 
 @layout(DIGGER, rate=100.0, how="points")
