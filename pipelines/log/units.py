@@ -9,7 +9,7 @@ from typing import Final
 
 from pipelines.errors import InputRejected, did_you_mean
 
-__all__ = ["UNITS", "Unit", "canonical_unit", "to_si"]
+__all__ = ["UNITS", "Unit", "canonical_unit", "of_rated", "to_si"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,8 @@ _WORDS: Final = ((r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"), (r"\bmilli[
                  (r"\boz(?=[ -])", "ozf"), (r"(?<=f)-", " "), (r"^([mcuk]?)n[ .-]?m$", r"\1N m"))  # fmt: skip
 
 
+_SHARE: Final = re.compile(r"(\d*\.?\d+)?\s*(%|‰|pct|per ?cent)", re.IGNORECASE)
+_RATED: Final = {"torque": "N m", "current": "A", "velocity": "rad/s"}
 _NO_WORDS: Final = re.compile(r"[013-9]|^.?$")  # of a unit; "s2" has a digit
 
 
@@ -106,6 +108,15 @@ def _in_words(name: str) -> str:
     return found if found in UNITS and len(name) > 1 and not name.startswith("MN") else name
 
 
+def of_rated(unit: str, quantity: str) -> str:
+    """Say how the recipe takes a share of a rated torque, current or speed, as drives count in; "" where `unit` is none."""
+    found = _SHARE.fullmatch(unit.strip())
+    if found is None or quantity not in _RATED:
+        return ""
+    parts = (1000.0 if found[2] == "‰" else 100.0) / float(found[1] or 1)
+    return f"scale = rated {quantity} / {parts:g}, one a joint, from the drive's data sheet, and unit = '{_RATED[quantity]}'"
+
+
 def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
     """The conversion of `unit` for a signal of `quantity` ("position", "torque", …).
 
@@ -115,6 +126,8 @@ def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
     name = canonical_unit(unit)
     accepted = [known for known, value in UNITS.items() if value.quantity == quantity]
     found = UNITS.get(name)
+    if share := of_rated(str(unit), quantity):
+        raise InputRejected("S05", f"'{unit}' is a share of what the drive is rated for", where=where, remedy=f"declare {share}")
     if found is None or found.quantity != quantity:
         what = f"unknown unit '{unit}'{did_you_mean(name, UNITS)}" if found is None else f"'{unit}' is a unit of {found.quantity}"
         raise InputRejected("S05", f"{what}; {quantity} needs one of {', '.join(accepted)}", where=where,

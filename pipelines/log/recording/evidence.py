@@ -15,7 +15,7 @@ from pipelines.log.experiment import Array
 from pipelines.log.recording.link_evidence import LinkFit, best_unit, unlike_links
 from pipelines.log.recording.recipe_reader import BLANK
 from pipelines.log.robot import Joint
-from pipelines.log.units import UNITS
+from pipelines.log.units import UNITS, of_rated
 
 __all__ = [
     "Guess",
@@ -179,9 +179,11 @@ def _denied(named: str, slope: Slope | None, speed: str | None, fits: Mapping[st
     return ""
 
 
-def unknown_unit(named: str) -> Guess:
-    """An open unit: what the file says is no unit of the signal."""
-    return Guess("", "unsure", f"its name or header says '{named}', which is no unit that import knows here")
+def unknown_unit(named: str, quantity: str = "") -> Guess:
+    """An open unit: what the file says is no unit of the signal, or a share of a rated value."""
+    share = of_rated(named, quantity)
+    return Guess("", "unsure", f"its name or header says '{named}', " + (f"a share: {share}" if share else
+                 "which is no unit that import knows here"))
 
 
 def _inside(q: Array, joint: Joint) -> bool:
@@ -340,7 +342,7 @@ def torque_unit(tau: Array, named: str | None, current: bool, fit: LinkFit | Non
     peak = float(np.abs(tau).max())
     unit = named or "N m"
     if named is not None and (named not in UNITS or UNITS[named].quantity not in ("torque", "current")):
-        return unknown_unit(named)
+        return unknown_unit(named, "current" if current else "torque")
     if named is None and current:
         return Guess("", "unsure", f"named a current; up to {peak:.4g}: A, mA, or a share of the drive's rated current?")
     off = "" if fit is None or unit not in UNITS or current else unlike_links(fit, UNITS[unit].factor, named is not None)

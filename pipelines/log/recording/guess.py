@@ -295,7 +295,8 @@ class _Drafting:
         found = [*([choice.group] if choice.group else []), *choice.others]
         if not found:
             lines[0] += "   # no column looks like it"
-            return lines
+            left = [f"{clean(name, 40)} ({clean(text, 80)})" for name, text in self.reading.table.text.items()]
+            return [*lines, f"    # no columns of numbers: {', '.join(left[:5])}"] if left else lines
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
         lines += [f"    # {doubt}"] if doubt else []
         if all(group.origin == "commanded" for group in found):

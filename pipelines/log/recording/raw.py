@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import itertools
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,7 @@ from pipelines.log.recording.header import split_unit
 
 __all__ = ["RawTable", "columns_of_arrays", "expand", "unstacked"]
 
+_PART = re.compile(r"_\d+$|\[\d+\]$")  # of an array
 _MOST_KEYS = 32  # joints, servos or environments in turn
 _SEPARATE = 0.5  # mean step from key to key over that from row to row: 1 for noise, more for one motion
 _ROUNDED = 1e-3  # of a clock's step: what rounding may take
@@ -60,9 +62,10 @@ class RawTable:
                 raise InputRejected("S01", f"no column {column}; the file has {len(ordered)} columns of numbers", where=self.source,
                                     remedy="columns count from 1; correct the recipe")
             return ordered[column - 1]
-        if column in self.text:
-            raise InputRejected("S12", f"column '{column}' holds no numbers but '{self.text[column]}'", where=self.source,
-                                remedy="export it as numbers, or choose another column")
+        whole = column if column in (*self.columns, *self.text) else _PART.sub("", column)  # an array that is no columns
+        if whole in self.text:
+            raise InputRejected("S12", f"column '{whole}' holds no numbers but '{self.text[whole]}'", where=self.source,
+                                remedy="export it as numbers, one row a sample, or choose another column")
         if column not in self.columns:
             raise InputRejected("S01", f"no column '{column}'{did_you_mean(column, names)}; there are {', '.join(names[:40])}",
                                 where=self.source, remedy=self._remedy(column, wanted))

@@ -232,7 +232,7 @@ def _parse_slowly(lines: list[Line], dialect: Dialect, names: tuple[str, ...], s
             if (arrays := _arrays([row[j] for row in cells])) is not None:
                 columns |= {f"{name}[{k}]": values for k, values in enumerate(arrays.T)}
                 continue
-            words[name] = cells[bad[0]][j][:40]
+            words[name] = _lengths([row[j] for row in cells]) or cells[bad[0]][j][:40]
             if (period := _period([row[j] for row in cells])) is not None:
                 labels[name] = cells[0][j] if period == 1 else tuple(row[j] for row in cells[:period])
         else:
@@ -260,11 +260,21 @@ def _with_units(cells: list[str]) -> tuple[Array, str] | None:
 
 def _arrays(cells: list[str]) -> Array | None:
     """Arrays of one length in the cells of a column, as Python and numpy write them: "[0.1, 0.2]". (cells, length)"""
-    if not all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells):
-        return None
-    rows = [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells]
+    rows = _lists(cells)
     alike = len({len(row) for row in rows}) == 1 and all(is_number(number) for row in rows for number in row)
     return np.array(rows, dtype=np.float64) if alike else None
+
+
+def _lists(cells: list[str]) -> list[list[str]]:
+    """The items of arrays in cells, none where a cell is no array."""
+    arrays = all(cell[:1] + cell[-1:] in ("[]", "()") for cell in cells)
+    return [re.split(r"[\s,;]+", cell[1:-1].strip(" ,")) for cell in cells] if arrays else []
+
+
+def _lengths(cells: list[str]) -> str:
+    """Say of how many items the arrays in cells are where that differs, as where two publishers share a topic."""
+    found = sorted({len(row) for row in _lists(cells)})
+    return f"arrays of {found[0]} to {found[-1]} items: keep the rows of one kind" if len(found) > 1 else ""
 
 
 def _clock_times(cells: list[str]) -> tuple[Array, str] | None:

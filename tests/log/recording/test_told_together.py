@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.recorded_arm import TWO, simulate
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.log.files import find_logs, open_log
 from pipelines.log.recording.guess import guess_recipe
@@ -120,3 +121,32 @@ def test_a_unit_that_is_not_known_is_asked_for(tmp_path: Path, names: dict[str, 
     columns = {names.get(name.split("_")[0], name).format(name[-1]): values for name, values in good().items()}
     draft = guess_recipe(write(tmp_path, text(columns)))
     assert draft.blanks == ("robot.use", blank)
+
+
+def test_a_share_of_a_rated_torque_is_scaled_as_the_refusal_says(tmp_path: Path) -> None:
+    """A drive counts torque in per cent of a rated one, which is no unit, and no file states it."""
+    columns = good()
+    rated = np.array([50.0, 20.0, 8.0])
+    shares = {f"tau_{j}": 100.0 * columns[f"tau_{j}"] / rated[j - 1] for j in (1, 2, 3)}
+    write(tmp_path / "data", text(columns | shares))
+    line = next(line for line in RECIPE.splitlines() if line.startswith("tau"))
+    with pytest.raises(InputRejected, match=r"RRID-S05.*scale = rated torque / 100.*unit = 'N m'"):
+        run(tmp_path / "data", RECIPE.replace(line, line.replace("N m", "%")))
+    scaled = line.replace('unit = "N m"', f'unit = "N m", scale = {(rated / 100).tolist()}')
+    out = run(tmp_path / "data", RECIPE.replace(line, scaled))
+    log = open_log(out.folder / "logs" / "run.h5").log
+    np.testing.assert_allclose(log.signals["tau"].values[:, 0], columns["tau_1"], atol=1e-6)
+
+
+def test_a_draft_names_arrays_that_are_one_sample_short(tmp_path: Path) -> None:
+    """A trajectory of N + 1 states has N inputs."""
+    moved = simulate(TWO, seed=5)
+    (tmp_path / "arm.urdf").write_text(TWO.urdf())
+    np.savez(tmp_path / "solution.npz", xs=np.column_stack([moved.q, moved.dq]), us=moved.tau[1:], dt=0.005)
+    assert "us (an array of shape (2399, 2), not of 2400 samples)" in guess_recipe(tmp_path / "solution.npz").text
+
+
+def test_a_draft_names_lists_of_two_publishers(tmp_path: Path) -> None:
+    rows = [f'{0.01 * k:.2f},"[0.1, {0.1 * k:.1f}]"\n{0.01 * k + 0.004:.3f},[0.3]\n' for k in range(300)]
+    (tmp_path / "run.csv").write_text("Time,position\n" + "".join(rows))
+    assert "position (arrays of 1 to 2 items: keep the rows of one kind)" in guess_recipe(tmp_path / "run.csv").text
