@@ -161,10 +161,11 @@ def _round(
     )
     if not tried:
         return replace(seen, follows=_place(next(iter(others))) if others else "")
-    pick, cause, stopped = _contest(later, state, tried, others, config)
+    apart = _apart(later, tried, others, baseline, config)
+    pick, cause, stopped = _contest(later, state, tried, others, apart, config)
     if pick is None:  # perhaps by another law of the same cause
         tried = [_other_form(later, state, one, config) for one in tried]
-        pick, cause, stopped = _contest(later, state, tried, others, config)
+        pick, cause, stopped = _contest(later, state, tried, others, apart, config)
     if pick is None:
         return replace(seen, stopped=stopped)
     chosen = _other_form(later, state, pick, config).state
@@ -215,6 +216,7 @@ def _contest(
     state: State,
     tried: Sequence[Candidate],
     others: Mapping[Key, State],
+    apart: Mapping[Key, Sequence[Key]],
     config: DiagnosisConfig,
 ) -> tuple[Candidate | None, Cause | None, str]:
     """Return the winner of the predictive scores with its alternatives, or why nothing wins."""
@@ -232,7 +234,8 @@ def _contest(
     kept, first = confidence_set(better, config), min(better, key=lambda key: better[key].sum())
     named = [one for one in tried if one.key in kept]
     if first in free or not named:
-        named = _nearly(later, state, tried, others, config)
+        beside = [one for one in tried if one.key in better and one.key in apart.get(first, ())]
+        named = _nearly(later, state, tried, others, config) or beside
     if not named:
         return None, None, f"{_place(first)} predicts better than {best}"
     pick = min(named, key=lambda one: scores[one.key].sum())
@@ -242,6 +245,31 @@ def _contest(
         return None, None, fails
     alike = tuple(one.key for one in named if one is not pick)
     return pick, Cause(pick.key, alike, probabilities(scores | free, config)), ""
+
+
+def _apart(
+    later: Later,
+    tried: Sequence[Candidate],
+    others: Mapping[Key, State],
+    baseline: Baseline,
+    config: DiagnosisConfig,
+) -> dict[Key, list[Key]]:
+    """Return of each shape without a name the causes that explain something else.
+
+    Beside it they are significant, and gain more than a share of what they gain alone.
+    """
+    out = {}
+    for shape, state in others.items():
+        beside = best_of(later.screened(state))
+        out[shape] = [
+            one.key
+            for one in tried
+            if one.key in beside
+            and beside[one.key].gain > config.share * one.gain
+            and beside[one.key].gain
+            > baseline.threshold(beside[one.key].group, beside[one.key].freedom, later.rows.count)
+        ]
+    return out
 
 
 def _nearly(
