@@ -68,6 +68,19 @@ def test_a_joint_that_loses_most_of_its_viscous_friction_tells_how_much_and_how_
     assert drift.values["time_constant"] == pytest.approx(2.0, rel=0.05)
 
 
+def nameless(motion: Motion) -> Array:
+    """Weak cogging at joint 2, and at joint 1 a torque that no cause of the library has: it rises and falls with the speed."""
+    out = 0.25 * wave(motion)
+    out[:, 0] += np.cos(5.0 * motion.dq[:, 0])
+    return out
+
+
+def test_what_is_surely_named_is_named_beside_a_larger_torque_without_a_name() -> None:
+    found = diagnosed(*logs(nameless), exclude=but("cogging"))
+    assert causes(found) == [("cogging", 2)]
+    assert "joint 1" in found.decision.reason
+
+
 def both(motion: Motion) -> Array:
     """Cogging at joint 2 and a drag at joint 1."""
     out = wave(motion).copy()
