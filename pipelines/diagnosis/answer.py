@@ -92,7 +92,11 @@ def answer(
         for cause, one in zip(causes, own, strict=True)
     ]
     findings = findings_of(worth, found.look.later, end, named_causes, found.responses)
-    limits = limits_of(found.look.later, end, found.look.baseline) if whole else Limits((), ())
+    limits = (
+        limits_of(found.look.later, end, found.look.baseline, found.config)
+        if whole
+        else Limits((), ())
+    )
     open_to = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
     named = {one.cause for one in findings}
     reference = prepared.reference is not None

@@ -22,8 +22,10 @@ class DiagnosisConfig:
     blocks_together: int = 3  # length of the moving blocks of the bootstrap, in blocks
     resamples: int = 400  # of the bootstrap
     friction_drift: float = 0.3  # relative std of friction between sessions
-    healthy: float = 0.001  # share of a joint's torque in which a healthy machine differs from any
-    # model: every drive ripples by a thousandth
+    healthy_share: float = (
+        0.001  # of a joint's torque, whitened as its noise, in which a healthy machine differs from
+        # any model: every drive ripples by a thousandth
+    )
     relevance: float = 0.02  # share of a cause's effect to which no law is exact
     variance_prior: float = 2.0  # pseudo-observations by which a variance is shrunk to its family's
     refits: int = 4  # candidates that are refitted exactly in a round
@@ -36,7 +38,8 @@ class DiagnosisConfig:
     knots: int = 10  # of the splines without a name
     event_candidates: int = 600  # windows that a search for a contact compares
     share: float = (
-        0.5  # of the excess residual, that causes have to explain where the rest does not fit
+        0.5  # of the excess residual, that causes have to explain where the rest does not fit; of
+        # what a cause gains, that is left beside a shape without a name that explains another thing
     )
     deviations: float = 2.0  # by which a number may lie outside its range and be taken for possible
     excess: float = (

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -20,11 +20,9 @@ from pipelines.diagnosis.table import Array, Indices, Table, by_joint
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
-from pipelines.model.effects.fast import mixing
 from pipelines.model.estimation.regression import Columns
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data, Kept, Whitening
-from pipelines.model.rows.exact import Exact, further_slopes
+from pipelines.model.rows.exact import Exact, further_slopes, nominal_slopes
 from pipelines.model.rows.nominal import fit_columns, fit_nominal, rows_of
 from pipelines.model.rows.prepare import Prepared
 
@@ -124,29 +122,9 @@ class Rows:
         return self.signal(model.torque(self.data))
 
     def mixed(self, model: Exact) -> Table | None:
-        """Return the slopes by the nominal numbers beside the effects; None: they are `nominal`.
-
-        A drive may mix or scale what it passes on, and what drifts is a share of the friction at
-        its joint.
-        """
-        every = [mixing(one.effect, one.values, self.n_joints) for one in model.effects]
-        found = [one for one in every if one is not None]
-        shares = [one for one in model.effects if one.drifts]
-        if not found and not shares:
-            return None
-        columns, kept = model.columns, list(model.columns.kept)
-        matrix = reduce(np.matmul, reversed(found), np.eye(self.n_joints))
-
-        def linear(motion: Motion) -> Array:
-            rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
-            laws = [law.columns(motion, columns.arm) for law in columns.laws]
-            table = np.concatenate([rigid, *laws], axis=2)
-            for one in shares:
-                for number in model.friction_at(one.effect.joint):
-                    table[:, :, number] += model.slope_of(one, number, motion)
-            return np.asarray(matrix @ table)
-
-        return self.table(self.data.lay(linear))
+        """Return the slopes by the nominal numbers beside the effects; None: they are `nominal`."""
+        slopes = nominal_slopes(model)
+        return None if slopes is None else self.table(self.data.lay(slopes))
 
     def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
         """Return the slopes of the torque by the numbers of the effects, and their names.

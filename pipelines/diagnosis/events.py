@@ -1,6 +1,6 @@
 """Find the window in which a push on the tip explains most of a residual.
 
-window = standing_out(rows, dictionary, arm, residual, config)
+window, other = push_of(rows, dictionary, arm, residual, config)
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import Event
 
-__all__ = ["DIRECTIONS", "Window", "standing_out", "windows_of"]
+__all__ = ["DIRECTIONS", "Window", "push_of", "windows_of"]
 
 _TOUCHED = 0.01  # numerics: of the largest effect of a push, from which a row is touched by it
 DIRECTIONS = 3  # components of a force
@@ -39,7 +39,7 @@ class Window:
     free: float = 0.0  # gain of any torque of each joint over the same time, less what that costs
 
 
-def standing_out(
+def _standing_out(
     rows: Rows,
     dictionary: Dictionary,
     arm: Arm,
@@ -65,13 +65,33 @@ def standing_out(
         middle = there.rows.start + one.rows // 2
         for half in (False, True):
             own = [w.gain for w in others if (w.touched.mean() > middle) == half]
-            gains += [max(own)] if own else []
+            gains.append(max(own, default=0.0))
     if best is None or best.gain < config.relevance**2 * _power(rows, best.touched):
         return None
     bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
-    if best.gain <= max(bound, upper_point(gains, config.alpha) if gains else 0.0):
+    if best.gain <= max(bound, upper_point(gains, config.alpha)):
         return None
     return replace(best, free=_free(rows, best, residual))
+
+
+def push_of(
+    rows: Rows,
+    dictionary: Dictionary,
+    arm: Arm,
+    residual: Sequence[Array],
+    config: DiagnosisConfig,
+) -> tuple[Window | None, str]:
+    """Return the push that stands out, or what does and is none.
+
+    A push on the tip acts on the joints in one proportion: where any other torque explains
+    relevantly more, something else happened at that moment.
+    """
+    window = _standing_out(rows, dictionary, arm, residual, config)
+    if window is None or window.free - window.gain < config.relevance * window.free:
+        return window, ""
+    log = rows.data.logs[window.log - rows.data.first].log.name
+    start = getattr(window.effect, "start", 0.0)
+    return None, f"what happened {start:.2f} s into {log} is not what a push on the tip does"
 
 
 def _free(rows: Rows, window: Window, residual: Sequence[Array]) -> float:

@@ -205,9 +205,9 @@ def _visibility(later: Later, end: State, place: int) -> float:
     rows, model = later.rows, end.model
     without = rows.torque(model.without(place))
     own = [a - b for a, b in zip(rows.torque(model), without, strict=True)]
-    moments = later.base.moments(own)
+    moments = end.known.base.moments(own)
     power = sum(float(x @ x) for x in own)
-    imitated = float(moments @ end.belief.after.solve(moments))
+    imitated = float(moments @ end.known.after.solve(moments))
     return float(np.sqrt(np.clip(1.0 - imitated / max(power, 1e-300), 0.0, 1.0)))
 
 

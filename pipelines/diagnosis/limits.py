@@ -1,6 +1,6 @@
 """Compute detection limits in closed form, and list causes that are not identifiable.
 
-    limits = limits_of(later, state, baseline)
+    limits = limits_of(later, state, baseline, config)
     causes = without_limit(result, frf)            those that no list of the result has
 
 A cause of amplitude a adds a² h to T_c, h its share of H_c (`screening`). It is found with
@@ -23,6 +23,7 @@ import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group, Key
+from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import (
     DetectionLimit,
@@ -78,11 +79,11 @@ class _Shape:
         return float(np.sqrt(max(self.hidden[0, 0], 0.0)) / max(self.length[0], 1e-300))
 
 
-def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
+def limits_of(later: Later, state: State, baseline: Baseline, config: DiagnosisConfig) -> Limits:
     """Return the limits beside the model that was found."""
     shapes: dict[Key, list[_Shape]] = {}
     norms = np.r_[state.known.base.norms, state.effects.norms]
-    cross = later.beside(state)
+    cross = later.cross_with(state)
     solved = state.factor.solve(cross)
     for group, square in zip(later.dictionary.groups, later.squares, strict=True):
         at, family = group.columns, later.dictionary.families.get(group.key)
@@ -95,7 +96,7 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
             _Shape(family.shapes[group.shape], hidden, length, part, group)
         )
     there = {(one.effect.name, one.effect.joint) for one in state.model.effects}
-    told = [_limit(later, own, baseline) for key, own in shapes.items() if key not in there]
+    told = [_limit(later, own, baseline, config) for key, own in shapes.items() if key not in there]
     return Limits(
         tuple(one for one in told if isinstance(one, DetectionLimit)),
         tuple(one for one in told if isinstance(one, NotIdentifiable)),
@@ -103,7 +104,7 @@ def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
 
 
 def _limit(
-    later: Later, shapes: Sequence[_Shape], baseline: Baseline
+    later: Later, shapes: Sequence[_Shape], baseline: Baseline, config: DiagnosisConfig
 ) -> DetectionLimit | NotIdentifiable:
     """Return the smallest of a cause that would have been found, or why none would."""
     visible = max(one.identifiability for one in shapes)
@@ -119,6 +120,10 @@ def _limit(
         reach = [np.sqrt(max(s.hidden[0, 0], 0.0)) / needed[s.freedom] for s in shapes]
         one = shapes[int(np.argsort(reach)[int(_QUARTER * (len(reach) - 1))])]
         least = needed[one.freedom] / np.sqrt(max(one.hidden[0, 0], 1e-300))
+        share = later.shares[later.dictionary.groups.index(one.group)]
+        acting = one.length[0] * np.sqrt(share)  # (joints,) length of its column
+        usual = later.usual(config) / np.maximum(acting, 1e-300)
+        least = max(least, float(usual.min()))
         return _told(later, one, least * np.eye(one.freedom)[0], visible)
     amplitudes = np.array(first.parameters.fixed)
     seen = [s for s in shapes if s.power(amplitudes) > needed[s.freedom] ** 2]

@@ -39,7 +39,7 @@ class State:
     model: Exact
     theta: Array  # nominal and standing numbers, scaled
     belief: Belief  # before the rows
-    known: Belief  # the same beside the effects, where slopes by nominal numbers are other ones
+    known: Belief  # the same, with the slopes by nominal numbers as drives and drift make them
     residual: tuple[Array, ...]  # of each joint, in units of the noise
     effects: Table  # slopes by the numbers of the effects, of unit length
     lasting: (
@@ -186,7 +186,7 @@ class Later:
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
-        cross = self.beside(state)
+        cross = self.cross_with(state)
         left = state.factor.solve(state.slope)  # zero where the fit has settled
         moments = self.candidates.moments(state.residual) - cross.T @ left
         found = screen(self.dictionary.groups, state.factor, cross, self.squares, moments)
@@ -194,7 +194,7 @@ class Later:
             found = [self._freely(state, one) for one in found]
         return [self._charged(one) if one.group.reads_torque else one for one in found]
 
-    def beside(self, state: State) -> Array:
+    def cross_with(self, state: State) -> Array:
         """Return the products of the slopes by all numbers of a state with the candidates."""
         base = state.known.base
         nominal = self.cross if base is self.base else base.gram(self.candidates)
@@ -209,6 +209,7 @@ class Later:
             belief = self.freed(state.belief, self._effect(one.group))
         columns = self.candidates.take(one.group.columns)
         size = _unit(columns.norms)
+        belief = self._exact(belief, state.model)
         more = Table.stacked([state.effects, columns.scaled(1.0 / size)])
         slope = np.r_[belief.slope(state.theta, state.residual), more.moments(state.residual)]
         step = belief.beside(more).solve(slope)
@@ -290,6 +291,19 @@ class Later:
         own = self.rows.data.counts & (self.rows.joint == (effect.joint or 1) - 1)
         return float(np.concatenate(acting)[own].mean()) > _HALF
 
+    def amplitudes_of(self, effect: Effect) -> int:
+        """Return how many amplitudes the effect has, in the form that is refitted."""
+        first = self.rows.data.logs[0].motion
+        some = replace(
+            first,
+            t=first.t[:8],
+            q=first.q[:8],
+            dq=first.dq[:8],
+            ddq=first.ddq[:8],
+            tau=None if first.tau is None else first.tau[:8],
+        )
+        return int(effect.columns(some, self.dataset.arm).shape[2])
+
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.
 
@@ -307,6 +321,15 @@ class Later:
             for torque in (own, whole)
         )
         return np.asarray(power / max(float(total.sum()), 1e-300))
+
+    def usual(self, config: DiagnosisConfig) -> Array:
+        """Return the length (joints,) of a torque, in units of the noise, that any machine has.
+
+        It is nothing with reference logs, which tell what this machine has.
+        """
+        if self.dataset.reference is not None:
+            return np.zeros(self.rows.n_joints)
+        return config.healthy_share * np.array([float(np.linalg.norm(y)) for y in self.rows.y])
 
     @cached_property
     def standing(self) -> Array:
@@ -400,7 +423,7 @@ class Later:
         return self._slopes(state.model)
 
     def _exact(self, belief: Belief, model: Exact) -> Belief:
-        """Return the belief where a drive passes on more, or less, than the torque of its joint."""
+        """Return the belief with the slopes by nominal numbers beside the effects of a model."""
         nominal = self.rows.mixed(model)
         if nominal is None:
             return belief

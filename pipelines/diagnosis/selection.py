@@ -15,7 +15,7 @@ import numpy as np
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.events import Window, standing_out
+from pipelines.diagnosis.events import Window, push_of
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
@@ -143,7 +143,7 @@ def _round(
     significant = _significant(
         later, state, [cause.key for cause in causes], explained, baseline, config
     )
-    touch, moment = _touch(later, state, config)
+    touch, moment = push_of(later.rows, later.dictionary, later.dataset.arm, state.residual, config)
     promising = _promising(later, state, significant, config)
     tried = [
         one
@@ -161,7 +161,7 @@ def _round(
     )
     if not tried:
         return replace(seen, follows=_place(next(iter(others))) if others else "")
-    apart = _apart(later, tried, others, baseline, config)
+    apart = _apart(later, state, significant, others, baseline, config)
     pick, cause, stopped = _contest(later, state, tried, others, apart, config)
     if pick is None:  # perhaps by another law of the same cause
         tried = [_other_form(later, state, one, config) for one in tried]
@@ -200,15 +200,10 @@ def _significant(
 
 
 def _slight(later: Later, one: Screened, config: DiagnosisConfig) -> bool:
-    """Return whether its torque is as small beside a joint's as healthy machines have some.
-
-    Reference logs tell what this machine has.
-    """
-    if later.dataset.reference is not None:
-        return False
+    """Return whether its torque is as small as healthy machines have some, at every joint."""
     torque = later.candidates.take(one.group.columns).times(one.amplitudes)
-    power = ((float(x @ x), float(y @ y)) for x, y in zip(torque, later.rows.y, strict=True))
-    return all(own < config.healthy**2 * whole for own, whole in power)
+    least = later.usual(config)
+    return all(float(np.linalg.norm(x)) <= own for x, own in zip(torque, least, strict=True))
 
 
 def _contest(
@@ -234,8 +229,9 @@ def _contest(
     kept, first = confidence_set(better, config), min(better, key=lambda key: better[key].sum())
     named = [one for one in tried if one.key in kept]
     if first in free or not named:
-        beside = [one for one in tried if one.key in better and one.key in apart.get(first, ())]
-        named = _nearly(later, state, tried, others, config) or beside
+        promising = [one for one in tried if one.key in better]
+        named = _nearly(later, state, promising, others, config)
+        named = named or _beside(promising, better, apart, config)
     if not named:
         return None, None, f"{_place(first)} predicts better than {best}"
     pick = min(named, key=lambda one: scores[one.key].sum())
@@ -244,30 +240,55 @@ def _contest(
     if "without" in pays and not pick.event:
         return None, None, fails
     alike = tuple(one.key for one in named if one is not pick)
-    return pick, Cause(pick.key, alike, probabilities(scores | free, config)), ""
+    rivals = {shape: v for shape, v in free.items() if pick.key not in apart[shape]}
+    return pick, Cause(pick.key, alike, probabilities(scores | rivals, config)), ""
+
+
+def _beside(
+    tried: Sequence[Candidate],
+    better: Mapping[Key, Array],
+    apart: Mapping[Key, Sequence[Key]],
+    config: DiagnosisConfig,
+) -> list[Candidate]:
+    """Return the causes that predict better than every shape that may explain the same.
+
+    What a shape without a name explains elsewhere takes no cause its name.
+    """
+    best = {}
+    for one in tried:
+        rivals = [k for k, separate in apart.items() if k in better and one.key not in separate]
+        if all(better[one.key].sum() < better[k].sum() for k in rivals):
+            best[one.key] = better[one.key]
+    kept = confidence_set(best, config) if best else []
+    return [one for one in tried if one.key in kept]
 
 
 def _apart(
     later: Later,
-    tried: Sequence[Candidate],
+    state: State,
+    significant: Mapping[Key, Screened],
     others: Mapping[Key, State],
     baseline: Baseline,
     config: DiagnosisConfig,
 ) -> dict[Key, list[Key]]:
-    """Return of each shape without a name the causes that explain something else.
+    """Return, for each shape without a name, the causes that explain something else than it does.
 
-    Beside it they are significant, and gain more than a share of what they gain alone.
+    Beside it they are significant, gain more than a share of what they gain alone, and more than
+    the shape leaves because no law is exact.
     """
     out = {}
-    for shape, state in others.items():
-        beside = best_of(later.screened(state))
+    for shape, other in others.items():
+        gains = {one.group: one.gain for one in later.screened(other)}
+        inexact = config.relevance * (state.cost - other.cost)
         out[shape] = [
-            one.key
-            for one in tried
-            if one.key in beside
-            and beside[one.key].gain > config.share * one.gain
-            and beside[one.key].gain
-            > baseline.threshold(beside[one.key].group, beside[one.key].freedom, later.rows.count)
+            key
+            for key, one in significant.items()
+            if gains[one.group]
+            > max(
+                config.share * one.gain,
+                inexact,
+                baseline.threshold(one.group, one.freedom, later.rows.count),
+            )
         ]
     return out
 
@@ -290,7 +311,7 @@ def _nearly(
         state.cost - one.cost - (one.effects.width - state.effects.width) * number
         for one in others.values()
     )
-    return [tried[best]] if free - saved[best] < config.relevance * free else []
+    return [tried[best]] if 0.0 < saved[best] > (1.0 - config.relevance) * free else []
 
 
 def _promising(
@@ -306,21 +327,6 @@ def _promising(
     worth = {key: named[key].gain + more for key, more in zip(named, taken, strict=True)}
     order = sorted(worth, key=lambda key: -worth[key])[: config.refits]
     return [named[key] for key in order if worth[key] > config.promising * worth[order[0]]]
-
-
-def _touch(later: Later, state: State, config: DiagnosisConfig) -> tuple[Window | None, str]:
-    """Return the push that stands out, or what does and is none.
-
-    A push on the tip acts on the joints in one proportion: where any other explains relevantly
-    more, something else happened at that moment.
-    """
-    rows = later.rows
-    touch = standing_out(rows, later.dictionary, later.dataset.arm, state.residual, config)
-    if touch is None or touch.free - touch.gain < config.relevance * touch.free:
-        return touch, ""
-    log = rows.data.logs[touch.log - rows.data.first].log.name
-    start = getattr(touch.effect, "start", 0.0)
-    return None, f"what happened {start:.2f} s into {log} is not what a push on the tip does"
 
 
 def _refitted(
@@ -379,7 +385,7 @@ def _candidate(
     log: int | None = None,
 ) -> Candidate | None:
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
-    start = np.zeros(max(len(amplitudes), _width(later, effect)))
+    start = np.zeros(max(len(amplitudes), later.amplitudes_of(effect)))
     start[: len(amplitudes)] = amplitudes
     belief = later.freed(state.belief, effect)
     model = state.model.with_effect(effect, start, log=log)
@@ -407,20 +413,6 @@ def _plainer(model: Exact) -> tuple[Exact, ...]:
     if plain == tuple(columns.laws):
         return ()
     return (replace(model, columns=replace(columns, laws=plain)),)
-
-
-def _width(later: Later, effect: Effect) -> int:
-    """Return how many amplitudes the effect has, in the form that is refitted."""
-    first = later.rows.data.logs[0].motion
-    some = replace(
-        first,
-        t=first.t[:8],
-        q=first.q[:8],
-        dq=first.dq[:8],
-        ddq=first.ddq[:8],
-        tau=None if first.tau is None else first.tau[:8],
-    )
-    return int(effect.columns(some, later.dataset.arm).shape[2])
 
 
 def _unnamed(

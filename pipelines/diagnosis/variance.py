@@ -29,7 +29,7 @@ __all__ = ["Components", "components", "settle"]
 _FLAT = 1e-10  # numerics: of a column's information
 _ROUNDS = 2  # numerics: of generalised least squares; a third changes the noise by a fiftieth
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
-_MAXIMISED = 8  # numerics: rounds of it; more change the variances by less than a tenth
+_EM_ROUNDS = 8  # numerics: rounds of it; more change the variances by less than a tenth
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def components(
     flat = _FLAT * np.where(square > 0.0, square, 1.0)
     tau, mean, noise = np.full(len(own), _START), np.zeros(len(gram)), 1.0
     per_group, per_family = np.bincount(own), np.bincount(family)
-    for _ in range(_MAXIMISED):
+    for _ in range(_EM_ROUNDS):
         precision = np.r_[flat, mean_square / tau]
         info = Arrow.of(gram / noise + np.diag(precision), structure)
         mean, spread = info.solve(moment / noise), info.inverse_diagonal

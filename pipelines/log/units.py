@@ -82,7 +82,7 @@ _WORDS: Final = ((r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"), (r"\bmilli[
                  (r"\boz(?=[ -])", "ozf"), (r"(?<=f)-", " "), (r"^([mcuk]?)n[ .-]?m$", r"\1N m"))  # fmt: skip
 
 
-_SHARE: Final = re.compile(r"(\d*\.?\d+)?\s*(%|‰|pct|per ?cent)", re.IGNORECASE)
+_SHARE: Final = re.compile(r"(\d++(?:\.\d++)?|\.\d++)?\s*+(%|‰|pct|per ?cent)", re.IGNORECASE)
 _RATED: Final = {"torque": "N m", "current": "A", "velocity": "rad/s"}
 _NO_WORDS: Final = re.compile(r"[013-9]|^.?$")  # of a unit; "s2" has a digit
 
@@ -111,9 +111,10 @@ def _in_words(name: str) -> str:
 def of_rated(unit: str, quantity: str) -> str:
     """Say how the recipe takes a share of a rated torque, current or speed, as drives count in; "" where `unit` is none."""
     found = _SHARE.fullmatch(unit.strip())
-    if found is None or quantity not in _RATED:
+    step = float(found[1] or 1) if found is not None else 0.0
+    if found is None or quantity not in _RATED or step == 0.0:
         return ""
-    parts = (1000.0 if found[2] == "‰" else 100.0) / float(found[1] or 1)
+    parts = (1000.0 if found[2] == "‰" else 100.0) / step
     return f"scale = rated {quantity} / {parts:g}, one a joint, from the drive's data sheet, and unit = '{_RATED[quantity]}'"
 
 

@@ -55,6 +55,6 @@ def threshold_words(result: Diagnosed) -> str:
         return "Thresholds: none, no cause was looked for."
     return (
         "Thresholds: a cause has to exceed what noise gives any cause with a probability of 1 %, and the "
-        f"difference between {'; '.join(origins)}; and it has to predict blocks of time that it was not "
-        "fitted to."
+        f"difference between {'; '.join(origins)}; without reference logs, a thousandth of its joint's torque; and "
+        "it has to predict blocks of time that it was not fitted to."
     )

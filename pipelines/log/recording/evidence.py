@@ -290,7 +290,8 @@ def _counts(q: Array, wrap: float | None, named: str | None, stated: float, join
         why += "; the counts of a revolution are in the encoder's data sheet"
     further = f", counts_per_rev = {turn:.10g}" if math.isfinite(turn) else f', counts_per_rev = "{BLANK}"'
     further += f", wrap = {again:.10g}" if again is not None else ""
-    if math.isfinite(turn) and (problem := _beyond(q, joints, 2.0 * math.pi / turn)):
+    whole = q if again is None else np.unwrap(q, period=again, axis=0)
+    if math.isfinite(turn) and (problem := _beyond(whole, joints, 2.0 * math.pi / turn)):
         return Guess("", "unsure", f"{why}; {problem}: turns of the motor, then [drive]?"), further
     return Guess("counts", "sure" if named and turn == wrap and not math.isfinite(stated) else "likely", why), further
 

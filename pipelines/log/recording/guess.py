@@ -20,7 +20,7 @@ from pipelines.errors import InputRejected, clean
 from pipelines.log.recording.clock_guess import round_rate
 from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
 from pipelines.log.recording.evidence import Guess, held, velocity_unit
-from pipelines.log.recording.findings import Findings, Model, unit_of_joint, whole
+from pipelines.log.recording.inference import Inference, Model, unit_of_joint, whole
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.reading import arm_beside, companion_for, read_recording, with_companion
 from pipelines.log.recording.recipe_reader import BLANK
@@ -80,13 +80,13 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
     if companion is not None:
         companion = sound_samples(companion, lost)
         reading = with_companion(reading, companion if np.array_equal(companion.rows, table.rows) else None)
-    return _Drafting(Findings(reading, model), lost).draft()
+    return _Drafting(Inference(reading, model), lost).draft()
 
 
 class _Drafting:
     """Collects the lines of a draft. Not frozen: it is the pencil, the `Draft` is the result."""
 
-    def __init__(self, found: Findings, lost: Sequence[float]) -> None:
+    def __init__(self, found: Inference, lost: Sequence[float]) -> None:
         self.found, self.reading, self.lost = found, found.reading, lost
         self.evidence: list[str] = []
         self.blanks: list[str] = []

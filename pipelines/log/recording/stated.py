@@ -190,13 +190,13 @@ def _rate_of(number: float, unit: str, text: str) -> float:
 
 def stated_of_some_joints(notes: Sequence[str], n: int) -> list[str]:
     """Return the sentences about some of `n` joints alone, by number, and not about a unit: what they say, a person must read."""
-    of_joint, found = WORDS["joint"] | {"q"}, []
-    for line in notes:
-        words = words_of(line[:_LONGEST])
+    of_joint, found = (WORDS["joint"] | {"q"}) - {"a"}, []
+    for clause in _clauses(notes):
+        words = words_of(clause[:_LONGEST])
         numbers = {number for word, number in itertools.pairwise(words) if word in of_joint and number.isdecimal()}
-        told = {word for word in words if not word.isdecimal()} - of_joint - WORDS["noise"]
-        if 0 < len(numbers) < n and len(told) > 2 and not any(any(_units(clause)) for clause in _clauses([line])):
-            found.append(line.strip("#%/*!;\"' \t,")[:_LONGEST])
+        more = {word for word in words if not word.isdecimal()} - of_joint - WORDS["noise"]
+        if 0 < len(numbers) < n and len(more) > 2 and not any(_units(clause)):
+            found.append(clause.strip("#%/*!;\"' \t,")[:_LONGEST])
     return found
 
 

@@ -11,9 +11,9 @@ shapes of the effects. Slopes by what is linear are columns; all others are diff
 
 from __future__ import annotations
 
-from collections.abc import Container, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -21,14 +21,14 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
-from pipelines.model.effects.fast import from_motion
+from pipelines.model.effects.fast import from_motion, mixing
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows, several_rows
 from pipelines.signal.first_order import lagging
 
-__all__ = ["Exact", "Named", "Which", "further_slopes", "law_of", "number_moved", "recorded", "slopes_of"]
+__all__ = ["Exact", "Named", "Which", "further_slopes", "law_of", "nominal_slopes", "number_moved", "recorded", "slopes_of"]
 
 def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
     """Return torque (samples, joints), or columns (samples, joints, k), as `arm` records them.
@@ -74,11 +74,6 @@ class Named:
     def count(self) -> int:
         """Numbers that are fitted."""
         return len(self.free_shapes) + (len(self.amplitudes) if self.free_amplitudes else 0)
-
-    @property
-    def drifts(self) -> bool:
-        """Return whether it drifts in the session: its torque is a share of the friction at its joint."""
-        return self.effect.clock == "session"
 
     @property
     def possible(self) -> bool:
@@ -202,7 +197,7 @@ class Exact:
         return [np.asarray(one.effect.amplitudes(one.values) @ self._of_log(data, one, own))
                 for one, own in zip(several, rows, strict=True)]
 
-    def friction_at(self, joint: int | None) -> list[int]:
+    def friction_numbers(self, joint: int | None) -> list[int]:
         """Which numbers of `beta` are amplitudes of friction laws of a joint."""
         owners = [law.joint for law in self.columns.laws for q in law.parameters if not q.shape]
         return [len(self.columns.kept) + k for k, owner in enumerate(owners) if owner == joint]
@@ -283,6 +278,9 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
         laid: as `model.laid(data)` makes it, where it is known.
     """
     further, names = further_slopes(model, data, range(1, data.n_joints + 1), laid)
+    by_nominal = nominal_slopes(model)
+    if by_nominal is not None and not _through(model):
+        return np.concatenate([data.lay(by_nominal), further]), names
     if not _through(model):
         laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
         return np.concatenate([rigid, *laws, further]), names
@@ -293,6 +291,31 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
         return recorded(arm, np.concatenate([own, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion)
 
     return np.concatenate([data.lay(linear), further]), names
+
+
+def nominal_slopes(model: Exact) -> Callable[[Motion], Array] | None:
+    """Return what gives the slopes (samples, joints, k) by base parameters and friction; None: no effect changes them.
+
+    A drive may mix or scale what it passes on, and an effect by the session's clock is a share of the friction at its joint. What
+    delays, clips or misreads changes slopes by the share that it adds, which is neglected.
+    """
+    columns, kept = model.columns, list(model.columns.kept)
+    n = columns.body.robot.n_joints
+    mixed = [m for m in (mixing(one.effect, one.values, n) for one in model.effects) if m is not None]
+    shares = [one for one in model.effects if one.effect.clock == "session"]
+    if not mixed and not shares:
+        return None
+    matrix = reduce(np.matmul, reversed(mixed), np.eye(n))
+
+    def slopes(motion: Motion) -> Array:
+        rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
+        table = np.concatenate([rigid, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2)
+        for one in shares:
+            for number in model.friction_numbers(one.effect.joint):
+                table[:, :, number] += model.slope_of(one, number, motion)
+        return np.asarray(matrix @ table)
+
+    return slopes
 
 
 def further_slopes(

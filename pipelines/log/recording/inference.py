@@ -26,7 +26,7 @@ from pipelines.log.recording.stated import Statement, stated_counts, stated_gear
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.log.units import UNITS
 
-__all__ = ["Findings", "Model", "unit_of_joint", "whole"]
+__all__ = ["Inference", "Model", "unit_of_joint", "whole"]
 
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")  # parts of an arm
 _ONE_UNIT = frozenset({"q", "qpos", "jpos", "effort", "efforts"})  # mechanics, ROS: velocities in the positions' unit of angle
@@ -37,7 +37,7 @@ _MOTOR_SIDE = re.compile(r"(motor|rotor|drive)[ _-]*(side|shaft|seit)|before the
 Model = Callable[[RobotDescription, Array, Array, Array], Array | None]
 
 
-class Findings:
+class Inference:
     """What is known of one recording. Not frozen: later findings rest on earlier ones."""
 
     def __init__(self, reading: Reading, model: Model | None) -> None:
