@@ -5,8 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from pipelines.model.effects.base import Effect
 from pipelines.model.effects.gravity_tilt import GravityTilt
+from pipelines.model.effects.torque_gain import TorqueGain
+from pipelines.model.effects.viscous_drift import ViscousDrift
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, slopes_of
 from pipelines.model.rows.fit import refine
@@ -44,3 +48,18 @@ def test_a_law_that_takes_no_torque_has_no_shape_either() -> None:
     without = refine(replace(model, beta=beta), prepared.data, fit.weight, steps=0)
     assert not any(one[:2] == (0, place) for one in without.names)
     assert len(without.slopes) == len(beta) + len(without.names)
+
+
+@pytest.mark.parametrize(("effect", "amplitude"), [(TorqueGain(2), 0.12), (ViscousDrift(2, time_constant=3.0), -0.7)])
+def test_slopes_by_base_parameters_and_friction_are_those_of_the_torque_with_the_effect(effect: Effect, amplitude: float) -> None:
+    """A drive that passes on 12 % more passes on 12 % more of each; friction that loses seven tenths acts less."""
+    prepared = prepare(Logs((hidden(1),)), Recipe())
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model = Exact.start(columns, fit).with_effect(effect, np.array([amplitude]))
+    slopes, _ = slopes_of(model, prepared.data, rigid_rows(prepared.data, columns))
+    here = model.torque(prepared.data)
+    for number in range(len(model.beta)):
+        moved = model.beta.copy()
+        moved[number] += 1e-3
+        there = replace(model, beta=moved).torque(prepared.data)
+        np.testing.assert_allclose(slopes[number], (there - here) / 1e-3, atol=1e-6 * np.abs(here).max())
