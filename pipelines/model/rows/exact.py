@@ -198,12 +198,12 @@ class Exact:
                 for one, own in zip(several, rows, strict=True)]
 
     def friction_numbers(self, joint: int | None) -> list[int]:
-        """Which numbers of `beta` are amplitudes of friction laws of a joint."""
+        """Return which numbers of `beta` are amplitudes of friction laws of a joint."""
         owners = [law.joint for law in self.columns.laws for q in law.parameters if not q.shape]
         return [len(self.columns.kept) + k for k, owner in enumerate(owners) if owner == joint]
 
     def slope_of(self, one: Named, number: int, motion: Motion) -> Array:
-        """(samples, joints) slope of the torque of an effect by number `number` of `beta`."""
+        """Return the slope (samples, joints) of the torque of an effect by number `number` of `beta`."""
         moved = self.beta.copy()
         moved[number] += _DIFFERENCE
         there, here = (one.effect.torque(motion, arm, one.values) for arm in (replace(self, beta=moved).nominal, self.nominal))
