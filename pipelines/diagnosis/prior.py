@@ -31,7 +31,7 @@ from pipelines.diagnosis.variance import Components, components
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.kinds import FrictionLaw
 
-__all__ = ["RIDGE", "Belief", "Prior", "prior_of"]
+__all__ = ["RIDGE", "Belief", "Prior", "prior_of", "rubs"]
 
 RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
 _FREE = 1e-6  # numerics: of the information along a direction that is freed, or not held
@@ -129,6 +129,7 @@ class Belief:
 
 
 _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot be seen in 1e5 rows
+_ROUNDING = 1e-13  # numerics: of each number's information, lost where columns are nearly alike
 _PARTS = 8  # numerics: of the known logs at most, of which splits are made
 
 
@@ -172,7 +173,7 @@ class Prior:
         side = info[:, free]
         inner = np.diag(1.0 / self.drift[free]) + side[free]
         new = info - side @ np.linalg.solve(inner, side.T)
-        new = 0.5 * (new + new.T)
+        new = 0.5 * (new + new.T) + _ROUNDING * np.diag(np.diag(info))
         return new, new @ Arrow.of(info, self.structure).solve(moment)
 
 
@@ -272,13 +273,15 @@ def _drift(
     """
     beta, rigid = dataset.model.beta, len(dataset.model.columns.kept)
     usual = (beta[rigid:] * scale[rigid:]) ** 2
-    rubs = np.array([g.key[0] == FORM or (g.kind == "named" and _rubs(g)) for g in of], float)
-    every = np.r_[np.zeros(rigid), usual, rubs * found.variance / found.mean_square]
+    own = np.array([rubs(g) for g in of], float)
+    every = np.r_[np.zeros(rigid), usual, own * found.variance / found.mean_square]
     return np.asarray(config.friction_drift**2 * every)
 
 
-def _rubs(group: Group) -> bool:
-    """Return whether a cause is a friction law or changes sign with the one at its joint."""
+def rubs(group: Group) -> bool:
+    """Return whether it is a form of friction, a law, or changes sign with the one at its joint."""
+    if group.kind != "named":
+        return group.key[0] == FORM
     effect = find_effect(group.key[0])
     return issubclass(effect, FrictionLaw) or any(q.shared for q in effect.parameters)
 

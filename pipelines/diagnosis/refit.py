@@ -16,10 +16,11 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary, Group, Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.prior import RIDGE, Belief, Prior
+from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
 from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact
 
@@ -141,12 +142,17 @@ class Later:
 
     def start(self, found: Exact | None = None) -> State:
         """Return the nominal model, or one with causes found before, fitted under the prior."""
-        model, belief = found or self.dataset.model, self.belief
-        for one in model.effects:
-            belief = self.freed(belief, one.effect)
+        model = found or self.dataset.model
         theta = np.zeros(self.base.width)
         theta[: len(model.beta)] = model.beta * self.prior.scale
-        return self.fit(model, theta, belief)
+        return self.fit(model, theta, self.belief_of(model))
+
+    def belief_of(self, model: Exact) -> Belief:
+        """Return what is known before the rows beside the effects of a model."""
+        belief = self.belief
+        for one in model.effects:
+            belief = self.beside(belief, one.effect)
+        return belief
 
     def fit(self, model: Exact, theta: Array, belief: Belief, steps: int = _STEPS) -> State:
         """Return the model with all its numbers fitted; those of effects have no prior."""
@@ -406,6 +412,19 @@ class Later:
         if not len(at):
             return state
         return self.fit(state.model, state.theta, state.belief.held(at))
+
+    def beside(self, belief: Belief, effect: Effect) -> Belief:
+        """Return the belief beside an effect.
+
+        Without reference logs friction is what the laws say at a joint where one of them, or a
+        drift of friction, is a cause: beside any form a further law, or a share of it, says
+        nothing.
+        """
+        law = isinstance(effect, FrictionLaw) or effect.clock == "session"
+        if law and self.dataset.reference is None:
+            own = [rubs(g) and g.key[1] == effect.joint for g in self.prior.groups]
+            belief = belief.held(self.prior.n_nominal + np.flatnonzero(own))
+        return self.freed(belief, effect)
 
     def freed(self, belief: Belief, effect: Effect) -> Belief:
         """Return the belief free along base parameters that the effect moves by unknown numbers."""

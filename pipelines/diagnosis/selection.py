@@ -319,14 +319,19 @@ def _promising(
 ) -> list[Screened]:
     """Return the significant causes that are the most promising ones, the best first.
 
-    A cause that healthy machines have in small is compared with a machine without it: what the
-    standing numbers have taken of it is a part of what it explains.
+    They are so by what they gain, or compared with a machine without them: what the standing
+    numbers have taken of a cause that healthy machines have in small is a part of what it explains.
     """
     named = {key: one for key, one in significant.items() if one.group.kind == "named"}
     taken = later.taken(state, [one.group for one in named.values()])
     worth = {key: named[key].gain + more for key, more in zip(named, taken, strict=True)}
-    order = sorted(worth, key=lambda key: -worth[key])[: config.refits]
-    return [named[key] for key in order if worth[key] > config.promising * worth[order[0]]]
+    gain = {key: one.gain for key, one in named.items()}
+    best = [
+        {k for k, x in by.items() if x > config.promising * max(by.values())}
+        for by in (gain, worth)
+    ]
+    order = sorted(best[0] | best[1], key=lambda key: -worth[key]) if named else []
+    return [named[key] for key in order[: config.refits]]
 
 
 def _refitted(
@@ -387,7 +392,7 @@ def _candidate(
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
     start = np.zeros(max(len(amplitudes), later.amplitudes_of(effect)))
     start[: len(amplitudes)] = amplitudes
-    belief = later.freed(state.belief, effect)
+    belief = later.beside(state.belief, effect)
     model = state.model.with_effect(effect, start, log=log)
     try:
         fits = [later.fit(one, state.theta, belief) for one in (model, *_plainer(model))]
@@ -465,7 +470,7 @@ def _backward(
             place += 1
             continue
         model = end.model.without(place)
-        without = later.fit(model, end.theta, end.belief)
+        without = later.fit(model, end.theta, later.belief_of(model))
         scores = {"with": _scores(later, end), "without": _scores(later, without)}
         if "without" in confidence_set(scores, config):
             causes, end, place = [c for k, c in enumerate(causes) if k != place], without, 0
