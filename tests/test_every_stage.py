@@ -6,7 +6,7 @@ import ast
 import dataclasses
 import inspect
 import json
-import shutil
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from pipelines.stage import Outcome, Request, Stage, run_stage
 from rrrid_cli.commands import STAGES
 from tests.controlled import controlled_log
 from tests.diagnose.sessions import but, session, written
+from tests.healthy import begun
 from tests.log.recording.good import RECIPE, good, text, write
 from tests.log.recording.good import run as run_import
 from tests.repairs import REPAIRS, Repair
@@ -37,7 +38,7 @@ from tests.test_compare import written as written_result
 
 REPO = Path(__file__).resolve().parents[1]
 MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if path.stem not in ("__init__", "stage", "errors")]
-# The sample logs a stage is run on here: few of every kind it reads. Any other stage takes them all.
+# The sample logs of whose first seconds a stage is run here: few of every kind it reads. Any other stage takes them all.
 _FEW = ("excitation-1", "excitation-2", "hold-1")
 LOGS = {"inspect": _FEW, "convert": ("excitation-1", "hold-1"), "reconstruct": ("excitation-1", "hold-1"), "estimate_bps": _FEW,
         "fit_friction": ("friction-3",), "run": ("excitation-1", "hold-1"), "validate_writing": ("excitation-1", "excitation-2")}
@@ -70,31 +71,29 @@ def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
     settings = stage.settings()
     paths: tuple[Path, ...] = (samples / "rrr-closed-form",)
     if module in LOGS:
-        (tmp_path / "few").mkdir(exist_ok=True)
-        paths = (tmp_path / "few",)
-        for name in LOGS[module]:
-            shutil.copy(samples / f"rrr-closed-form/{name}.h5", tmp_path / "few")
+        logs = (open_log(samples / f"rrr-closed-form/{name}.h5").log for name in LOGS[module])
+        paths = (written(tmp_path / "few", [begun(log, 4000) for log in logs]),)
     if module == "import_log":
         recipe = _recording(tmp_path / "data", samples)
-        settings, paths = dataclasses.replace(settings, recipe=str(recipe), source=recipe.parent), ()
+        settings, paths = replace(settings, recipe=str(recipe), source=recipe.parent), ()
     if module == "simulate":
         write_log(tmp_path / "waving.h5", controlled_log(400))
-        settings, paths = dataclasses.replace(settings, model="rrr"), (tmp_path / "waving.h5",)
+        settings, paths = replace(settings, model="rrr"), (tmp_path / "waving.h5",)
     if module == "frf":
-        settings, paths = dataclasses.replace(settings, high=60.0), (samples / "rrr-healthy/frf-1-1.h5",)
+        settings, paths = replace(settings, high=60.0), (samples / "rrr-healthy/frf-1-1.h5",)
     if module == "run":
-        settings = dataclasses.replace(settings, skip=("fit-friction", "validate-writing", "diagnose", "extend"))
+        settings = replace(settings, skip=("fit-friction", "validate-writing", "diagnose", "extend"))
     if module in ("diagnose", "extend"):
         paths = (written(tmp_path / "brief", session("cogging", 1, 2.0, 1)),)
         more: dict[str, Any] = {"exclude": but("cogging"), "max_causes": 1} if module == "diagnose" else {
             "causes": ("cogging:1",)}
-        settings = dataclasses.replace(settings, **more)
+        settings = replace(settings, **more)
     if module == "demo":
         paths = ()
     if module == "compare":
         paths = (written_result(tmp_path / "a", 1), written_result(tmp_path / "b", 2))
     if module == "design_excitation":
-        settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
+        settings, paths = replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out", no_report=True), settings)
 
 
