@@ -42,6 +42,8 @@ MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if pa
 _FEW = ("excitation-1", "excitation-2", "hold-1")
 LOGS = {"inspect": _FEW, "convert": ("excitation-1", "hold-1"), "reconstruct": ("excitation-1", "hold-1"), "estimate_bps": _FEW,
         "fit_friction": ("friction-3",), "run": ("excitation-1", "hold-1"), "validate_writing": ("excitation-1", "excitation-2")}
+# Whose two runs are compared by name alone: an import, two fits, a search by chance, a simulation and `run` differ in kind.
+RARELY_TWICE = ("compare", "convert", "demo", "diagnose", "fit_friction", "frf", "inspect", "reconstruct", "validate_writing")
 FORBIDDEN = {"open", "print", "read_text", "write_text", "read_bytes", "write_bytes", "open_log", "write_log", "savefig"}
 
 
@@ -162,7 +164,8 @@ def test_a_stored_result_redraws_its_report(ran: Ran, monkeypatch: pytest.Monkey
     assert redrawn == drawn
 
 
-@pytest.mark.parametrize("ran", MODULES, indirect=True)
+@pytest.mark.parametrize("ran", [
+    pytest.param(m, marks=pytest.mark.slow if m in RARELY_TWICE else ()) for m in MODULES], indirect=True)
 def test_twice_is_the_same(ran: Ran, tmp_path: Path, samples: Path) -> None:
     """Equal inputs give equal bytes, provenance.json apart; that a report follows from its result is another test's."""
     contents = []
