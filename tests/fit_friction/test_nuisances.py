@@ -86,15 +86,18 @@ MACHINES = {
 }
 
 
+USUAL, RARE = ("rests", "regenerating", "step"), ("ordered", "quiet")
+
+
 @cache
-def logs() -> dict[str, ExperimentLog]:
-    """Logs of all machines, integrated side by side."""
-    return dict(zip(MACHINES, logs_of(list(MACHINES.values())).values(), strict=True))
+def logs(names: tuple[str, ...]) -> dict[str, ExperimentLog]:
+    """Logs of these machines, integrated side by side."""
+    return dict(zip(names, logs_of([MACHINES[name] for name in names]).values(), strict=True))
 
 
 @cache
 def computed(name: str, law: str | None) -> tuple[JointResult, Result]:
-    opened = Opened(Path("a.h5"), "", logs()[name], ())
+    opened = Opened(Path("a.h5"), "", logs(USUAL if name in USUAL else RARE)[name], ())
     result = fit_friction.compute(Inputs((opened,), label="logs"), Settings(law=law))
     return result.joints[0], result
 
@@ -178,7 +181,7 @@ def test_an_inertia_below_zero_is_remarked() -> None:
 
 def test_a_validation_log_at_rest_judges_nothing() -> None:
     """It is reported, and held-out blocks of the identification log judge."""
-    log = logs()["rests"]
+    log = logs(USUAL)["rests"]
     still = {name: replace(signal, values=signal.values[:2500].copy()) for name, signal in log.signals.items()}
     still["q"] = replace(still["q"], values=MACHINES["rests"].encoder * (np.arange(2500) % 7 == 0.0)[:, None])
     rest = replace(log, name="rest", role="validate", signals=still)
