@@ -101,6 +101,7 @@ def test_infinite_measurements_are_refused() -> None:
         smooth(np.array([[0.0], [np.inf], [0.0]]), design(T, 500.0, R))
 
 
+@pytest.mark.slow
 def test_a_log_longer_than_one_chunk() -> None:
     """Worked on chunk by chunk, observer and smoother of 50 000 samples give what filterpy gives near every joint of chunks."""
     y = swing(50_000, 1, STEP)
