@@ -51,7 +51,8 @@ def test_committed_logs_are_what_the_script_makes(rebuilt: dict[str, ExperimentL
         assert not opened.checks
 
 
-@pytest.mark.parametrize(("name", "made"), [("rrr-healthy/hold-1", healthy_logs), ("rrr-changed/writing-6", changed_logs)])
+@pytest.mark.parametrize(("name", "made"), [
+    ("rrr-healthy/hold-1", healthy_logs), pytest.param("rrr-changed/writing-6", changed_logs, marks=pytest.mark.slow)])
 def test_a_bench_log_is_what_the_script_makes(name: str, made: Callable[[str], Iterator[tuple[str, ExperimentLog]]],
                                               samples: Path) -> None:
     """The same digest from the committed file and from the machine recorded anew; by another MuJoCo, or on a processor whose LAPACK

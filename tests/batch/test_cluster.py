@@ -69,8 +69,9 @@ def test_a_cluster_gives_the_same_bytes_and_bears_the_same_misfortunes(lay: Lay,
         place: text for place, text in contents(here.folder).items() if not place.startswith("crashes")}
 
 
+@pytest.mark.slow
 @pytest.mark.row("P06", "P07")
-@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_a_batch_and_leaves_the_cluster_free(lay: Lay, tmp_path: Path, cluster: Cluster, number: signal.Signals,
                                                            exit_code: int) -> None:
     """P06: a summary within 5 s while both workers are at long items, which are dropped; the next batch has the workers at once."""

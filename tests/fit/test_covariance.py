@@ -57,6 +57,7 @@ def test_truth_lies_within_two_standard_deviations(noise: Noise, every: int, siz
     assert 0.9 < z.std() < 1.1
 
 
+@pytest.mark.slow
 def test_the_white_noise_formula_would_not_do() -> None:
     """What the sandwich is for: with a memory of 20 samples the plain formula covers less than half."""
     assert covered(scores(autoregressive)[1]) < 0.5

@@ -72,6 +72,7 @@ def test_a_firm_arm_under_pd_is_rigid(shared: Path, arm: str) -> None:
     assert {one.kind for one in found.classification} <= {"rigid"}
 
 
+@pytest.mark.slow
 def test_a_soft_base_under_pd(shared: Path) -> None:
     """Its frequency within 3 %, its inertia within 15 %, and no other finding."""
     truth = json.loads((shared / "plant-b" / "answers.json").read_text())["arm-06"]["truth"][0]["parameters"]
