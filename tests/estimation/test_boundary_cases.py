@@ -219,7 +219,7 @@ def test_a_recorded_arm_has_a_boundary_without_a_finding(robot: str, shared: Pat
 
 
 @pytest.mark.parametrize(
-    "number", [pytest.param(k, marks=pytest.mark.slow if k % 4 else ()) for k in range(1, 17)]
+    "number", [pytest.param(k, marks=pytest.mark.slow if k % 8 else ()) for k in range(1, 17)]
 )
 def test_a_fault_of_another_plant_is_no_mistake_of_its_description(
     number: int, shared: Path

@@ -70,7 +70,7 @@ def test_truth_lies_within_two_standard_deviations(seeds: int, repeats: float, n
 
 @pytest.mark.parametrize(("phases", "periods", "memory"), [
     pytest.param(500, 8, 0.95, id="half a second"),
-    pytest.param(400, 10, 0.8, id="400 phases"),
+    pytest.param(400, 10, 0.8, id="400 phases", marks=pytest.mark.slow),
     pytest.param(1000, 5, 0.99, id="a memory of 100", marks=pytest.mark.slow),
     pytest.param(200, 20, 0.95, id="200 phases", marks=pytest.mark.slow)])
 def test_noise_that_remembers_long_beside_a_period(phases: int, periods: int, memory: float) -> None:

@@ -39,7 +39,7 @@ def covered(z: Array) -> float:
 
 
 @pytest.mark.parametrize(("noise", "every", "size", "width"), [
-    pytest.param(white, 0, None, 13, id="white"),
+    pytest.param(white, 0, None, 13, id="white", marks=pytest.mark.slow),
     pytest.param(autoregressive, 0, None, 13, id="ar"),
     pytest.param(NEARLY_INTEGRATED, 0, None, 13, id="ar 0.99", marks=pytest.mark.slow),
     pytest.param(white, 5, None, 13, id="decimated by 5", marks=pytest.mark.slow),

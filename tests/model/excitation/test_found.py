@@ -17,6 +17,7 @@ from pipelines.model.excitation.found import Found, best
 from pipelines.model.excitation.rehearse import Rehearsal
 from pipelines.model.excitation.task import Task, Wishes, plan_task
 from tests.model.excitation.arms import described, rrr
+from tests.seeds import rarely
 
 PAIR = Pair(Spring(joint=2), TorqueOffset(joint=2))
 EFFORT = Effort(evaluations=200)
@@ -70,7 +71,7 @@ def test_a_design_that_its_rehearsal_spoils_gives_way_to_the_plain_one(task: Tas
     assert found.apart.after == found.apart.before
 
 
-@pytest.mark.parametrize("nth", [1, 2])
+@pytest.mark.parametrize("nth", [*rarely(1), 2])
 def test_who_stops_keeps_the_best_by_then(task: Task, plain: Design, nth: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped while causes are told apart, and spoilt by its rehearsal: the plain design; stopped in its rehearsal: as it was. The
     exit code is the signal's either way, and nothing is rehearsed after the second."""

@@ -104,8 +104,9 @@ def test_limited_output() -> None:
     assert (np.abs(tau).max(axis=0) == limit).all()
 
 
-@pytest.mark.parametrize("parts", [("friction",), ("friction", "inertia"), ("gravity", "coriolis"),
-                                   ("friction", "inertia", "coriolis", "gravity")])
+@pytest.mark.parametrize("parts", [
+    ("friction", "inertia", "coriolis", "gravity"), *(pytest.param(parts, marks=pytest.mark.slow) for parts in (
+        ("friction",), ("friction", "inertia"), ("gravity", "coriolis")))])
 def test_feedforward(parts: tuple[str, ...]) -> None:
     """Eq. (24): the parts that the log names, of its own model (here 20 % too heavy), on the reference."""
     model = _wrong()
