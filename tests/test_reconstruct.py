@@ -123,7 +123,7 @@ def test_what_the_doctor_rejects_is_rejected(row: str, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("row", [pytest.param(row, marks=pytest.mark.slow if k % 3 else ()) for k, row in enumerate(MENDED)])
+@pytest.mark.parametrize("row", [pytest.param(row, marks=pytest.mark.slow if k % 6 else ()) for k, row in enumerate(MENDED)])
 def test_what_the_doctor_mends_is_reconstructed_and_said(row: str, tmp_path: Path) -> None:
     """Exit 0; the finding stands in the result; the motion is finite at every sample; with --strict a repair is an error."""
     fault = next(f for f in FAULTS if f.row == row)

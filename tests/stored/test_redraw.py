@@ -17,6 +17,7 @@ from pipelines.stage import Request, run_stage
 from pipelines.stored.redraw import redraw
 from tests.cli.commands import rrrid
 from tests.controlled import controlled_log
+from tests.seeds import rarely
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-@pytest.mark.parametrize("command", ["inspect", "run"])
+@pytest.mark.parametrize("command", ["inspect", *rarely("run")])
 def test_a_lost_report_comes_back(results: Path, tmp_path: Path, command: str) -> None:
     """Report and figures deleted, then drawn again: every byte is as it was, in its place and elsewhere."""
     shutil.copytree(results / command, tmp_path / "here")
