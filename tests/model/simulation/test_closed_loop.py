@@ -16,7 +16,7 @@ from pipelines.model.simulation.replicas import _draws, run_together
 from tests.model.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop, TransferObserver
 
-SAMPLES = 500
+SAMPLES = 200
 MANY = 9  # robots that are simulated side by side, in arrays
 NOISE = Noise(np.array([0.020, 0.010, 0.005]), np.zeros(3))
 Law = Callable[[int, Array], Array]

@@ -21,7 +21,7 @@ from tests.model.simulation.pinocchio_loop import Loop
 from tests.model.simulation.test_forward_dynamics import follow, offsets
 from tests.seeds import rarely
 
-SAMPLES = 250
+SAMPLES = 120
 
 
 def missed(name: str, shared: Path, folder: Path, torque: Array, *steps: int) -> list[float]:

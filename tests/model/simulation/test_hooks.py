@@ -22,7 +22,7 @@ from tests.model.simulation.arms import KD, KP, TS, Case, experiment, rrr, rrr_f
 from tests.model.simulation.pinocchio_loop import Loop
 from tests.seeds import rarely
 
-SAMPLES = 300
+SAMPLES = 150
 
 
 @dataclass(frozen=True)
