@@ -91,6 +91,7 @@ def test_no_result_is_lost_to_a_report(results: Path, tmp_path: Path) -> None:
     assert f"moved to {tmp_path / 'here-inspect'}" in said
 
 
+@pytest.mark.slow
 def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) -> None:
     """Derived logs deleted to save room: the report needs none of them."""
     shutil.copytree(results / "run", tmp_path / "a")

@@ -19,7 +19,6 @@ from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
 from pipelines.stage import Request, run_stage
-from tests.seeds import rarely
 
 CUTOFF, EVERY = 20.0, 100  # [Hz] of the decimation from 5 kHz to 50 Hz
 SLOW = (0.05, 0.05, 0.05, 0.08, 0.08, 0.12)  # [rad/s] as published
@@ -84,7 +83,8 @@ def in_base_parameters(estimate: Estimate, beta: Array, shared: Path) -> Array:
     return np.concatenate([rigid, friction])
 
 
-@pytest.mark.parametrize("weighted", [*rarely(False), True])
+@pytest.mark.slow
+@pytest.mark.parametrize("weighted", [False, True])
 def test_least_squares_are_those_of_pinocchio(weighted: bool, tx40: ExperimentLog, published: Fitted, independent: Independent,
                                               shared: Path) -> None:
     """Every parameter to 1e-6 of the largest of its kind, with the joints alike and weighted."""

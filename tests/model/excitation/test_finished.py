@@ -39,6 +39,7 @@ def torque_share(task: Task, motion: Array) -> float:
     return float(np.abs(general.torque(q, dq, ddq, p)[:, 1]).max() / (0.9 * task.robot.joints[1].torque))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [pytest.param(1.001, marks=pytest.mark.slow), 1.01])
 def test_where_gravity_asks_for_the_torque_a_motion_stays_as_large(times: float) -> None:
     """A stretched arm needs most of its torque at rest: half a motion needs nearly as much. It is moved a little instead."""

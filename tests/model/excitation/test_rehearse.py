@@ -78,6 +78,7 @@ def test_without_a_model_nothing_is_rehearsed() -> None:
     assert rehearsed_design(task, found, 1, lambda words: None) == (found, None, "")
 
 
+@pytest.mark.slow
 def test_a_range_open_on_one_side_is_kept_by_as_little_less() -> None:
     """A shoulder that stands a tenth of a radian from the one end of its range, and sags past it by a tenth of that: it is made
     smaller about where it stands, by a tenth."""
