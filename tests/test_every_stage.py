@@ -193,7 +193,8 @@ def test_every_log_a_stage_writes_is_in_order(ran: Ran, tmp_path: Path) -> None:
     assert complaints == []
 
 
-@pytest.mark.parametrize("repair", REPAIRS, ids=[r.row.replace(" ", "-") for r in REPAIRS])
+@pytest.mark.parametrize("repair", [pytest.param(one, id=one.row.replace(" ", "-"), marks=pytest.mark.slow if k % 3 else ())
+                                    for k, one in enumerate(REPAIRS)])
 def test_what_an_import_has_mended_is_in_order(repair: Repair, tmp_path: Path) -> None:
     """Import and doctor judge by the same limits: nothing is left to reject or to mend, but glitches, which are recorded."""
     write(tmp_path / "data", text(good()))

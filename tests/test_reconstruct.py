@@ -272,6 +272,7 @@ def test_report_shows_what_the_paper_shows(tmp_path: Path) -> None:
     assert "standard deviation" in outcome.report.verdict
 
 
+@pytest.mark.slow
 def test_a_short_log_and_an_order_of_two(tmp_path: Path) -> None:
     """A hundred and ten samples are enough; so is a model without acceleration as a state."""
     outcome = stage(tmp_path, rows(good_log(), slice(1000, 1110)), settings=Settings(order=2), report=True)

@@ -127,6 +127,7 @@ def test_no_item_is_lost_with_its_worker(lay: Lay, tmp_path: Path, cluster: Clus
     assert not list(away.folder.rglob(".rrrid-tmp-*"))
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_gone_is_exit_6_and_can_be_gone_on_from(lay: Lay, tmp_path: Path, cluster: Cluster) -> None:
     """It goes away in the middle: what is done is kept, the rest is done by --resume, here or on another cluster."""
     root = lay({f"{i}": f"sleep {0.2 if i < 4 else 1.5} started {tmp_path / 'started'}{i}" for i in range(6)})

@@ -191,6 +191,7 @@ def test_equal_causes_are_refused_before_the_search(tmp_path: Path, monkeypatch:
     assert designed(tmp_path / "waves", "cogging:2:order=7", "cogging:2:order=12", evaluations=2).result.apart is not None
 
 
+@pytest.mark.slow
 def test_a_plan_that_tells_apart_and_a_plain_one_lie_beside_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither takes the default folder of the other, in whichever order they are made."""
     monkeypatch.chdir(tmp_path)

@@ -175,6 +175,7 @@ def test_without_averaging_every_sample_counts() -> None:
     assert not [check for check in found.data_quality if check.code == "RRID-T10"]
 
 
+@pytest.mark.slow
 def test_a_log_with_an_uneven_clock_is_folded_on_its_even_grid() -> None:
     log = periodic(0, 2)
     t = log.t + np.random.default_rng(3).uniform(-0.03, 0.03, log.n_samples) * 1e-3

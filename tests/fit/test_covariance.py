@@ -80,6 +80,7 @@ def test_white_noise_is_recognised() -> None:
     assert seen(autoregressive, 0)[1].min() > 3.0
 
 
+@pytest.mark.slow
 def test_against_the_covariance_of_known_noise() -> None:
     """With 80 000 samples the estimated covariance is the exact one of AR(1) noise, C Aᵀ V A C, to a few per cent."""
     memory, samples = 0.9, 80_000

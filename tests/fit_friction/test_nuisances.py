@@ -42,6 +42,7 @@ def within(value: dict[str, float], truth: float, std: float, relative: float) -
     return abs(value["value"] - truth) <= max(std * value["std"], relative * abs(truth))
 
 
+@pytest.mark.slow
 def test_rests_do_not_count_as_sliding(shared: Path, tmp_path: Path) -> None:
     """Case 24: 3 and 2 N m, 1.0 and 1.6 N m s/rad, 0.5 kg m²; no gravity about an axis that is parallel to it."""
     (joint,) = fitted(shared, tmp_path, "24", "asymmetric_friction")["joints"]

@@ -131,6 +131,7 @@ def test_modes_of_a_link_on_a_spring() -> None:
     assert one.parameters["stiffness"].value == pytest.approx(8000.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_mode_that_moves_along_the_turn_is_as_uncertain() -> None:
     """Half of each way with a spring 3 % stiffer, 1.5 % in frequency: std 0.75 % of it; of one spring far less."""
     logs = [replace(LINK, plant=elastic(0.2, 0.8, k, 4.0)).log() for k in (8000.0, 8240.0)]

@@ -82,6 +82,7 @@ def test_a_soft_base_under_pd(shared: Path) -> None:
     assert base.parameters["inertia"].value == pytest.approx(truth["inertia"], rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_spring_in_a_joint_under_pd(shared: Path) -> None:
     """Joint 2: stiffness within 5 %, motor within 3 %."""
     truth = json.loads((shared / "plant-b" / "answers.json").read_text())["arm-07"]["truth"][0]["parameters"]

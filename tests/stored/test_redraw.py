@@ -50,6 +50,7 @@ def test_a_lost_report_comes_back(results: Path, tmp_path: Path, command: str) -
     assert contents(tmp_path / "here") == before
 
 
+@pytest.mark.slow
 def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """None where a run's lie there; the one that is lost or damaged; all where other code drew them. The bytes are the same."""
     shutil.copytree(results / "run", tmp_path / "a")

@@ -111,6 +111,7 @@ def test_what_no_smaller_motion_mends_stays_as_large_as_it_is(rest: bool) -> Non
     assert len(told) == 2
 
 
+@pytest.mark.slow
 def test_of_several_periods_one_is_rehearsed_with_the_way_in_and_out() -> None:
     task, found = designed(replace(SHORT, rest=False, periods=3), rrr())
     _, rehearsal, _ = rehearsed_design(task, found, 1, lambda words: None)
