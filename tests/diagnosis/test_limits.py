@@ -22,7 +22,7 @@ from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered, causes, diagnosed
 
-FEW = but("cogging", "torque_offset")
+FEW = but("cogging", "torque_offset", "quadratic_drag", "torque_gain")
 SECONDS, NUMBER = 3.0, 7
 
 
