@@ -42,8 +42,9 @@ MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if pa
 _FEW = ("excitation-1", "excitation-2", "hold-1")
 LOGS = {"inspect": _FEW, "convert": ("excitation-1", "hold-1"), "reconstruct": ("excitation-1", "hold-1"), "estimate_bps": _FEW,
         "fit_friction": ("friction-3",), "run": ("excitation-1", "hold-1"), "validate_writing": ("excitation-1", "excitation-2")}
-# Whose two runs are compared by name alone: an import, two fits, a search by chance, a simulation and `run` differ in kind.
-RARELY_TWICE = ("compare", "convert", "demo", "diagnose", "fit_friction", "frf", "inspect", "reconstruct", "validate_writing")
+# Whose two runs are compared by name alone: an import, a fit, a search by chance, a simulation and `run` differ in kind.
+RARELY_TWICE = ("compare", "convert", "demo", "diagnose", "extend", "fit_friction", "frf", "inspect", "reconstruct",
+                "validate_writing")
 FORBIDDEN = {"open", "print", "read_text", "write_text", "read_bytes", "write_bytes", "open_log", "write_log", "savefig"}
 
 

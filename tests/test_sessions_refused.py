@@ -80,7 +80,8 @@ def test_one_can_be_taken_alone(two_arms: Path, tmp_path: Path) -> None:
     assert "arm-a, arm-b" in wrong.stderr
 
 
-@pytest.mark.parametrize("words", [("inspect",), ("convert",), ("simulate", "rrr", "--windowed", "--replay")])
+@pytest.mark.parametrize("words", [
+    pytest.param(("inspect",), marks=pytest.mark.slow), ("convert",), ("simulate", "rrr", "--windowed", "--replay")])
 def test_commands_that_take_each_log_by_itself_have_the_option_too(words: tuple[str, ...], two_arms: Path, tmp_path: Path) -> None:
     done = rrrid(*words, "logs", "--session", "arm-b", "--no-report", "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -95,6 +95,7 @@ def test_what_one_leaves_of_the_other_stands_above_the_noise(both: dict[str, Out
     assert missed(trajectory(both["apart"])) > 3.0 * NOISE
 
 
+@pytest.mark.slow
 def test_what_is_said_of_them_is_of_the_motion_that_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Motions made smaller by their rehearsal tell less: similarity and condition number are their own; the ceiling is missed."""
     def halved(task: Task, found: Design, *given: object) -> tuple[Design, None, str]:

@@ -251,6 +251,7 @@ def test_a_ripple_that_is_there_for_half_a_log_is_none_of_the_machine() -> None:
     assert ("cogging", 1) not in causes(diagnosed(half, exclude=but("cogging"), cutoff_hz=40.0))
 
 
+@pytest.mark.slow
 def test_samples_lost_here_and_there_are_no_fault() -> None:
     fitted, judging = session()
     found = diagnosed(dropped(fitted, lambda k: k % 97 != 96), judging, exclude=but(*FEW))

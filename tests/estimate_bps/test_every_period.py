@@ -77,6 +77,7 @@ def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     assert said[0] == said[1] != ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("periods", "averages"), [
     ((0.2,), (True,)), pytest.param((0.2, 0.1, 0.01, 7.3), (True, False), marks=pytest.mark.slow)])
 def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float], averages: Sequence[bool]) -> None:

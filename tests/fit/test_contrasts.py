@@ -177,8 +177,9 @@ def test_what_repeats_nothing_passes_as_it_is() -> None:
     assert both.longest(150) == 150
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("way", "seeds"), [
-    ("mean", SEEDS), *(pytest.param(way, MORE // 2, marks=pytest.mark.slow) for way in ("mean", "every sample"))])
+    ("mean", SEEDS), ("mean", MORE // 2), ("every sample", MORE // 2)])
 def test_logs_of_one_period_beside_one_of_several(way: str, seeds: int) -> None:
     """An error in each: what is told of both together holds, as it does where the log of several gives its mean alone.
 

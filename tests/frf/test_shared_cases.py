@@ -100,6 +100,7 @@ def test_a_gap_is_no_spring(shared: Path) -> None:
     assert {"backlash", "joint_elasticity"} <= set(found.undecided[0].candidates)
 
 
+@pytest.mark.slow
 def test_the_excited_band_is_that_of_v(shared: Path) -> None:
     """Of v from 4 to 150 Hz: within 2 Hz of it."""
     (measured,) = measured_responses([open_log(shared / "plant-b" / "arm-02" / "frf-3.h5").log])

@@ -189,6 +189,7 @@ def test_more_noise_is_ten_times_as_much() -> None:
     np.testing.assert_allclose(loud, 10.0 * np.array(quiet))
 
 
+@pytest.mark.slow
 def test_sessions_last_52_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each with logs to fit and logs to judge."""
     monkeypatch.setattr(references, "within_torque", lambda machine, reference, centre: reference)  # it takes long

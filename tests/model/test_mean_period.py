@@ -105,6 +105,7 @@ def test_where_a_lead_precedes_them_two_whole_periods_remain() -> None:
     assert elbow_error(log) < 2e-5
 
 
+@pytest.mark.slow
 def test_of_three_periods_the_first_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """A start of 0.6 mrad, too small to make its period an odd one: two others remain, whose mean has nothing of it."""
     log = settling(3, 0.1, size=6e-4)

@@ -22,6 +22,7 @@ from pipelines.report import render
 from pipelines.stage import Outcome, Request, run_stage
 from tests.controlled import controlled_log
 from tests.healthy import begun
+from tests.seeds import rarely
 
 SHORT = run.Settings(skip=tuple(m.replace("_", "-") for m in run.STEPS if m not in ("inspect", "reconstruct", "frf")))
 LONG = run.Settings(skip=("diagnose", "extend"), stages={"estimate-bps": estimate_bps.Settings(compare=False),
@@ -263,8 +264,7 @@ def _shut(log: ExperimentLog) -> Shut:
     return same
 
 
-@pytest.mark.parametrize("module", ["fit_friction", "estimate_bps", "frf",
-                                    pytest.param("validate_writing", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("module", ["estimate_bps", "frf", *rarely("fit_friction", "validate_writing")])
 def test_a_stage_reads_no_other_logs_than_it_says(module: str, samples: Path) -> None:
     """`Uses` is the truth: with every other log shut, the result is the same."""
     from pipelines.errors import NothingMatched

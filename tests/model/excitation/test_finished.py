@@ -64,6 +64,7 @@ def test_where_speed_asks_for_the_torque_a_motion_is_made_smaller() -> None:
     assert all(peak.share <= 1.0 for peak in kept.peaks)
 
 
+@pytest.mark.slow
 def test_a_ceiling_is_that_of_the_motion_as_it_is() -> None:
     """What half of a motion does is not what the search had reached."""
     task = plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(8,)))

@@ -59,6 +59,7 @@ def test_the_reserve_is_what_an_overshoot_takes(seed: int) -> None:
     assert 0.95 < max(np.divide(rehearsal.speed_peak, rehearsal.speed_limit)) <= 1.0
 
 
+@pytest.mark.slow
 def test_a_range_is_kept_by_the_arm_as_by_the_plan() -> None:
     """Joints that may turn by a radian each way of the horizontal: sagging, the shoulder leaves the range that a plan uses up."""
     task, found = designed(replace(SHORT, home=(0.0, -0.3, 0.0)), rrr(position=(-1.0, 1.0)))  # type: ignore[arg-type]

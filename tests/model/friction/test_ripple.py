@@ -88,6 +88,7 @@ def cable(q: float, v: float) -> float:
     return 0.3 * q**3
 
 
+@pytest.mark.slow
 def test_a_spring_is_no_more_than_what_is_left() -> None:
     """Gravity takes most of a spring: what it leaves is told, within 3 std, as a torque of the angle, not as waves or cogging."""
     found = fitted(held_back(spring))

@@ -86,6 +86,7 @@ def test_a_rotor_is_pinocchios_armature(name: str, shared: Path, tmp_path: Path)
     np.testing.assert_allclose(accelerations(Plant.of(arm), q, dq, torque), judge, atol=1e-10 * np.abs(judge).max())
 
 
+@pytest.mark.slow
 def test_one_second_open_loop_of_the_rrr_arm() -> None:
     """Within 1e-9 rad of Pinocchio's RK4 after 1 s at 4 kHz, alone without arrays and among others."""
     case, plant = rrr(), Plant.of(rrr().arm)

@@ -55,6 +55,7 @@ def test_the_chosen_step_costs_a_tenth_of_noise_at_most(sharpness: float | None)
     assert step.per_sample <= (4 if sharpness != 2000.0 else 16)
 
 
+@pytest.mark.slow
 def test_a_step_for_several_experiments_is_fine_enough_for_each() -> None:
     """A crawl takes fewer steps than a wave that reverses; of another sample time it has a step of its own."""
     arm, _ = dry(2000.0)
