@@ -75,7 +75,7 @@ def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
     paths: tuple[Path, ...] = (samples / "rrr-closed-form",)
     if module in LOGS:
         logs = (open_log(samples / f"rrr-closed-form/{name}.h5").log for name in LOGS[module])
-        paths = (written(tmp_path / "few", [begun(log, 4000) for log in logs]),)
+        paths = (written(tmp_path / "few", [begun(log, 3000) for log in logs]),)
     if module == "import_log":
         recipe = _recording(tmp_path / "data", samples)
         settings, paths = replace(settings, recipe=str(recipe), source=recipe.parent), ()
