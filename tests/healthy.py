@@ -149,6 +149,11 @@ def rows(log: ExperimentLog, keep: object) -> ExperimentLog:
     return replace(log, signals={k: replace(s, values=s.values[keep]) for k, s in log.signals.items()})  # type: ignore[index]
 
 
+def begun(log: ExperimentLog, samples: int) -> ExperimentLog:
+    """`log` up to that sample: what is no whole period declares none."""
+    return replace(rows(log, slice(0, samples)), period=None)
+
+
 def healthy_logs(seeds: range) -> list[ExperimentLog]:
     """Every kind of experiment, slow and fast, clean and noisy, with and without a reference or rests."""
     logs = []

@@ -6,7 +6,7 @@ import ast
 import dataclasses
 import inspect
 import json
-import shutil
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from pipelines.stage import Outcome, Request, Stage, run_stage
 from rrrid_cli.commands import STAGES
 from tests.controlled import controlled_log
 from tests.diagnose.sessions import but, session, written
+from tests.healthy import begun
 from tests.log.recording.good import RECIPE, good, text, write
 from tests.log.recording.good import run as run_import
 from tests.repairs import REPAIRS, Repair
@@ -37,10 +38,13 @@ from tests.test_compare import written as written_result
 
 REPO = Path(__file__).resolve().parents[1]
 MODULES = [path.stem for path in sorted((REPO / "pipelines").glob("*.py")) if path.stem not in ("__init__", "stage", "errors")]
-# The sample logs a stage is run on here: few of every kind it reads. Any other stage takes them all.
+# The sample logs of whose first seconds a stage is run here: few of every kind it reads. Any other stage takes them all.
 _FEW = ("excitation-1", "excitation-2", "hold-1")
 LOGS = {"inspect": _FEW, "convert": ("excitation-1", "hold-1"), "reconstruct": ("excitation-1", "hold-1"), "estimate_bps": _FEW,
         "fit_friction": ("friction-3",), "run": ("excitation-1", "hold-1"), "validate_writing": ("excitation-1", "excitation-2")}
+# Whose two runs are compared by name alone: an import, a fit, a search by chance, a simulation and `run` differ in kind.
+RARELY_TWICE = ("compare", "convert", "demo", "diagnose", "extend", "fit_friction", "frf", "inspect", "reconstruct",
+                "validate_writing")
 FORBIDDEN = {"open", "print", "read_text", "write_text", "read_bytes", "write_bytes", "open_log", "write_log", "savefig"}
 
 
@@ -70,31 +74,29 @@ def _run(module: str, tmp_path: Path, samples: Path) -> Ran:
     settings = stage.settings()
     paths: tuple[Path, ...] = (samples / "rrr-closed-form",)
     if module in LOGS:
-        (tmp_path / "few").mkdir(exist_ok=True)
-        paths = (tmp_path / "few",)
-        for name in LOGS[module]:
-            shutil.copy(samples / f"rrr-closed-form/{name}.h5", tmp_path / "few")
+        logs = (open_log(samples / f"rrr-closed-form/{name}.h5").log for name in LOGS[module])
+        paths = (written(tmp_path / "few", [begun(log, 3000) for log in logs]),)
     if module == "import_log":
         recipe = _recording(tmp_path / "data", samples)
-        settings, paths = dataclasses.replace(settings, recipe=str(recipe), source=recipe.parent), ()
+        settings, paths = replace(settings, recipe=str(recipe), source=recipe.parent), ()
     if module == "simulate":
         write_log(tmp_path / "waving.h5", controlled_log(400))
-        settings, paths = dataclasses.replace(settings, model="rrr"), (tmp_path / "waving.h5",)
+        settings, paths = replace(settings, model="rrr"), (tmp_path / "waving.h5",)
     if module == "frf":
-        settings, paths = dataclasses.replace(settings, high=60.0), (samples / "rrr-healthy/frf-1-1.h5",)
+        settings, paths = replace(settings, high=60.0), (samples / "rrr-healthy/frf-1-1.h5",)
     if module == "run":
-        settings = dataclasses.replace(settings, skip=("fit-friction", "validate-writing", "diagnose", "extend"))
+        settings = replace(settings, skip=("fit-friction", "validate-writing", "diagnose", "extend"))
     if module in ("diagnose", "extend"):
         paths = (written(tmp_path / "brief", session("cogging", 1, 2.0, 1)),)
         more: dict[str, Any] = {"exclude": but("cogging"), "max_causes": 1} if module == "diagnose" else {
             "causes": ("cogging:1",)}
-        settings = dataclasses.replace(settings, **more)
+        settings = replace(settings, **more)
     if module == "demo":
         paths = ()
     if module == "compare":
         paths = (written_result(tmp_path / "a", 1), written_result(tmp_path / "b", 2))
     if module == "design_excitation":
-        settings, paths = dataclasses.replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
+        settings, paths = replace(settings, evaluations=150, harmonics=(15,), rehearse=False), ()
     return stage, run_stage(stage, Request(paths, out=tmp_path / "out", no_report=True), settings)
 
 
@@ -163,7 +165,8 @@ def test_a_stored_result_redraws_its_report(ran: Ran, monkeypatch: pytest.Monkey
     assert redrawn == drawn
 
 
-@pytest.mark.parametrize("ran", MODULES, indirect=True)
+@pytest.mark.parametrize("ran", [
+    pytest.param(m, marks=pytest.mark.slow if m in RARELY_TWICE else ()) for m in MODULES], indirect=True)
 def test_twice_is_the_same(ran: Ran, tmp_path: Path, samples: Path) -> None:
     """Equal inputs give equal bytes, provenance.json apart; that a report follows from its result is another test's."""
     contents = []
@@ -191,7 +194,8 @@ def test_every_log_a_stage_writes_is_in_order(ran: Ran, tmp_path: Path) -> None:
     assert complaints == []
 
 
-@pytest.mark.parametrize("repair", REPAIRS, ids=[r.row.replace(" ", "-") for r in REPAIRS])
+@pytest.mark.parametrize("repair", [pytest.param(one, id=one.row.replace(" ", "-"), marks=pytest.mark.slow if k % 3 else ())
+                                    for k, one in enumerate(REPAIRS)])
 def test_what_an_import_has_mended_is_in_order(repair: Repair, tmp_path: Path) -> None:
     """Import and doctor judge by the same limits: nothing is left to reject or to mend, but glitches, which are recorded."""
     write(tmp_path / "data", text(good()))

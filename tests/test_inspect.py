@@ -19,6 +19,7 @@ from pipelines.stage import Outcome, Request, run_stage
 from tests.fault_table import FAULTS
 from tests.faulty import faster, good_path
 from tests.healthy import good_log, make_log, rest, rows, with_signal
+from tests.seeds import rarely
 
 MAKE = {fault.row: fault.make for fault in FAULTS}
 
@@ -34,7 +35,7 @@ def doctor(folder: Path, *logs: ExperimentLog, check: bool = False, strict: bool
 
 @pytest.mark.parametrize(("row", "plain", "checked"), [
     ("", 0, 0),  # nothing wrong
-    ("T03", 0, 0),  # a warning alone is not a failed check
+    *rarely(("T03", 0, 0)),  # a warning alone is not a failed check
     ("T01", 0, 1),  # repaired
     ("S14", 0, 1),  # a gate
     ("S09", 3, 3),  # not usable
@@ -106,8 +107,8 @@ def test_equal_logs_give_equal_results(tmp_path: Path) -> None:
     assert texts[0] == texts[1]
 
 
-@pytest.mark.parametrize("row", ["T04", "T08 none", "D02 channel", *(pytest.param(row, marks=pytest.mark.slow) for row in (
-    "T01", "T08", "S08 ns", "S08 neither", "D03 huge", "D05 flat top", "D11 power"))])
+@pytest.mark.parametrize("row", ["T04", "T08 none", *rarely(
+    "D02 channel", "T01", "T08", "S08 ns", "S08 neither", "D03 huge", "D05 flat top", "D11 power")])
 def test_the_report_of_a_broken_log_is_drawn(row: str, tmp_path: Path) -> None:
     """One page, without script, that names the finding, within 200 kB."""
     outcome = doctor(tmp_path, MAKE[row](good_log()), no_report=False)
@@ -167,6 +168,7 @@ def _codes(log: ExperimentLog, tmp_path: Path) -> list[tuple[str, str]]:
     return [(c.code, c.message) for c in doctor(tmp_path, log).result.checks if c.level != "ok"]
 
 
+@pytest.mark.slow
 def test_a_recorded_arm_is_in_order(tx40: ExperimentLog, tmp_path: Path) -> None:
     """Six joints, wrist friction no model explains, 1.5 s of rest at the end, links described wrongly: no false alarm."""
     assert _codes(tx40, tmp_path) == []

@@ -178,10 +178,3 @@ def test_help_imports_no_numpy() -> None:
     code = "import rrrid_cli.main, sys; print(sorted({'numpy', 'h5py', 'rich', 'pipelines.stage'} & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPO, check=False)
     assert done.stdout == "[]\n"
-
-
-def test_every_module_says_what_it_is() -> None:
-    """The docstring's first line is the title: reports and `--help` reuse it."""
-    firsts = {module: (ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or "").partition("\n")[0]
-              for module, path in MODULES.items()}
-    assert [module for module, first in firsts.items() if len(first) <= 15 or ("." not in first and not first.endswith(":"))] == []

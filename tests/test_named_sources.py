@@ -43,6 +43,7 @@ def literals(path: Path) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.value
 
 
+@pytest.mark.slow
 def test_no_message_speaks_of_a_paper_without_its_name() -> None:
     wrong = [f"{path.relative_to(REPO)}:{line}: {text}" for path in FILES for line, text in literals(path) if nameless(text)]
     assert not wrong, "\n".join(wrong)

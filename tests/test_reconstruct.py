@@ -123,7 +123,7 @@ def test_what_the_doctor_rejects_is_rejected(row: str, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("row", [pytest.param(row, marks=pytest.mark.slow if k % 3 else ()) for k, row in enumerate(MENDED)])
+@pytest.mark.parametrize("row", [pytest.param(row, marks=pytest.mark.slow if k % 6 else ()) for k, row in enumerate(MENDED)])
 def test_what_the_doctor_mends_is_reconstructed_and_said(row: str, tmp_path: Path) -> None:
     """Exit 0; the finding stands in the result; the motion is finite at every sample; with --strict a repair is an error."""
     fault = next(f for f in FAULTS if f.row == row)
@@ -272,6 +272,7 @@ def test_report_shows_what_the_paper_shows(tmp_path: Path) -> None:
     assert "standard deviation" in outcome.report.verdict
 
 
+@pytest.mark.slow
 def test_a_short_log_and_an_order_of_two(tmp_path: Path) -> None:
     """A hundred and ten samples are enough; so is a model without acceleration as a state."""
     outcome = stage(tmp_path, rows(good_log(), slice(1000, 1110)), settings=Settings(order=2), report=True)

@@ -17,7 +17,8 @@ from pipelines.log.sessions import apart
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 from tests.cli.commands import rrrid
-from tests.diagnose.sessions import but, session, written
+from tests.diagnose.sessions import written
+from tests.healthy import begun
 
 # What is dear and has tests of its own is left out: diagnosis, the choice of a law of friction, simulated writing.
 WITHOUT = run.Settings({"fit-friction": fit_friction.Settings(law="three_sigmoid"),
@@ -27,9 +28,16 @@ ESTIMATE = run.Settings({"estimate-bps": estimate_bps.Settings(compare=False)},
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Outcome[run.Result]:
-    """`rrrid run` on the sample logs; every joint was driven alone in one of them."""
-    request = Request((samples / "rrr-closed-form",), out=tmp_path_factory.mktemp("run") / "out", no_report=True)
+def logs(tmp_path_factory: pytest.TempPathFactory, samples: Path) -> Path:
+    """Six seconds of each sample log; every joint was driven alone in one of them."""
+    opened = (open_log(path).log for path in sorted((samples / "rrr-closed-form").glob("*.h5")))
+    return written(tmp_path_factory.mktemp("logs") / "logs", [begun(log, 6000) for log in opened])
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory, logs: Path) -> Outcome[run.Result]:
+    """`rrrid run` on them."""
+    request = Request((logs,), out=tmp_path_factory.mktemp("run") / "out", no_report=True)
     return run_stage(run.STAGE, request, WITHOUT)
 
 
@@ -65,35 +73,25 @@ def test_what_to_record_is_said(whole: Outcome[run.Result]) -> None:
     assert "let one joint turn" in str(row[2])
 
 
-def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
+def test_the_workflow_gives_what_its_stages_give(whole: Outcome[run.Result], logs: Path, tmp_path: Path) -> None:
     """estimate-bps inside `run`, on derived logs, is estimate-bps on the recordings with the friction that fit-friction found."""
     settings = estimate_bps.Settings(model=str(whole.folder / "fit-friction/model.json"))
-    alone = run_stage(estimate_bps.STAGE, Request((samples / "rrr-closed-form",), out=tmp_path / "out", no_report=True), settings)
+    alone = run_stage(estimate_bps.STAGE, Request((logs,), out=tmp_path / "out", no_report=True), settings)
     inside = json.loads((whole.folder / "result.json").read_text())["stages"][3]["result"]
     assert inside["parameters"] == alone.json["parameters"]
     assert inside["relative_error"] == alone.json["relative_error"]
     assert (whole.folder / "estimate-bps/model.json").read_bytes() == (alone.folder / "model.json").read_bytes()
 
 
-def test_it_is_said_whose_friction_went_in(whole: Outcome[run.Result], samples: Path, tmp_path: Path) -> None:
+def test_it_is_said_whose_friction_went_in(whole: Outcome[run.Result], logs: Path, tmp_path: Path) -> None:
     """In a run that of fit-friction, on its own none, or that of a model; the report says so, and which option makes them equal."""
     rests = next(section for section in whole.report.sections if section.title == "estimate-bps: What the estimate rests on")
     assert rests.text[0].startswith("Friction: held, that of fit-friction, earlier in this run.")
     assert "--model RUN/fit-friction/model.json" in rests.text[0]
-    logs = samples / "rrr-closed-form"
     for words, said in (((), "Friction: Coulomb and viscous, fitted with the rest, for no other was given."),
                         (("--model", whole.folder / "fit-friction/model.json"), "Friction: held, that of model.json, as --model")):
         told = rrrid("estimate-bps", logs, *words, "--no-report", "--out", tmp_path / "out", cwd=tmp_path).stdout
         assert said in told
-
-
-def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(tmp_path: Path) -> None:
-    words = ("diagnose", written(tmp_path / "brief", session("cogging", 1, 2.0, 1)), "--out", tmp_path / "out", "--no-report",
-             "--max-causes", "1", *(word for cause in but("cogging") for word in ("--exclude", cause)))
-    told = rrrid(*words, cwd=tmp_path).stdout
-    assert "Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run" in told
-    assert "--set diagnose.model=FILE" in told
-    assert "Thresholds: " in told
 
 
 def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path: Path) -> None:
@@ -108,11 +106,11 @@ def test_what_a_folder_lacks_is_passed_over_with_a_word(samples: Path, tmp_path:
     assert "ecord an excitation" in last.report.verdict
 
 
-def test_a_bad_log_costs_itself_alone(samples: Path, tmp_path: Path) -> None:
+def test_a_bad_log_costs_itself_alone(logs: Path, tmp_path: Path) -> None:
     """One damaged file and one log that stands still beside good ones: exit 3, and the rest is estimated as without them."""
     (tmp_path / "logs").mkdir()
     for name in ("excitation-1", "excitation-2"):
-        shutil.copy(samples / f"rrr-closed-form/{name}.h5", tmp_path / "logs")
+        shutil.copy(logs / f"{name}.h5", tmp_path / "logs")
     good = run_stage(run.STAGE, Request((tmp_path / "logs",), out=tmp_path / "good", no_report=True), ESTIMATE)
     (tmp_path / "logs/cut.h5").write_bytes((tmp_path / "logs/excitation-1.h5").read_bytes()[:9000])
     log = open_log(tmp_path / "logs/excitation-1.h5").log

@@ -51,7 +51,8 @@ def test_committed_logs_are_what_the_script_makes(rebuilt: dict[str, ExperimentL
         assert not opened.checks
 
 
-@pytest.mark.parametrize(("name", "made"), [("rrr-healthy/hold-1", healthy_logs), ("rrr-changed/writing-6", changed_logs)])
+@pytest.mark.parametrize(("name", "made"), [
+    ("rrr-healthy/hold-1", healthy_logs), pytest.param("rrr-changed/writing-6", changed_logs, marks=pytest.mark.slow)])
 def test_a_bench_log_is_what_the_script_makes(name: str, made: Callable[[str], Iterator[tuple[str, ExperimentLog]]],
                                               samples: Path) -> None:
     """The same digest from the committed file and from the machine recorded anew; by another MuJoCo, or on a processor whose LAPACK
@@ -111,6 +112,7 @@ def test_writing_by_feedback_alone_errs_by_millimetres(samples: Path, arm: Arm) 
     assert (spread[0] / spread[1] > [3.2, 6.9, 4.3]).all()
 
 
+@pytest.mark.slow
 def test_logs_pass_the_strict_checker(shared: Path, samples: Path) -> None:
     """check_log.py finds no fault."""
     done = subprocess.run([sys.executable, str(shared / "tools" / "check_log.py"), str(samples)], check=False,

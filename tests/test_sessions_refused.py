@@ -14,6 +14,7 @@ from pipelines.log.files import open_log, write_log
 from pipelines.log.mixed import SeveralSessions
 from pipelines.stage import Request, Stage, run_stage
 from tests.cli.commands import rrrid
+from tests.healthy import begun
 
 READING = ("run", "inspect", "convert", "reconstruct", "fit_friction", "estimate_bps", "validate_writing", "frf", "diagnose",
            "extend", "simulate", "design_excitation")
@@ -21,10 +22,10 @@ QUICK = ("--no-report", "--set", "estimate-bps.compare=false")
 
 
 def _put(folder: Path, prefix: str, kinds: tuple[str, ...], origin: Path, **about: Any) -> None:
-    """Copies of the sample logs `kinds`, with other attributes."""
+    """Eight seconds of the sample logs `kinds`, with other attributes."""
     folder.mkdir(exist_ok=True)
     for kind in kinds:
-        write_log(folder / f"{prefix}{kind}.h5", replace(open_log(origin / f"{kind}.h5").log, **about))
+        write_log(folder / f"{prefix}{kind}.h5", replace(begun(open_log(origin / f"{kind}.h5").log, 8000), **about))
 
 
 @pytest.fixture
@@ -79,7 +80,8 @@ def test_one_can_be_taken_alone(two_arms: Path, tmp_path: Path) -> None:
     assert "arm-a, arm-b" in wrong.stderr
 
 
-@pytest.mark.parametrize("words", [("inspect",), ("convert",), ("simulate", "rrr", "--windowed", "--replay")])
+@pytest.mark.parametrize("words", [
+    pytest.param(("inspect",), marks=pytest.mark.slow), ("convert",), ("simulate", "rrr", "--windowed", "--replay")])
 def test_commands_that_take_each_log_by_itself_have_the_option_too(words: tuple[str, ...], two_arms: Path, tmp_path: Path) -> None:
     done = rrrid(*words, "logs", "--session", "arm-b", "--no-report", "--out", "out", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -266,13 +266,13 @@ def test_a_failed_stage_leaves_the_earlier_result(logs: Path) -> None:
 
 @pytest.mark.row("P01")
 def test_a_killed_stage_leaves_the_old_folder_or_the_new_one(logs: Path) -> None:
-    """P01: SIGKILL at 20 points of a run that replaces its own output: a folder whose every file fits its provenance."""
+    """P01: SIGKILL at ten points of a run that replaces its own output: a folder whose every file fits its provenance."""
     request, kinds = _request(logs, no_report=True), set()
     run_stage(convert.STAGE, request, convert.Settings("parquet"))
     began = time.monotonic()
     run_stage(convert.STAGE, request, convert.Settings("csv"))
     lasted = time.monotonic() - began
-    for kill in range(0, 40, 2):
+    for kill in range(0, 40, 4):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", DeprecationWarning)
             child = os.fork()

@@ -69,8 +69,9 @@ def test_a_cluster_gives_the_same_bytes_and_bears_the_same_misfortunes(lay: Lay,
         place: text for place, text in contents(here.folder).items() if not place.startswith("crashes")}
 
 
+@pytest.mark.slow
 @pytest.mark.row("P06", "P07")
-@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, 143, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_a_batch_and_leaves_the_cluster_free(lay: Lay, tmp_path: Path, cluster: Cluster, number: signal.Signals,
                                                            exit_code: int) -> None:
     """P06: a summary within 5 s while both workers are at long items, which are dropped; the next batch has the workers at once."""
@@ -126,6 +127,7 @@ def test_no_item_is_lost_with_its_worker(lay: Lay, tmp_path: Path, cluster: Clus
     assert not list(away.folder.rglob(".rrrid-tmp-*"))
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_is_gone_is_exit_6_and_can_be_gone_on_from(lay: Lay, tmp_path: Path, cluster: Cluster) -> None:
     """It goes away in the middle: what is done is kept, the rest is done by --resume, here or on another cluster."""
     root = lay({f"{i}": f"sleep {0.2 if i < 4 else 1.5} started {tmp_path / 'started'}{i}" for i in range(6)})

@@ -18,6 +18,7 @@ from pipelines.log.files import write_log
 from tests.batch.conftest import contents
 from tests.cli.commands import REPO, RRRID, rrrid
 from tests.log.logs import small_log
+from tests.seeds import rarely
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,7 @@ def _text(path: Path) -> str:
 
 
 @pytest.mark.row("P06", "P07")
-@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), *rarely((signal.SIGTERM, 143))])
 def test_a_signal_ends_with_a_summary_and_resume_ends_the_same(many: Path, tmp_path: Path, number: signal.Signals,
                                                                exit_code: int) -> None:
     """P06, P07: to the whole group, as a terminal sends it; within 5 s, a summary of all, no orphan, nothing half written."""

@@ -28,6 +28,7 @@ from pipelines.bench.solid import Solid
 from tests.bench.machines import sway
 from tests.bench.test_rigid import standard_parameters
 from tests.model.rigid.serial_arms import Arm, by_hand
+from tests.seeds import usually
 
 SHARPNESS = 100.0  # [s/rad]
 FC, FV = (4.5, 2.4, 0.9), (0.6, 0.3, 0.12)
@@ -136,7 +137,8 @@ def test_nothing_is_left_of_a_healthy_machine() -> None:
 
 
 @pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", COLUMNS)
+@pytest.mark.parametrize("name", usually(
+    COLUMNS, "cogging", "stribeck", "presliding", "torque_gain", "torque_crosstalk", "drive_lag", "rotor_inertia"))
 def test_a_load_has_the_sign_and_the_size_of_its_answer(name: str, joint: int) -> None:
     """The column of causes.md at the answer's parameters, coefficient near one."""
     fault = make(name, machine(), joint, seed=2, duration=2.0)

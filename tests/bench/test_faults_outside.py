@@ -71,6 +71,7 @@ def test_a_sloshing_load_swings_at_its_frequency() -> None:
     assert np.ptp(swing[:500]) > 1.5 * np.ptp(swing[-500:])
 
 
+@pytest.mark.slow
 def test_cables_dissipate_whatever_the_speed() -> None:
     """Work over one closed cycle of bending is positive and the same at half the speed."""
     work = []

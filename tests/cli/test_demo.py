@@ -60,6 +60,7 @@ def test_an_arm_that_runs_away_is_told_of_the_fault() -> None:
     assert "log" not in refused.value.remedy
 
 
+@pytest.mark.slow
 @pytest.mark.row("C05")
 def test_what_was_put_in_its_place_is_kept(tmp_path: Path) -> None:
     """Another command's result lies where the logs shall: it is moved aside, and that is said, though recording has no page."""

@@ -99,6 +99,7 @@ def test_mjcf_of_the_case_and_a_urdf_by_another_name(shared: Path, tmp_path: Pat
     assert load_robot(tmp_path / "arm.xml").n_joints == 6
 
 
+@pytest.mark.slow
 def test_the_remedy_for_a_branching_arm_works_where_it_is_given(shared: Path, tmp_path: Path) -> None:
     """Case 46: seven joints and two fingers. What the error offers works on the command line, in a recipe and in a description."""
     for file in (shared / "cases" / "46-panda-tip-link-remedy").iterdir():

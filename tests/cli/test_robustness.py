@@ -19,6 +19,7 @@ import pytest
 from benchmarks.mutations import mutations, read_apart, warm_up
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.model_file import parse_model
+from pipelines.log.recording import filenames
 from pipelines.log.recording.filenames import matches
 from pipelines.log.shipped import shipped
 from pipelines.log.toml_text import TomlError, parse_toml
@@ -51,6 +52,8 @@ HOSTILE: dict[str, tuple[str, str]] = {
         for k in range(5000)) + '<link name="l5000"/></robot>'),
 }
 
+ALIKE = {"60,000 columns of one name"}  # to "header of 60,000 names"
+
 
 @pytest.fixture(scope="module")
 def _warm() -> None:
@@ -58,7 +61,7 @@ def _warm() -> None:
 
 
 @pytest.mark.usefixtures("_warm")
-@pytest.mark.parametrize("name", HOSTILE)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in ALIKE else ()) for name in HOSTILE])
 def test_a_hostile_text_costs_little(name: str) -> None:
     """Reading it ends within 5 s and 500 MB, in a draft or in an error with a code."""
     kind, text = HOSTILE[name]
@@ -70,8 +73,8 @@ def test_a_hostile_text_costs_little(name: str) -> None:
 
 @pytest.mark.usefixtures("_warm")
 def test_mutations_cost_little() -> None:
-    """Of 40 damaged texts none takes 5 s or 500 MB, or ends in an internal error (`python -m benchmarks.mutations`: of 10,000)."""
-    for k, (kind, text) in enumerate(mutations(40, seed=51)):
+    """Of 15 damaged texts none takes 5 s or 500 MB, or ends in an internal error (`python -m benchmarks.mutations`: of 10,000)."""
+    for k, (kind, text) in enumerate(mutations(15, seed=51)):
         reading = read_apart(kind, text)
         assert not reading.outcome.startswith("internal"), (k, reading.outcome)
         assert reading.seconds < SECONDS, k
@@ -93,10 +96,11 @@ def test_healthy_toml_is_within_the_bounds() -> None:
 
 
 @pytest.mark.parametrize("pattern", ["{x:(a+)+}!.csv", pytest.param("*a" * 20 + "!", marks=pytest.mark.slow)])
-def test_a_pattern_cannot_hang_the_import(pattern: str, tmp_path: Path) -> None:
-    """An expression that would take ages is refused after 3 s; healthy ones give their groups as before."""
+def test_a_pattern_cannot_hang_the_import(pattern: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An expression that would take ages is refused when its time, here a second, is over; healthy ones give their groups."""
+    monkeypatch.setattr(filenames, "_SECONDS", 1.0)
     began = time.monotonic()
-    with pytest.raises(UsageError, match=r"RRID-C02.*takes more than 3 s"):
+    with pytest.raises(UsageError, match=r"RRID-C02.*takes more than 1 s"):
         matches([pattern], ["a" * 60 + ".csv"], tmp_path)
     assert time.monotonic() - began < 15.0  # on a busy machine
     assert matches([r"{x:run}_{n:\d{2}}.csv", "*.mat"], ["run_07.csv", "b.mat"], tmp_path) == [
@@ -125,7 +129,7 @@ def _shell(line: str, cwd: Path, **environment: str) -> subprocess.CompletedProc
                           env=os.environ | {"PYTHONPATH": str(REPO)} | environment)
 
 
-@pytest.mark.parametrize("closed", [">&-", "2>&-", "<&- >&- 2>&-"])
+@pytest.mark.parametrize("closed", ["<&- >&- 2>&-", *(pytest.param(one, marks=pytest.mark.slow) for one in (">&-", "2>&-"))])
 def test_closed_streams_are_no_error(closed: str, logs: Path) -> None:
     """Without standard output, error, or any stream the work is done all the same, and an error keeps its code."""
     done = _shell(f"RRRID convert logs --to csv --out out {closed}; echo $? > code; "
@@ -139,9 +143,9 @@ def test_an_encoding_without_our_signs(logs: Path) -> None:
     words = _shell("RRRID convert logs --to csv --out out", logs, PYTHONIOENCODING="ascii")
     assert words.returncode == 0
     assert b"-> " in words.stdout
-    texts = [json.loads(_shell("RRRID convert logs --to csv --out out --json", logs, PYTHONIOENCODING=encoding).stdout)
-             for encoding in ("ascii", "utf-8")]
-    assert texts[0] == texts[1]
+    command = ("convert", "logs", "--to", "csv", "--out", "out", "--json")
+    ascii_ = _shell(f"RRRID {shlex.join(command)}", logs, PYTHONIOENCODING="ascii")
+    assert json.loads(ascii_.stdout) == json.loads(rrrid(*command, cwd=logs).stdout)
 
 
 def test_a_deleted_working_folder(logs: Path) -> None:

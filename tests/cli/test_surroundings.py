@@ -15,6 +15,7 @@ from pipelines import convert
 from pipelines.log.files import write_log
 from tests.cli.commands import REPO, RRRID, rrrid
 from tests.log.logs import small_log
+from tests.seeds import rarely
 
 
 def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -31,7 +32,7 @@ def test_an_internal_error_is_exit_70_with_a_crash_file(logs: Path, monkeypatch:
 
 
 @pytest.mark.row("P06")
-@pytest.mark.parametrize(("number", "exit_code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+@pytest.mark.parametrize(("number", "exit_code"), [*rarely((signal.SIGINT, 130)), (signal.SIGTERM, 143)])
 def test_a_signal_ends_cleanly(tmp_path: Path, number: signal.Signals, exit_code: int) -> None:
     """P06: Ctrl-C and SIGTERM end within 5 s with their code, no half-written folder, no orphan."""
     for i in range(30):

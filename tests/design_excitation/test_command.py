@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.design_excitation import STAGE
+from pipelines.design_excitation import STAGE, Result
 from pipelines.errors import InputRejected, Interrupted, UsageError
 from pipelines.inspect import STAGE as DOCTOR
 from pipelines.log.files import open_log
-from pipelines.stage import Request, run_stage
+from pipelines.stage import Outcome, Request, run_stage
 from tests.cli.commands import rrrid
 from tests.design_excitation.short import QUICK, designed
 
@@ -40,9 +40,14 @@ transmission = [[10.0, 0.0, 0.0], [0.0, 20.0, 0.0], [0.0, 5.0, 30.0]]
 """
 
 
-def test_what_the_result_says(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Outcome[Result]:
+    return designed(tmp_path_factory.mktemp("plain") / "out")
+
+
+def test_what_the_result_says(plain: Outcome[Result]) -> None:
     """Every key of the contract; limits kept; the certificate beside the value."""
-    done = designed(tmp_path / "out").json
+    done = plain.json
     for key in ("condition_number", "lower_bound", "criterion", "predicted_relative_std", "limits", "evaluations"):
         assert done[key] is not None
     assert done["evaluations"] == 150
@@ -54,9 +59,9 @@ def test_what_the_result_says(tmp_path: Path) -> None:
     assert done["limits"][-1]["limit"] in (-13.5, 13.5)  # nine tenths of 15 N m
 
 
-def test_the_files_agree(tmp_path: Path) -> None:
+def test_the_files_agree(plain: Outcome[Result], tmp_path: Path) -> None:
     """The log, the coefficients by eq. (22), and the table for a controller are one motion; the doctor finds the log in order."""
-    out = designed(tmp_path / "out").folder
+    out = plain.folder
     log = open_log(out / "trajectory.h5").log
     assert (log.origin, log.experiment, log.role, log.period) == ("planned", "excitation", "identify", 10.0)
     assert "q" not in log
@@ -111,17 +116,17 @@ def test_a_rehearsal_before_the_robot_moves(tmp_path: Path) -> None:
     assert all(peak < limit for peak, limit in zip(done.rehearsal.torque_peak, done.rehearsal.torque_limit, strict=True))
 
 
-def test_who_stops_the_rehearsal_keeps_the_motion_with_all_its_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_stops_the_rehearsal_keeps_the_motion_with_all_its_files(plain: Outcome[Result], tmp_path: Path,
+                                                                     monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C while it is simulated: the motion that was searched, exit 130, and no word of a rehearsal."""
     def stopped(*given: object) -> None:
         raise Interrupted(signal.SIGINT)
 
     monkeypatch.setattr("pipelines.model.excitation.rehearse.rehearse", stopped)
     outcome = designed(tmp_path / "out", replace(QUICK, rehearse=True))
-    alone = designed(tmp_path / "alone")
     for name in ("trajectory.h5", "controller.csv", "coefficients.json", "result.json"):
         assert (outcome.folder / name).is_file()
-    assert (outcome.folder / "controller.csv").read_bytes() == (alone.folder / "controller.csv").read_bytes()
+    assert (outcome.folder / "controller.csv").read_bytes() == (plain.folder / "controller.csv").read_bytes()
     assert (outcome.result.rehearsal, outcome.json["interrupted"]) == (None, True)
     assert STAGE.exit_code(outcome.result, False) == 130
     assert "interrupted" in outcome.report.verdict

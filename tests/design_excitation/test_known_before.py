@@ -67,6 +67,7 @@ def testwithout_links_torque_is_not_claimed_to_be_checked(tmp_path: Path) -> Non
     assert all(one.quantity != "torque" for one in outcome.result.limits)
 
 
+@pytest.mark.slow
 def test_bounds_on_the_parameters_limit_the_torque(tmp_path: Path) -> None:
     """No parameters between the bounds ask for more than the limit, on 0.1 ms; the corner that asks most comes near to it."""
     body = Arm.from_links(load_robot("rrr")).body

@@ -95,6 +95,7 @@ def test_what_one_leaves_of_the_other_stands_above_the_noise(both: dict[str, Out
     assert missed(trajectory(both["apart"])) > 3.0 * NOISE
 
 
+@pytest.mark.slow
 def test_what_is_said_of_them_is_of_the_motion_that_is_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Motions made smaller by their rehearsal tell less: similarity and condition number are their own; the ceiling is missed."""
     def halved(task: Task, found: Design, *given: object) -> tuple[Design, None, str]:
@@ -191,6 +192,7 @@ def test_equal_causes_are_refused_before_the_search(tmp_path: Path, monkeypatch:
     assert designed(tmp_path / "waves", "cogging:2:order=7", "cogging:2:order=12", evaluations=2).result.apart is not None
 
 
+@pytest.mark.slow
 def test_a_plan_that_tells_apart_and_a_plain_one_lie_beside_each_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither takes the default folder of the other, in whichever order they are made."""
     monkeypatch.chdir(tmp_path)

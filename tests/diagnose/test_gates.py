@@ -63,8 +63,8 @@ def test_data_that_are_wrong_are_refused_with_their_repair(what: str, healthy: E
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize(("cause", "joint"), [("time_delay", 1), ("torque_crosstalk", 2), *(
-    pytest.param(*other, marks=pytest.mark.slow) for other in (("torque_gain", 2), ("torque_lag", 1)))])
+@pytest.mark.parametrize(("cause", "joint"), [("time_delay", 1), *(
+    pytest.param(*other, marks=pytest.mark.slow) for other in (("torque_crosstalk", 2), ("torque_gain", 2), ("torque_lag", 1)))])
 def test_a_fault_of_the_arm_closes_no_gate(cause: str, joint: int) -> None:
     """At full strength, and of the kinds that look most like a mix-up."""
     assert [check.code for check in examined(session(cause, joint, 6.0, 1))[0] if check.gate] == []

@@ -13,6 +13,8 @@ from pathlib import Path
 import pytest
 
 from pipelines import diagnose, run
+from pipelines.bench.faults import make
+from pipelines.bench.machine import draw_machine
 from pipelines.errors import UsageError
 from pipelines.stage import Outcome, Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written
@@ -34,7 +36,7 @@ def rippled(tmp_path_factory: pytest.TempPathFactory) -> Outcome[diagnose.Result
     """Cogging at joint 2, since reference logs."""
     place = tmp_path_factory.mktemp("cogging")
     logs = (*healthy_again(session()), *session("cogging", 2))
-    return asked(written(place / "logs", logs), place / "out")
+    return asked(written(place / "logs", logs), place / "out", exclude=but("cogging", "torque_offset"))
 
 
 @pytest.mark.slow
@@ -63,6 +65,10 @@ def test_a_cause_is_named_with_its_joint_and_its_numbers(rippled: Outcome[diagno
     """Exit 1 under --check; the extended model is better on the held-out log, and the simulated arm nearer."""
     finding = rippled.result.findings[0]
     assert (finding.cause, finding.joint, rippled.exit_code) == ("cogging", 2, 1)
+    truth = make("cogging", draw_machine(7, "fault"), 2, 1, 1.0).parameters()
+    assert finding.parameters["order"].value == pytest.approx(truth["order"], rel=0.01)
+    turned = finding.parameters["phase"].value - truth["phase"]
+    assert math.remainder(turned, 2.0 * math.pi) == pytest.approx(0.0, abs=0.05)
     assert finding.parameters["amplitude"].value == pytest.approx(0.28, rel=0.05)  # 0.4 N m, joint factor 0.7
     gain = finding.gain
     assert gain.validate_torque_rms.ci95[1][1] < 0.0
@@ -92,6 +98,13 @@ def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> Non
     assert any(" mm " in text for text in first.text)
     assert first.figures[0].name == "proof-1"
     assert {"What this rests on", "What would have been found"} <= {section.title for section in report.sections}
+
+
+def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(rippled: Outcome[diagnose.Result]) -> None:
+    told = " ".join(words for section in rippled.report.sections for words in section.text)
+    assert "Friction laws: Coulomb and viscous to begin with, fitted here, alone and in a run" in told
+    assert "--set diagnose.model=FILE" in told
+    assert "Thresholds: " in told
 
 
 def test_without_a_name_the_nearest_explanations_are_told(rippled: Outcome[diagnose.Result]) -> None:

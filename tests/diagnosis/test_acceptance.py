@@ -40,6 +40,7 @@ def test_a_model_that_runs_away_has_no_simulated_gain() -> None:
     assert (gain.simulated_position_rms, gain.tip_error_rms, gain.simulation) == (None, None, "none")
 
 
+@pytest.mark.slow
 def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """One window of one arm without an end: that arm has no simulated error, the other keeps its own."""
     log = replace(session()[0], controller=None)
@@ -83,6 +84,7 @@ def test_the_simulated_span_is_where_the_measured_arm_counts(long: tuple[Any, An
         assert (simulation_errors([arm], ((moved, found),))[0].tip_rms == first.tip_rms) == same
 
 
+@pytest.mark.slow
 def test_longer_stretches_are_simulated_where_the_last_arm_comes_no_nearer(long: tuple[Any, Any]) -> None:
     """An arm that is worse first, and then the fitted one: what is short tells. The same two the other way round, and one arm
     twice, are told apart by all of the log."""

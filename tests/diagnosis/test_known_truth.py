@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +20,7 @@ from tests.diagnosis.arms import arm, hidden, wave
 from tests.diagnosis.asking import answered, causes, diagnosed, effects
 from tests.diagnosis.rotor import turned
 from tests.faulty import dropped
-from tests.healthy import rows, with_signal
+from tests.healthy import begun, with_signal
 from tests.model.estimation.experiments import VISCOUS
 
 Load = Callable[[Motion], Array]  # torque (samples, joints) [N m] that a motion costs beside
@@ -38,9 +37,10 @@ def logs(load: Load | None = None) -> tuple[ExperimentLog, ...]:
 
 def short(load: Load) -> list[ExperimentLog]:
     """Four seconds of a log to fit and of one that judges."""
-    return [rows(replace(log, period=None), slice(0, 4000)) for log in logs(load)[1:]]
+    return [begun(log, 4000) for log in logs(load)[1:]]
 
 
+@pytest.mark.slow
 def test_cogging_is_found_at_its_joint_with_its_numbers() -> None:
     """And what is left is the noise of the drives, 20, 10 and 5 mN m, as far as the low-pass lets it through."""
     found = answered(Logs.by_role(short(wave)), exclude=but("cogging", "torque_offset", "quadratic_drag"))
@@ -59,9 +59,10 @@ def warming(motion: Motion) -> Array:
     return out
 
 
+@pytest.mark.slow
 def test_a_joint_that_loses_most_of_its_viscous_friction_tells_how_much_and_how_fast() -> None:
     """Both numbers and the friction itself are unknown, and their product acts."""
-    found = diagnosed(*logs(warming), exclude=but("viscous_drift", "quadratic_drag", "load_friction"))
+    found = diagnosed(*logs(warming)[1:], exclude=but("viscous_drift", "quadratic_drag", "load_friction"))
     assert causes(found) == [("viscous_drift", 2)]
     (drift,) = effects(found)
     assert drift.values["relative_change"] == pytest.approx(-0.7, abs=0.02)
@@ -75,6 +76,7 @@ def nameless(motion: Motion) -> Array:
     return out
 
 
+@pytest.mark.slow
 def test_what_is_surely_named_is_named_beside_a_larger_torque_without_a_name() -> None:
     found = diagnosed(*logs(nameless), exclude=but("cogging"))
     assert causes(found) == [("cogging", 2)]
@@ -249,9 +251,10 @@ def test_a_ripple_that_is_there_for_half_a_log_is_none_of_the_machine() -> None:
     assert ("cogging", 1) not in causes(diagnosed(half, exclude=but("cogging"), cutoff_hz=40.0))
 
 
+@pytest.mark.slow
 def test_samples_lost_here_and_there_are_no_fault() -> None:
     fitted, judging = session()
-    found = diagnosed(dropped(fitted, lambda k: k % 97 != 96), judging)
+    found = diagnosed(dropped(fitted, lambda k: k % 97 != 96), judging, exclude=but(*FEW))
     assert found.decision.verdict == "no-fault-found"
 
 

@@ -71,13 +71,14 @@ def named(cause: str, joint: int, part: float, exclude: tuple[str, ...] = FEW) -
     return (cause, joint) in causes(diagnosed(*logs, exclude=exclude))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cause", "joint", "part"),
     [
-        pytest.param("torque_offset", 3, 2.0, marks=pytest.mark.slow),
-        pytest.param("torque_offset", 3, -2.0, marks=pytest.mark.slow),
+        ("torque_offset", 3, 2.0),
+        ("torque_offset", 3, -2.0),
         ("cogging", 2, 2.0),
-        pytest.param("cogging", 2, -2.0, marks=pytest.mark.slow),
+        ("cogging", 2, -2.0),
     ],
 )
 def test_above_its_limit_a_cause_is_found(cause: str, joint: int, part: float) -> None:

@@ -16,12 +16,13 @@ from pipelines.log.model_file import read_model
 from pipelines.model.estimation.words import column_in_words
 from pipelines.stage import Request, run_stage
 from tests.estimate_bps.estimates import SYMMETRIC, contents, of_elbow, stage
-from tests.healthy import with_signal
+from tests.healthy import begun, with_signal
 from tests.model.estimation.experiments import experiment, truth
 
 
 def test_derived_logs_give_what_recordings_give(good: ExperimentLog, held_out: ExperimentLog, tmp_path: Path) -> None:
     """`reconstruct` and then `estimate-bps` on its logs: the same result, series and model, in either container and mixed."""
+    good, held_out = begun(good, 4000), begun(held_out, 4000)
     direct = contents(stage(tmp_path / "h5", good, held_out).folder)
     assert contents(stage(tmp_path / "parquet", good, held_out, suffix="parquet").folder) == direct
     request = Request((tmp_path / "h5/logs",), out=tmp_path / "motion", no_report=True, format="parquet")

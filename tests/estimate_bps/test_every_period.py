@@ -61,6 +61,7 @@ def test_both_ways_know_as_much(spoil: Callable[[int], Spoil | None]) -> None:
         np.testing.assert_allclose(only(one).ratio, only(other).ratio, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     """0.1 N m at the waist beside the noise of a mean of three, whichever way: the first sentence says the same."""
     def ripple(q: Array, tau: Array) -> None:
@@ -76,6 +77,7 @@ def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     assert said[0] == said[1] != ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("periods", "averages"), [
     ((0.2,), (True,)), pytest.param((0.2, 0.1, 0.01, 7.3), (True, False), marks=pytest.mark.slow)])
 def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float], averages: Sequence[bool]) -> None:
@@ -89,6 +91,7 @@ def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float]
         np.testing.assert_allclose(std_of(found), std_of(none), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_touch_that_is_kept_is_named() -> None:
     """Nobody asked for its period to be left out, and the elbow was held there: it is in the fit, and said to be."""
     def touched(q: Array, tau: Array) -> None:

@@ -24,11 +24,10 @@ from tests.healthy import with_signal
 from tests.model.estimation.experiments import arm, experiment, truth
 
 
-def test_the_balance_of_power_agrees_on_healthy_logs(tmp_path: Path) -> None:
-    for seed in range(2):
-        balance = stage(tmp_path / str(seed), experiment(seed)).result.balance
-        assert balance is not None
-        assert balance.agree, (seed, balance.apart)
+def test_the_balance_of_power_agrees_on_a_healthy_log(good: ExperimentLog, tmp_path: Path) -> None:
+    balance = stage(tmp_path, good).result.balance
+    assert balance is not None
+    assert balance.agree, balance.apart
 
 
 def test_the_balance_of_power_finds_a_late_position(good: ExperimentLog, tmp_path: Path) -> None:
@@ -119,7 +118,7 @@ def test_the_command_line(good: ExperimentLog, held_out: ExperimentLog, tmp_path
 
 
 @pytest.mark.parametrize(("alone", "min_speed"), [
-    (True, 0.5), (False, 0.0), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((True, 0.0), (False, 0.5)))])
+    (True, 0.5), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((False, 0.0), (True, 0.0), (False, 0.5)))])
 def test_all_ways_are_judged_by_the_same_equations(alone: bool, min_speed: float, good: ExperimentLog, held_out: ExperimentLog,
                                                    tmp_path: Path) -> None:
     settings = replace(SYMMETRIC, compare=True, min_speed=(min_speed,))

@@ -78,7 +78,7 @@ CASES = {
 
 
 @pytest.mark.parametrize(
-    "case", [pytest.param(name, marks=pytest.mark.slow if name == "32-wall-mounted" else ()) for name in CASES]
+    "case", [pytest.param(name, marks=() if name == "34-gravity-compensated-torque" else pytest.mark.slow) for name in CASES]
 )
 def test_a_field_case_is_named_and_refused_with_its_repair(
     case: str, shared: Path, tmp_path: Path
@@ -207,7 +207,7 @@ def test_a_fit_that_fails_costs_its_answers_and_not_the_run(
     assert card.text[0].startswith("These logs do not determine gravity, ")
 
 
-@pytest.mark.parametrize("robot", ["panda", "kr300"])
+@pytest.mark.parametrize("robot", ["panda", pytest.param("kr300", marks=pytest.mark.slow)])
 def test_a_recorded_arm_has_a_boundary_without_a_finding(robot: str, shared: Path) -> None:
     """Link-side sensors and uneven stamps; a base whose z axis points down and three short logs."""
     found = boundary_of(shared / "real" / robot / "logs")
@@ -219,7 +219,7 @@ def test_a_recorded_arm_has_a_boundary_without_a_finding(robot: str, shared: Pat
 
 
 @pytest.mark.parametrize(
-    "number", [pytest.param(k, marks=pytest.mark.slow if k % 4 else ()) for k in range(1, 17)]
+    "number", [pytest.param(k, marks=pytest.mark.slow if k % 8 else ()) for k in range(1, 17)]
 )
 def test_a_fault_of_another_plant_is_no_mistake_of_its_description(
     number: int, shared: Path

@@ -20,7 +20,7 @@ from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written
 
 OTHERS = ("fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf")
-QUICK = diagnose.Settings(exclude=but("cogging", "torque_offset"), max_causes=1)
+QUICK = diagnose.Settings(exclude=but("cogging"), max_causes=1)
 
 
 def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:

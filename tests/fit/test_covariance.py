@@ -39,7 +39,7 @@ def covered(z: Array) -> float:
 
 
 @pytest.mark.parametrize(("noise", "every", "size", "width"), [
-    pytest.param(white, 0, None, 13, id="white"),
+    pytest.param(white, 0, None, 13, id="white", marks=pytest.mark.slow),
     pytest.param(autoregressive, 0, None, 13, id="ar"),
     pytest.param(NEARLY_INTEGRATED, 0, None, 13, id="ar 0.99", marks=pytest.mark.slow),
     pytest.param(white, 5, None, 13, id="decimated by 5", marks=pytest.mark.slow),
@@ -57,6 +57,7 @@ def test_truth_lies_within_two_standard_deviations(noise: Noise, every: int, siz
     assert 0.9 < z.std() < 1.1
 
 
+@pytest.mark.slow
 def test_the_white_noise_formula_would_not_do() -> None:
     """What the sandwich is for: with a memory of 20 samples the plain formula covers less than half."""
     assert covered(scores(autoregressive)[1]) < 0.5
@@ -79,6 +80,7 @@ def test_white_noise_is_recognised() -> None:
     assert seen(autoregressive, 0)[1].min() > 3.0
 
 
+@pytest.mark.slow
 def test_against_the_covariance_of_known_noise() -> None:
     """With 80 000 samples the estimated covariance is the exact one of AR(1) noise, C Aᵀ V A C, to a few per cent."""
     memory, samples = 0.9, 80_000

@@ -42,6 +42,7 @@ def within(value: dict[str, float], truth: float, std: float, relative: float) -
     return abs(value["value"] - truth) <= max(std * value["std"], relative * abs(truth))
 
 
+@pytest.mark.slow
 def test_rests_do_not_count_as_sliding(shared: Path, tmp_path: Path) -> None:
     """Case 24: 3 and 2 N m, 1.0 and 1.6 N m s/rad, 0.5 kg m²; no gravity about an axis that is parallel to it."""
     (joint,) = fitted(shared, tmp_path, "24", "asymmetric_friction")["joints"]
@@ -86,15 +87,18 @@ MACHINES = {
 }
 
 
+USUAL, RARE = ("rests", "regenerating", "step"), ("ordered", "quiet")
+
+
 @cache
-def logs() -> dict[str, ExperimentLog]:
-    """Logs of all machines, integrated side by side."""
-    return dict(zip(MACHINES, logs_of(list(MACHINES.values())).values(), strict=True))
+def logs(names: tuple[str, ...]) -> dict[str, ExperimentLog]:
+    """Logs of these machines, integrated side by side."""
+    return dict(zip(names, logs_of([MACHINES[name] for name in names]).values(), strict=True))
 
 
 @cache
 def computed(name: str, law: str | None) -> tuple[JointResult, Result]:
-    opened = Opened(Path("a.h5"), "", logs()[name], ())
+    opened = Opened(Path("a.h5"), "", logs(USUAL if name in USUAL else RARE)[name], ())
     result = fit_friction.compute(Inputs((opened,), label="logs"), Settings(law=law))
     return result.joints[0], result
 
@@ -178,7 +182,7 @@ def test_an_inertia_below_zero_is_remarked() -> None:
 
 def test_a_validation_log_at_rest_judges_nothing() -> None:
     """It is reported, and held-out blocks of the identification log judge."""
-    log = logs()["rests"]
+    log = logs(USUAL)["rests"]
     still = {name: replace(signal, values=signal.values[:2500].copy()) for name, signal in log.signals.items()}
     still["q"] = replace(still["q"], values=MACHINES["rests"].encoder * (np.arange(2500) % 7 == 0.0)[:, None])
     rest = replace(log, name="rest", role="validate", signals=still)

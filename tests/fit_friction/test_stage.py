@@ -20,6 +20,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from tests.cli.commands import rrrid
+from tests.healthy import begun
 from tests.model.friction.one_joint import COSINE, INERTIA, JOINT, SINE, STEP, TRUTHS, as_log, driven, recorded, relative
 
 QUICK = Settings(law="coulomb+viscous")
@@ -49,13 +50,13 @@ def gates(result: Result) -> dict[str, Check]:
 
 @pytest.fixture(scope="module")
 def good() -> ExperimentLog:
-    return recorded("coulomb+viscous", 4, duration=10.0)
+    return recorded("coulomb+viscous", 4, duration=7.0)
 
 
 @pytest.fixture(scope="module")
 def outcome(tmp_path_factory: pytest.TempPathFactory) -> Outcome[Result]:
-    return stage(tmp_path_factory.mktemp("friction"), recorded("three_sigmoid", 4), recorded("three_sigmoid", 54, "validate"),
-                 settings=Settings(), no_report=False)
+    logs = recorded("three_sigmoid", 4), recorded("three_sigmoid", 54, "validate", duration=10.0)
+    return stage(tmp_path_factory.mktemp("friction"), *logs, settings=Settings(), no_report=False)
 
 
 def test_the_fields_of_the_contract(outcome: Outcome[Result]) -> None:
@@ -118,9 +119,10 @@ def test_the_derived_log_holds_the_friction(outcome: Outcome[Result]) -> None:
     assert relative(friction[:, 2], TRUTHS["three_sigmoid"].curve(log["dq_hat"][:, 2])) < 0.01
 
 
-@pytest.mark.parametrize("method", ["varpro", pytest.param("output-error", marks=pytest.mark.slow), "ekf"])
-def test_three_methods(method: str) -> None:
-    """Each gives inertia to 1 % and the curve to 1.2 % on a log of its own."""
+@pytest.mark.slow
+@pytest.mark.parametrize("method", ["ekf", "output-error"])
+def test_other_methods(method: str) -> None:
+    """Beside variable projection, that of `outcome`, each gives inertia to 1 % and the curve to 1.2 % on a log of its own."""
     (joint,) = computed(recorded("three_sigmoid", 5, duration=10.0), settings=Settings(law="three_sigmoid", method=method)).joints
     assert joint.method == method
     assert joint.inertia.value == pytest.approx(INERTIA, rel=0.01)
@@ -249,7 +251,8 @@ def test_the_command(good: ExperimentLog, tmp_path: Path) -> None:
 def test_friction_is_handed_on(samples: Path) -> None:
     """`run` fits friction first: where every joint was driven alone, the estimate takes it as known."""
     names = [f"friction-{number}" for number in (1, 2, 3)]
-    opened = tuple(open_log(samples / f"rrr-closed-form/{name}.h5") for name in names)
+    whole = (open_log(samples / f"rrr-closed-form/{name}.h5") for name in names)
+    opened = tuple(replace(one, log=begun(one.log, 5000)) for one in whole)
     inputs = Inputs(opened, label="logs")
     result = fit_friction.compute(inputs, QUICK)
     assert isinstance(fit_friction.STAGE.onward(result, inputs).material, Arm)

@@ -13,6 +13,7 @@ from pipelines.model.frf.modes import fitted_modes
 from pipelines.model.frf.responses import How, Measured, measured_responses
 from pipelines.signal.frequency_response import FrequencyResponse
 from tests.frf.loops import Loop, elastic, rigid
+from tests.seeds import rarely
 
 LINK = Loop(elastic(0.2, 0.8, 8000.0, 4.0))
 
@@ -71,7 +72,7 @@ def test_a_strong_disturbance_misleads_the_direct_method_alone() -> None:
     assert np.mean(off**2) < 1.3  # no more than its variance says: no bias
 
 
-@pytest.mark.parametrize("law", ["computed-torque", "pd"])
+@pytest.mark.parametrize("law", [*rarely("computed-torque"), "pd"])
 def test_the_delay_of_a_controller_is_known(law: str) -> None:
     """A sample between what it read and the torque it leads to, as the log says: no delay of the plant, by either method."""
     loop = Loop(rigid(1.0), law=law, late=1)
@@ -130,6 +131,7 @@ def test_modes_of_a_link_on_a_spring() -> None:
     assert one.parameters["stiffness"].value == pytest.approx(8000.0, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_mode_that_moves_along_the_turn_is_as_uncertain() -> None:
     """Half of each way with a spring 3 % stiffer, 1.5 % in frequency: std 0.75 % of it; of one spring far less."""
     logs = [replace(LINK, plant=elastic(0.2, 0.8, k, 4.0)).log() for k in (8000.0, 8240.0)]

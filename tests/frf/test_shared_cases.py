@@ -72,6 +72,7 @@ def test_a_firm_arm_under_pd_is_rigid(shared: Path, arm: str) -> None:
     assert {one.kind for one in found.classification} <= {"rigid"}
 
 
+@pytest.mark.slow
 def test_a_soft_base_under_pd(shared: Path) -> None:
     """Its frequency within 3 %, its inertia within 15 %, and no other finding."""
     truth = json.loads((shared / "plant-b" / "answers.json").read_text())["arm-06"]["truth"][0]["parameters"]
@@ -81,6 +82,7 @@ def test_a_soft_base_under_pd(shared: Path) -> None:
     assert base.parameters["inertia"].value == pytest.approx(truth["inertia"], rel=0.15)
 
 
+@pytest.mark.slow
 def test_a_spring_in_a_joint_under_pd(shared: Path) -> None:
     """Joint 2: stiffness within 5 %, motor within 3 %."""
     truth = json.loads((shared / "plant-b" / "answers.json").read_text())["arm-07"]["truth"][0]["parameters"]
@@ -98,6 +100,7 @@ def test_a_gap_is_no_spring(shared: Path) -> None:
     assert {"backlash", "joint_elasticity"} <= set(found.undecided[0].candidates)
 
 
+@pytest.mark.slow
 def test_the_excited_band_is_that_of_v(shared: Path) -> None:
     """Of v from 4 to 150 Hz: within 2 Hz of it."""
     (measured,) = measured_responses([open_log(shared / "plant-b" / "arm-02" / "frf-3.h5").log])

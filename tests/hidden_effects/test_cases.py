@@ -23,6 +23,7 @@ from pipelines.errors import UsageError
 from pipelines.log.canonical import digest_of
 from pipelines.log.files import open_log
 from tests.bench.machines import sway
+from tests.seeds import rarely
 
 COGGING, CONTACT = Hidden("cogging", 2, 1.0, 7), Hidden("contact", None, 1.0, 7)
 CASE = SealedCase("single", (COGGING,), 5, 7, "short")
@@ -137,8 +138,9 @@ def test_answers_are_apart_from_logs(tmp_path: Path) -> None:
 
 @pytest.mark.usefixtures("brief")
 @pytest.mark.parametrize(("hidden", "reference"), [
-    ((COGGING,), True), ((replace(COGGING, cause="torque_saturation"),), False),
-    ((replace(COGGING, cause="joint_elasticity"),), False), ((replace(COGGING, cause="time_delay", strength=0.1),), False),
+    ((replace(COGGING, cause="torque_saturation"),), False), *rarely(
+        ((COGGING,), True), ((replace(COGGING, cause="joint_elasticity"),), False)),
+    ((replace(COGGING, cause="time_delay", strength=0.1),), False),
     ((COGGING, replace(COGGING, cause="spring", joint=3)), True)])
 def test_no_log_tells_what_is_hidden(hidden: tuple[Hidden, ...], reference: bool) -> None:
     """But for the samples, the logs are those of the same machine in order; the reference logs are so to the last sample."""
@@ -187,6 +189,7 @@ def test_more_noise_is_ten_times_as_much() -> None:
     np.testing.assert_allclose(loud, 10.0 * np.array(quiet))
 
 
+@pytest.mark.slow
 def test_sessions_last_52_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each with logs to fit and logs to judge."""
     monkeypatch.setattr(references, "within_torque", lambda machine, reference, centre: reference)  # it takes long

@@ -20,8 +20,8 @@ from pipelines.log.files import find_logs, open_log, write_log
 from tests.log.logs import small_log
 
 # Whole campaigns are slow; CI takes a part of each.
-FLIPS = [20, pytest.param(1000, marks=pytest.mark.slow)]
-KILLS = [10, pytest.param(100, marks=pytest.mark.slow)]
+FLIPS = [8, pytest.param(1000, marks=pytest.mark.slow)]
+KILLS = [5, pytest.param(100, marks=pytest.mark.slow)]
 
 
 def _data_ranges(path: Path) -> list[tuple[int, int]]:

@@ -18,11 +18,12 @@ from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, Us
 from pipelines.log.experiment import Controller, Derived, Signal
 from pipelines.log.files import find_logs, open_log, write_log
 from tests.log.logs import ROBOT_TEXT, random_log, small_log
+from tests.seeds import seeds
 
 BOTH = pytest.mark.parametrize("ending", [".h5", ".parquet"])
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", seeds(40, 10))
 def test_there_and_back_is_bit_for_bit(tmp_path: Path, seed: int) -> None:
     """HDF5 to Parquet and back keeps every sample's bits and every attribute, and the same bytes of HDF5 come out."""
     log = random_log(np.random.default_rng(seed))

@@ -13,9 +13,10 @@ from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.signal.periods import Periods
 from tests.healthy import with_signal
 from tests.model.estimation.experiments import motion_of, one_period, periodic
+from tests.seeds import rarely
 
 
-@pytest.mark.parametrize(("encoder", "gain"), [(3e-6, np.sqrt(5.0)), (3e-5, np.sqrt(5.0)), (0.0, 1.0)])
+@pytest.mark.parametrize(("encoder", "gain"), [(3e-6, np.sqrt(5.0)), *rarely((3e-5, np.sqrt(5.0))), (0.0, 1.0)])
 def test_the_mean_is_as_good_as_it_says(encoder: float, gain: float) -> None:
     """Five periods: the error is 0.7 to 1.1 of the stated deviation, and about √5 below that of a sample.
 
@@ -104,6 +105,7 @@ def test_where_a_lead_precedes_them_two_whole_periods_remain() -> None:
     assert elbow_error(log) < 2e-5
 
 
+@pytest.mark.slow
 def test_of_three_periods_the_first_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """A start of 0.6 mrad, too small to make its period an odd one: two others remain, whose mean has nothing of it."""
     log = settling(3, 0.1, size=6e-4)
@@ -127,7 +129,7 @@ def test_of_what_settles_slowly_the_first_period_goes() -> None:
     assert elbow_error(log) < 2e-5
 
 
-@pytest.mark.parametrize(("periods", "seed"), [(2, 0), (2, 1), (3, 0), (5, 0), (5, 1)])
+@pytest.mark.parametrize(("periods", "seed"), [(2, 0), (5, 0), *rarely((2, 1), (3, 0), (5, 1))])
 def test_noise_that_is_larger_in_a_part_of_the_period_is_no_start(periods: int, seed: int) -> None:
     """What is quiet is a joint at rest, not an arm that has settled: every period is averaged."""
     log = louder(periods, seed)

@@ -228,7 +228,7 @@ CAUSES = {
 
 
 @pytest.mark.parametrize("cause", CAUSES)
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", seeds(2))
 def test_what_is_wrong_with_an_arm_is_not_a_mix_up(cause: str, seed: int) -> None:
     """Causes at full strength (causes.md): none is called swapped, flipped, wrongly geared or late. What a model does not explain
     may hide a parameter, as an estimate says as well: D09."""

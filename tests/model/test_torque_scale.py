@@ -20,7 +20,7 @@ from pipelines.model.torque_scale import torque_scale
 from tests.faulty import healthy_without_reference
 from tests.healthy import good_log, with_signal
 from tests.model.estimation.experiments import experiment
-from tests.seeds import seeds
+from tests.seeds import rarely, seeds
 
 
 def evidence(log: ExperimentLog) -> Evidence:
@@ -39,8 +39,8 @@ def scaled(log: ExperimentLog, joint: int, factor: float) -> ExperimentLog:
     return with_signal(log, tau=log.tau * np.where(np.arange(log.n_joints) == joint, factor, 1.0))
 
 
-@pytest.mark.parametrize("joint", range(3))
-@pytest.mark.parametrize("factor", [0.1, 0.25, 4.0])
+@pytest.mark.parametrize("joint", [0, *rarely(1), 2])
+@pytest.mark.parametrize("factor", [0.1, *rarely(0.25), 4.0])
 def test_a_torque_in_another_scale_is_measured(excited: ExperimentLog, joint: int, factor: float) -> None:
     found = torque_scale(evidence(scaled(excited, joint, factor)))
     assert found is not None

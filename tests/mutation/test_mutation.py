@@ -1,6 +1,6 @@
 """Damaged bytes, whatever they say: every reader takes them or refuses them in words, in bounded time and memory.
 
-In CI each reader meets 25; the campaign is `pytest -m slow tests/mutation -s -k hdf5`, ten thousand a reader.
+In CI each reader meets 15; the campaign is `pytest -m slow tests/mutation -s -k hdf5`, ten thousand a reader.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from tests.mutation.edits import Edit, damaged, edits
 from tests.mutation.readers import READERS, Reader
 
 _SECONDS, _BYTES = 10.0, 1e9
-FEW, MANY = 25, int(os.environ.get("RRRID_MUTATIONS", "10000"))
+FEW, MANY = 15, int(os.environ.get("RRRID_MUTATIONS", "10000"))
 
 
 def _outcomes(reader: Reader, folder: Path, examples: int) -> list[Outcome]:

@@ -133,6 +133,7 @@ def test_a_motion_that_contradicts_itself_alone_does_not_contradict_the_paramete
     assert "does not confirm" not in words
 
 
+@pytest.mark.slow
 def test_described_links_that_differ_are_named(result: Result) -> None:
     """One described value ten standard deviations from its estimate, the others equal to theirs."""
     equal = tuple(replace(p, known=p.value) for p in result.parameters)

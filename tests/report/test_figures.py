@@ -96,8 +96,12 @@ VALUES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "huge spike": lambda t: np.where(t == t[5], 1e308, np.sin(t)), "far and small": lambda t: 1e6 + 1e-9 * np.sin(t)}
 
 
-@pytest.mark.parametrize(("times", "values"), [*((times, "signal") for times in TIMES),
-                                               *(("even", values) for values in VALUES), ("jumps", "all missing")])
+USUAL = [("backwards", "signal"), ("missing", "signal"), ("huge", "signal"), ("even", "infinite"), ("even", "huge spike"),
+         ("jumps", "all missing")]
+RARE = [pair for pair in (*((times, "signal") for times in TIMES), *(("even", values) for values in VALUES)) if pair not in USUAL]
+
+
+@pytest.mark.parametrize(("times", "values"), [*USUAL, *(pytest.param(*pair, marks=pytest.mark.slow) for pair in RARE)])
 @pytest.mark.filterwarnings("ignore:invalid value encountered in multiply:RuntimeWarning")
 def test_a_damaged_log_can_be_drawn(times: str, values: str) -> None:
     base = np.arange(2000) / 1000.0
@@ -106,7 +110,7 @@ def test_a_damaged_log_can_be_drawn(times: str, values: str) -> None:
     assert "<path" in drawn(interval_figure("b", "", t, 1e-3))
 
 
-@pytest.mark.parametrize("samples", [0, 1, 2])
+@pytest.mark.parametrize("samples", [0, pytest.param(1, marks=pytest.mark.slow), 2])
 def test_a_log_of_hardly_a_sample_can_be_drawn(samples: int) -> None:
     t = np.arange(samples) / 1000.0
     assert "<path" in drawn(joint_signal_figure("a", "", t, np.zeros((samples, 2)), "rad"))

@@ -36,6 +36,7 @@ def test_a_simulation_that_runs_away_is_said_to(with_: float | None, without: fl
     assert "no end" not in told.verdict + words
 
 
+@pytest.mark.slow
 def test_more_numbers_are_given_a_reason(samples: Path) -> None:
     """Three sigmoids at the shoulder, which has that law: why not the plainer one; no key of a law."""
     opened = open_log(samples / "rrr-healthy/friction-2-1.h5")

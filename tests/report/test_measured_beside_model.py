@@ -17,6 +17,7 @@ from pipelines.report.joint_units import Units
 from pipelines.report.render import render_report
 from pipelines.report.report import Figure, Report, Section
 from pipelines.report.writing_figures import _compared
+from tests.seeds import usually
 
 T = np.linspace(0.0, 10.0, 500)
 X = np.sin(T)
@@ -51,7 +52,7 @@ def pixels(figure: Figure, colour: str) -> int:
     return int((np.abs(below - np.array(colors.to_rgb(colour))).max(axis=-1) < 0.1).sum())
 
 
-@pytest.mark.parametrize("stage", FIGURES)
+@pytest.mark.parametrize("stage", usually(FIGURES, "estimate-bps", "diagnose"))
 def test_a_perfect_model_leaves_the_measurement_to_be_seen(stage: str) -> None:
     figure = FIGURES[stage]()
     assert pixels(figure, style.SKY) > 1000

@@ -104,6 +104,7 @@ def test_the_verdict_stands_before_the_evidence_and_is_said_in_words(demo: dict[
     assert places == sorted(places)
 
 
+@pytest.mark.slow
 def test_keeping_ticks_changes_no_picture(demo: dict[str, bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     """The same bytes as by matplotlib alone: linear and logarithmic axes, a shared one, one with a power of ten at its end."""
     def several(drawing: Any) -> None:

@@ -40,6 +40,7 @@ def test_few_figures_are_drawn_here() -> None:
     assert {svg.partition(" by ")[2] for svg, _ in drawn(few, by_process).values()} == {str(os.getpid())}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("home", ["/dev/null", pytest.param("/proc/nothing", marks=pytest.mark.slow)])
 def test_a_home_that_cannot_be_written_is_not_remarked_upon(home: str, tmp_path: Path) -> None:
     """matplotlib's settings are looked for in a folder of ours, which is gone afterwards."""

@@ -25,11 +25,11 @@ from tests import test_every_stage
 from tests.cli.commands import REPO, RRRID
 from tests.log.logs import small_log
 from tests.rows.commanded import Command
+from tests.seeds import usually
 
 # HDF5 complains once more when its objects of a file that found no room are taken apart.
 pytestmark = [pytest.mark.row("P02"), pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")]
-CHEAP = ("convert", "import_log", "inspect", "reconstruct", "simulate")
-EVERY = [module if module in CHEAP else pytest.param(module, marks=pytest.mark.slow) for module in test_every_stage.MODULES]
+EVERY = usually(test_every_stage.MODULES, "convert", "import_log", "simulate")
 
 
 @contextmanager

@@ -114,6 +114,7 @@ def test_deep_groups(command: Command, tmp_path: Path) -> None:
     assert time.monotonic() - began < 3.0  # a second, and two for a busy machine
 
 
+@pytest.mark.slow
 @row("X04")
 def test_thirty_thousand_attributes(command: Command, tmp_path: Path) -> None:
     """Counted, not read."""

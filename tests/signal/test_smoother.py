@@ -10,15 +10,16 @@ from pipelines.errors import InputRejected
 from pipelines.signal.kalman import Textbook
 from pipelines.signal.observer import Start, design, observe
 from pipelines.signal.smoother import Smoother, smooth, twicing_growth
+from tests.seeds import rarely
 from tests.signal.chains import assert_near, exact_smoother, swing, walk, with_gaps
 
 T, STEP = 1e-3, 1e-5
 R = STEP**2 / 12
 
 
-@pytest.mark.parametrize("order", [2, 3, 4])
+@pytest.mark.parametrize("order", [2, *rarely(3), 4])
 @pytest.mark.parametrize("jerk", [np.array([50.0, 500.0, 3770.0]), np.array([1.0, 1e5, 10.0])])
-@pytest.mark.parametrize("gaps", [False, True])
+@pytest.mark.parametrize("gaps", [True, *rarely(False)])
 def test_equal_to_filterpy(order: int, jerk: np.ndarray, gaps: bool) -> None:
     """Position, speed and acceleration to 1e-8 of their largest (a fourth state to 1e-7), at every sample, gaps and ends too."""
     y = swing(2000, 3, STEP)
@@ -101,6 +102,7 @@ def test_infinite_measurements_are_refused() -> None:
         smooth(np.array([[0.0], [np.inf], [0.0]]), design(T, 500.0, R))
 
 
+@pytest.mark.slow
 def test_a_log_longer_than_one_chunk() -> None:
     """Worked on chunk by chunk, observer and smoother of 50 000 samples give what filterpy gives near every joint of chunks."""
     y = swing(50_000, 1, STEP)

@@ -17,6 +17,7 @@ from pipelines.signal.tuning import (
     tune_smoother,
     whiteness,
 )
+from tests.seeds import seeds
 from tests.signal.chains import walk
 
 T = 1e-3
@@ -37,7 +38,7 @@ def excitation(samples: int = 10_000) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("order", "sigma"), [(2, 0.5), (2, 30.0), (3, 5.0), (3, 500.0), (3, 3e4), (4, 5e3), (4, 5e5), (4, 3e7)])
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", seeds(3))
 def test_the_jerk_that_made_the_data_is_found(order: int, sigma: float, seed: int) -> None:
     """10 s at 1 kHz with a 1e-5 rad encoder: within a factor 1.5 by likelihood and by cross-validation alike."""
     q = walk(np.random.default_rng(seed), order, sigma, T, 10_000)[:, :1]

@@ -17,6 +17,7 @@ from pipelines.stage import Request, run_stage
 from pipelines.stored.redraw import redraw
 from tests.cli.commands import rrrid
 from tests.controlled import controlled_log
+from tests.seeds import rarely
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +35,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
 
 
-@pytest.mark.parametrize("command", ["inspect", "run"])
+@pytest.mark.parametrize("command", ["inspect", *rarely("run")])
 def test_a_lost_report_comes_back(results: Path, tmp_path: Path, command: str) -> None:
     """Report and figures deleted, then drawn again: every byte is as it was, in its place and elsewhere."""
     shutil.copytree(results / command, tmp_path / "here")
@@ -49,6 +50,7 @@ def test_a_lost_report_comes_back(results: Path, tmp_path: Path, command: str) -
     assert contents(tmp_path / "here") == before
 
 
+@pytest.mark.slow
 def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """None where a run's lie there; the one that is lost or damaged; all where other code drew them. The bytes are the same."""
     shutil.copytree(results / "run", tmp_path / "a")
@@ -90,6 +92,7 @@ def test_no_result_is_lost_to_a_report(results: Path, tmp_path: Path) -> None:
     assert f"moved to {tmp_path / 'here-inspect'}" in said
 
 
+@pytest.mark.slow
 def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) -> None:
     """Derived logs deleted to save room: the report needs none of them."""
     shutil.copytree(results / "run", tmp_path / "a")

@@ -11,12 +11,13 @@ from benchmarks.writing_cases import PAPER_MM, PAPER_RATIOS, campaign, missed, t
 from pipelines.log.files import open_log
 from pipelines.model.estimation.in_folder import fitted_in_folder
 from sample_logs.bench_session import machine
+from tests.healthy import begun
 
 
 def test_a_model_of_excitation_logs_holds_on_the_writing_task(samples: Path) -> None:
     """On the arm of the sample logs it misses at most 1.3 times the torque that the true parameters miss, joint by joint."""
     excited = open_log(samples / "rrr-healthy/excitation-1.h5").log
-    fitted = fitted_in_folder([excited])
+    fitted = fitted_in_folder([begun(excited, 10_000)])
     assert fitted is not None
     log = open_log(samples / "rrr-healthy/writing-1.h5").log
     assert (missed(log, fitted) <= 1.3 * missed(log, true_arm(machine()))).all()

@@ -14,6 +14,7 @@ from pipelines.import_log import STAGE, Result, Settings, draft_recipe
 from pipelines.log.files import open_log
 from pipelines.log.recording.guess import Draft
 from pipelines.stage import Outcome, Request, run_stage
+from tests.seeds import rarely, usually
 
 SIX = range(6)
 UR = ["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3"]
@@ -36,13 +37,12 @@ def imported(recipe: Path, source: Path, out: Path) -> Outcome[Result]:
     ("number", "q", "tau"),
     [
         ("01", [f"q[{j}]" for j in SIX], [f"tau[{j}]" for j in SIX]),
-        ("04", [f"actual_q_{j}" for j in SIX], [f"actual_current_{j}" for j in SIX]),
+        *rarely(("04", [f"actual_q_{j}" for j in SIX], [f"actual_current_{j}" for j in SIX])),
         ("06", "q_{j}", "tau_{j}"),
-        ("07", "q_meas_{j}", "tau_meas_{j}"),
+        *rarely(("07", "q_meas_{j}", "tau_meas_{j}")),
         ("08", [f"{n}_joint_position" for n in UR], [f"{n}_joint_effort" for n in UR]),
-        ("10", [f"field.position{j}" for j in SIX], [f"field.effort{j}" for j in SIX]),
-        ("12", "q_{j}", "tau_{j}"),
-        ("14", "q{j}", "tau{j}"),
+        *rarely(("10", [f"field.position{j}" for j in SIX], [f"field.effort{j}" for j in SIX])),
+        *rarely(("12", "q_{j}", "tau_{j}"), ("14", "q{j}", "tau{j}")),
         ("17", [f"column_{j}" for j in range(2, 8)], [f"column_{j}" for j in range(14, 20)]),
     ],
 )
@@ -73,7 +73,7 @@ def test_the_unit_of_a_torque_that_nothing_names_is_left_open(shared: Path) -> N
     assert recipe["signals"]["dq"]["columns"] == [f"column_{j}" for j in range(8, 14)]
 
 
-@pytest.mark.parametrize("number", ["01", "06", "07", "08", "10", "12", "14"])
+@pytest.mark.parametrize("number", usually(("01", "06", "07", "08", "10", "12", "14"), "01", "08"))
 def test_a_complete_draft_imports_the_same_samples(shared: Path, number: str, tmp_path: Path) -> None:
     """All these recordings hold the same motion, in different layouts."""
     draft, _ = draft_of(shared, number)

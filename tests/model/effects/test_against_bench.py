@@ -33,6 +33,7 @@ from tests.model.effects.on_bench import (
     planned,
     rms,
 )
+from tests.seeds import rarely
 
 SAMPLES = 400  # simulated
 SHARE = 0.02  # of what a fault does to the torque may stay unexplained, beside what the healthy arm leaves
@@ -40,6 +41,7 @@ SHARE = 0.02  # of what a fault does to the torque may stay unexplained, beside 
 CASES = (("cogging", 2), ("viscous_drift", 1), ("torque_gain", 3), ("torque_saturation", 2), ("torque_crosstalk", 3),
          ("drive_lag", 1), ("torque_lag", 2), ("transmission_coupling", 3), ("payload", None), ("contact", None),
          ("spring", 1), ("gravity_tilt", None), ("link_length", None))
+LONG = (("contact", None), ("gravity_tilt", None))  # simulated for longer
 NO_MOTION = {"torque_lag"}  # it changes the log, not what the arm does
 NO_OPPOSITE = {"torque_saturation", "link_length", "payload"}  # a limit is positive; what fits of base parameters tell has no sign
 
@@ -115,7 +117,8 @@ def test_the_opposite_sign_is_wrong(name: str, joint: int | None) -> None:
     assert rms(left_over(recording, model.torque(motion) - change)) > 1.5 * rms(left_over(recording, model.torque(motion)))
 
 
-@pytest.mark.parametrize(("name", "joint"), [case for case in CASES if case[0] not in NO_MOTION], ids=lambda x: str(x))
+@pytest.mark.parametrize(("name", "joint"), [
+    *(case for case in CASES if case not in LONG and case[0] not in NO_MOTION), *rarely(*LONG)], ids=lambda x: str(x))
 def test_the_closed_loop_does_what_the_faulty_machine_does(name: str, joint: int | None) -> None:
     """Position under the same controller and reference: the difference that the fault makes is simulated to 3 %."""
     model, effect, values = fitted(name, joint)

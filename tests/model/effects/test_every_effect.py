@@ -91,6 +91,7 @@ def _named_in(path: Path, names: set[str]) -> Iterator[str]:
             yield from {str(node.module).rpartition(".")[2]} & names
 
 
+@pytest.mark.slow
 def test_no_effect_is_named_elsewhere(tmp_path: Path) -> None:
     """What an effect needs is in its file: no stage, no report and no diagnosis knows one by name."""
     names = set(effect_names()) - NOMINAL

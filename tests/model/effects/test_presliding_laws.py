@@ -101,6 +101,7 @@ def fitted(law: Law) -> tuple[Presliding, float]:
     return best[1], best[2]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("law", "inner", "numbers", "share"), [
     (integrated(lambda z, s: (1.0 - s * z) / DISTANCE), 0.0, {"distance": DISTANCE}, 0.01),
     pytest.param(integrated(lambda z, s: (1.0 - s * z) / DISTANCE, damping=0.005), 0.0, {"distance": DISTANCE}, 0.01,

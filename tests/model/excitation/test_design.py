@@ -105,15 +105,6 @@ def test_a_run_in_keeps_the_limits() -> None:
     assert np.abs(np.diff(ddq, axis=1)).max() < 0.5  # no jump: 60 rad/s² turn over within 10 ms at most
 
 
-def test_the_same_evaluations_give_the_same_design() -> None:
-    """Bit for bit; another seed gives another one."""
-    task = _task(replace(Wishes(), harmonics=(12,)))
-    one, again, other = (design(task, Effort(evaluations=300), seed) for seed in (5, 5, 6))
-    assert one.evaluations == again.evaluations == 300
-    assert one.trajectory.series.cosine.tobytes() == again.trajectory.series.cosine.tobytes()
-    assert one.trajectory.series.cosine.tobytes() != other.trajectory.series.cosine.tobytes()
-
-
 @pytest.mark.slow
 def test_an_interruption_keeps_the_best() -> None:
     """Stopped in the middle of the search, the design is the one that as many evaluations give."""

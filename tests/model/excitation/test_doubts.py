@@ -43,6 +43,7 @@ def test_each_joint_beyond_a_limit_is_named(safe: Result) -> None:
     assert STAGE.exit_code(bad, False) == 0
 
 
+@pytest.mark.slow
 def test_what_no_smaller_motion_mends_is_not_silent(tmp_path: Path) -> None:
     """Torque noise of half the limits saturates the drives however small the motion is."""
     outcome = designed(tmp_path / "out", replace(QUICK, rehearse=True, noise=(30.0, 30.0, 10.0), cond_max=20.0))

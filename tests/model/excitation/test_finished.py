@@ -39,6 +39,7 @@ def torque_share(task: Task, motion: Array) -> float:
     return float(np.abs(general.torque(q, dq, ddq, p)[:, 1]).max() / (0.9 * task.robot.joints[1].torque))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("times", [pytest.param(1.001, marks=pytest.mark.slow), 1.01])
 def test_where_gravity_asks_for_the_torque_a_motion_stays_as_large(times: float) -> None:
     """A stretched arm needs most of its torque at rest: half a motion needs nearly as much. It is moved a little instead."""
@@ -63,6 +64,7 @@ def test_where_speed_asks_for_the_torque_a_motion_is_made_smaller() -> None:
     assert all(peak.share <= 1.0 for peak in kept.peaks)
 
 
+@pytest.mark.slow
 def test_a_ceiling_is_that_of_the_motion_as_it_is() -> None:
     """What half of a motion does is not what the search had reached."""
     task = plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(8,)))

@@ -17,6 +17,7 @@ from pipelines.model.excitation.found import Found, best
 from pipelines.model.excitation.rehearse import Rehearsal
 from pipelines.model.excitation.task import Task, Wishes, plan_task
 from tests.model.excitation.arms import described, rrr
+from tests.seeds import rarely
 
 PAIR = Pair(Spring(joint=2), TorqueOffset(joint=2))
 EFFORT = Effort(evaluations=200)
@@ -55,6 +56,7 @@ def test_what_is_rehearsed_safely_is_kept(task: Task, plain: Design) -> None:
     assert found.design.trajectory.series.cosine.tobytes() != plain.trajectory.series.cosine.tobytes()
 
 
+@pytest.mark.slow
 def test_a_design_that_its_rehearsal_spoils_gives_way_to_the_plain_one(task: Task, plain: Design,
                                                                       monkeypatch: pytest.MonkeyPatch) -> None:
     """Half as large it tells less than the plain design as large as that may be: the plain one is returned, and said to be it."""
@@ -70,7 +72,7 @@ def test_a_design_that_its_rehearsal_spoils_gives_way_to_the_plain_one(task: Tas
     assert found.apart.after == found.apart.before
 
 
-@pytest.mark.parametrize("nth", [1, 2])
+@pytest.mark.parametrize("nth", [*rarely(1), 2])
 def test_who_stops_keeps_the_best_by_then(task: Task, plain: Design, nth: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped while causes are told apart, and spoilt by its rehearsal: the plain design; stopped in its rehearsal: as it was. The
     exit code is the signal's either way, and nothing is rehearsed after the second."""
@@ -96,6 +98,7 @@ def test_who_stops_keeps_the_best_by_then(task: Task, plain: Design, nth: int, m
     assert same == (nth == 1)
 
 
+@pytest.mark.slow
 def test_both_are_compared_as_their_rehearsals_leave_them(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where both are made half as large, what is returned is no worse than the plain design so, and its ceiling is its own."""
     found = sought(task, monkeypatch, lambda task, found, *given: (halved(task, found), None, ""))

@@ -59,6 +59,7 @@ def test_the_reserve_is_what_an_overshoot_takes(seed: int) -> None:
     assert 0.95 < max(np.divide(rehearsal.speed_peak, rehearsal.speed_limit)) <= 1.0
 
 
+@pytest.mark.slow
 def test_a_range_is_kept_by_the_arm_as_by_the_plan() -> None:
     """Joints that may turn by a radian each way of the horizontal: sagging, the shoulder leaves the range that a plan uses up."""
     task, found = designed(replace(SHORT, home=(0.0, -0.3, 0.0)), rrr(position=(-1.0, 1.0)))  # type: ignore[arg-type]
@@ -78,6 +79,7 @@ def test_without_a_model_nothing_is_rehearsed() -> None:
     assert rehearsed_design(task, found, 1, lambda words: None) == (found, None, "")
 
 
+@pytest.mark.slow
 def test_a_range_open_on_one_side_is_kept_by_as_little_less() -> None:
     """A shoulder that stands a tenth of a radian from the one end of its range, and sags past it by a tenth of that: it is made
     smaller about where it stands, by a tenth."""
@@ -110,6 +112,7 @@ def test_what_no_smaller_motion_mends_stays_as_large_as_it_is(rest: bool) -> Non
     assert len(told) == 2
 
 
+@pytest.mark.slow
 def test_of_several_periods_one_is_rehearsed_with_the_way_in_and_out() -> None:
     task, found = designed(replace(SHORT, rest=False, periods=3), rrr())
     _, rehearsal, _ = rehearsed_design(task, found, 1, lambda words: None)

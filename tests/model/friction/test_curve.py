@@ -81,6 +81,7 @@ def test_the_curve_is_better_than_the_papers_filter(fits: dict[int, LawFit]) -> 
     assert np.median(theirs) < 0.05, "the filter itself works"
 
 
+@pytest.mark.slow
 def test_output_error_polishes_from_there(fits: dict[int, LawFit]) -> None:
     """The third method: the same curve to 0.4 %, the same inertia to three of its standard deviations."""
     log = recorded("three_sigmoid", 0)

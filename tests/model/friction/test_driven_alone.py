@@ -13,6 +13,7 @@ from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.one_joint import OneJoint
 from pipelines.model.rigid.body import Motion
 from tests.model.friction.one_joint import COSINE, ENCODER, INERTIA, JOINT, SINE, TRUTHS, driven_speeds, recorded, relative
+from tests.seeds import rarely
 
 
 def fitted(name: str, seed: int, missing: slice = slice(0), samples: int | None = None) -> LawFit:
@@ -39,7 +40,8 @@ def test_the_curve_and_the_joint_of_three_seeds() -> None:
         assert np.all(apart <= 0.01 * np.array([INERTIA, SINE, SINE])), apart
 
 
-@pytest.mark.parametrize("name", ["coulomb+viscous", "stribeck", "concave_friction", "asymmetric_friction", "quadratic_drag"])
+@pytest.mark.parametrize("name", [
+    "stribeck", "asymmetric_friction", *rarely("coulomb+viscous", "concave_friction", "quadratic_drag")])
 def test_other_laws(name: str) -> None:
     """Each true law is followed to 1.2 %."""
     assert curve_error(name, 1, fitted(name, 1)) <= 0.012

@@ -68,6 +68,7 @@ def test_an_offset_is_not_told_from_asymmetric_friction_without_rest() -> None:
     assert any("Asymmetric friction" in text and "old still" in text for text in words)
 
 
+@pytest.mark.slow
 def test_few_speeds_do_not_tell_stribeck_from_drag() -> None:
     """At three speeds a hump at the lowest and drag at the highest are one curve; at nine, over two decades, they are not."""
     def drag(v: float) -> float:

@@ -21,15 +21,15 @@ BAR = 1e-11  # of the largest torque
 
 
 def test_regressor_and_recursion_equal_pinocchio(arm: Arm) -> None:
-    """On 1000 random states, each with other links, Y φ and the recursion give Pinocchio's torque to 1e-11 of the largest.
+    """On 250 random states, each with other links, Y φ and the recursion give Pinocchio's torque to 1e-11 of the largest.
 
     A new random φ for every state makes every column count: no error in one can hide behind another.
     """
     rng = np.random.default_rng(21)
-    q, dq, ddq = arm.states(1000, seed=22)
+    q, dq, ddq = arm.states(250, seed=22)
     chain, data = serial_chain(arm.robot), arm.model.createData()
     y = serial.regressor(chain, q, dq, ddq)
-    theirs, ours, recursive = (np.empty((1000, arm.n)) for _ in range(3))
+    theirs, ours, recursive = (np.empty((250, arm.n)) for _ in range(3))
     for k, posture in enumerate(arm.offset(q)):
         phi = physical_links(arm.n, rng)
         arm.load(phi)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from pipelines.log.derive import derive
 from pipelines.log.experiment import ExperimentLog
@@ -20,6 +21,7 @@ def with_motion(log: ExperimentLog) -> ExperimentLog:
     return derive(log, "reconstruct", how.as_settings(), reconstruct(log, how).signals())
 
 
+@pytest.mark.slow
 def test_motion_that_was_handed_on_is_sharpened_as_well(samples: Path) -> None:
     """Were it not, the speed would pass through zero late at every reversal, in a run alone."""
     logs = [open_log(samples / f"rrr-changed/{name}.h5").log for name in ("excitation-3", "excitation-4")]

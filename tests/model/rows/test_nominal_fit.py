@@ -26,6 +26,7 @@ def test_a_column_of_zeros_has_the_number_zero(place: int) -> None:
     np.testing.assert_allclose(more.left, plain.left, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_three_sigmoids_are_found_from_where_they_are(samples: Path) -> None:
     """The model of the arm that made these logs leaves their noise; from the coarse grid alone two of its sigmoids merged, and at
     joint 3 it left 0.12 N m."""

@@ -21,6 +21,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.simulation import Experiment, Noise, simulate
 from sample_logs.bench_session import arm_of, controllers_model
 from sample_logs.make_healthy import text
+from tests.seeds import usually
 
 LAWS = ("pd", "pd+feedforward", "computed-torque")
 NATURAL = 2.0 * np.pi * 3.2  # [rad/s] of the linearised loop
@@ -65,7 +66,7 @@ def part(reference: Reference, samples: int) -> Reference:
     return Reference(reference.t[:samples], reference.q[:samples], reference.dq[:samples], reference.ddq[:samples])
 
 
-@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("name", usually(LAWS, "pd+feedforward"))
 def test_a_letter_is_simulated_to_the_noise(name: str) -> None:
     """2.5 s of writing."""
     ours, noise = differences(name, part(text(machine(), "RRRID"), 2500))

@@ -16,7 +16,7 @@ from pipelines.model.simulation.replicas import _draws, run_together
 from tests.model.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Loop, TransferObserver
 
-SAMPLES = 500
+SAMPLES = 200
 MANY = 9  # robots that are simulated side by side, in arrays
 NOISE = Noise(np.array([0.020, 0.010, 0.005]), np.zeros(3))
 Law = Callable[[int, Array], Array]
@@ -104,8 +104,9 @@ def test_limited_output() -> None:
     assert (np.abs(tau).max(axis=0) == limit).all()
 
 
-@pytest.mark.parametrize("parts", [("friction",), ("friction", "inertia"), ("gravity", "coriolis"),
-                                   ("friction", "inertia", "coriolis", "gravity")])
+@pytest.mark.parametrize("parts", [
+    ("friction", "inertia", "coriolis", "gravity"), *(pytest.param(parts, marks=pytest.mark.slow) for parts in (
+        ("friction",), ("friction", "inertia"), ("gravity", "coriolis")))])
 def test_feedforward(parts: tuple[str, ...]) -> None:
     """Eq. (24): the parts that the log names, of its own model (here 20 % too heavy), on the reference."""
     model = _wrong()

@@ -17,6 +17,7 @@ from pipelines.model.simulation.plant import Plant
 from tests.model.rigid.serial_arms import ARMS
 from tests.model.simulation.arms import TS, Case, rrr, rrr_friction, serial
 from tests.model.simulation.pinocchio_loop import Loop
+from tests.seeds import rarely
 
 CHAINS = tuple(name for name in ARMS if name != "rrr")
 
@@ -85,6 +86,7 @@ def test_a_rotor_is_pinocchios_armature(name: str, shared: Path, tmp_path: Path)
     np.testing.assert_allclose(accelerations(Plant.of(arm), q, dq, torque), judge, atol=1e-10 * np.abs(judge).max())
 
 
+@pytest.mark.slow
 def test_one_second_open_loop_of_the_rrr_arm() -> None:
     """Within 1e-9 rad of Pinocchio's RK4 after 1 s at 4 kHz, alone without arrays and among others."""
     case, plant = rrr(), Plant.of(rrr().arm)
@@ -120,7 +122,7 @@ def follow(integrator: OneRRR | RungeKutta, start: Array, torque: Array, replica
     return np.array(rows)
 
 
-@pytest.mark.parametrize("name", ["rrr", "puma-mdh"])
+@pytest.mark.parametrize("name", ["rrr", *rarely("puma-mdh")])
 def test_without_friction_and_torque_energy_stays(name: str, shared: Path, tmp_path: Path) -> None:
     """Kinetic and potential energy, by Pinocchio, over 1 s of free swinging."""
     case = rrr(friction=False) if name == "rrr" else serial(name, shared, tmp_path)

@@ -22,6 +22,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.simulation import Noise, Plant, choose_step, run
 from pipelines.model.simulation.replicas import Simulated
 from tests.model.simulation.arms import KD, KP, experiment, rrr
+from tests.seeds import usually
 
 SAMPLES, FINE = 150, 16
 PD = Controller("pd", KP, KD, velocity="backward-difference")
@@ -51,7 +52,7 @@ def moved(arm: Plant, steps: int, exact: bool, replicas: int = 1) -> Array:
     return np.asarray(done.true_q[-1])
 
 
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize("name", usually(ARMS, "friction that remembers", "nothing more"))
 def test_the_shorter_the_step_the_nearer_to_arrays_that_hold_nothing(name: str) -> None:
     """Twelve replicas take arrays. Of second order: half the step takes three quarters off."""
     arm = plant(name)

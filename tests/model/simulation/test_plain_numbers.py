@@ -145,7 +145,8 @@ DRIVES = {
 }
 
 
-@pytest.mark.parametrize("names", [*((name,) for name in DRIVES), tuple(DRIVES), tuple(reversed(DRIVES))])
+@pytest.mark.parametrize("names", [*((name,) for name in DRIVES), tuple(DRIVES),
+                                   pytest.param(tuple(reversed(DRIVES)), marks=pytest.mark.slow)])
 def test_a_command_on_its_way_to_the_joints(names: tuple[str, ...]) -> None:
     """Through one drive, or through all of them in their order, beside friction that remembers; by Runge-Kutta's arrays as well."""
     acting_on = [DRIVES[name] for name in names]

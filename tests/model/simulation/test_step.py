@@ -14,6 +14,7 @@ from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.simulation import Noise, Plant, choose_step, choose_steps, run, runs_alone, simulate, simulate_together
 from tests.model.simulation.arms import KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Friction, Loop
+from tests.seeds import rarely
 
 NOISE = Noise(np.array([0.020, 0.010, 0.005]), np.zeros(3))
 PD = Controller("pd", KP, KD, velocity="backward-difference")
@@ -40,7 +41,7 @@ def judged(friction: Friction, samples: int, steps: int) -> Array:
     return Loop(rrr().model, friction, TS, steps).run(q_ref[0], dq_ref[0], law, samples)[0]
 
 
-@pytest.mark.parametrize("sharpness", [None, 100.0, 2000.0])
+@pytest.mark.parametrize("sharpness", [None, 100.0, *rarely(2000.0)])
 def test_the_chosen_step_costs_a_tenth_of_noise_at_most(sharpness: float | None) -> None:
     """Over the whole run, not only where it was tried; sharper friction takes more steps."""
     samples = 800
@@ -54,6 +55,7 @@ def test_the_chosen_step_costs_a_tenth_of_noise_at_most(sharpness: float | None)
     assert step.per_sample <= (4 if sharpness != 2000.0 else 16)
 
 
+@pytest.mark.slow
 def test_a_step_for_several_experiments_is_fine_enough_for_each() -> None:
     """A crawl takes fewer steps than a wave that reverses; of another sample time it has a step of its own."""
     arm, _ = dry(2000.0)

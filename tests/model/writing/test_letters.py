@@ -65,6 +65,7 @@ def test_letters_turned_by_half_a_turn(character: str, turned: str) -> None:
     assert farthest(points(turned), -points(character)) < 0.006
 
 
+@pytest.mark.slow
 def test_no_two_characters_look_alike() -> None:
     """O and 0, S and 5, B and 8: each pair differs by at least a twentieth of the height."""
     drawn = {character: points(character) for character in CHARACTERS.strip()}
