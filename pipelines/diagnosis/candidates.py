@@ -150,9 +150,15 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
 
 
 def _standing(family: Family, number: int) -> bool:
-    """Return whether healthy machines have shape `number` of a family in small."""
+    """Return whether healthy machines have shape `number` of a family in small.
+
+    Of waves that differ in order they have all that the travel tells apart: those of whole orders,
+    and every second one of a grid in steps of half of that.
+    """
     parameters = family.shapes[0].parameters
-    return any(q.several for q in parameters) or (parameters.healthy != 0.0 and number == 0)
+    if any(q.several for q in parameters):
+        return not family.shapes[number].free or number % 2 == 0
+    return parameters.healthy != 0.0 and number == 0
 
 
 Make = Callable[[Motion], Array]  # (samples, k) on one joint

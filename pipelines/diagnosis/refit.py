@@ -356,15 +356,17 @@ class Later:
         return out
 
     def taken(self, state: State, groups: Sequence[Group]) -> list[float]:
-        """Return what the standing numbers of candidates, or of their first shapes, save.
+        """Return what the standing numbers of candidates, those of the next shapes, save.
 
         Of each s ((P⁻¹)_ss)⁻¹ s, by which the cost would rise without them.
         """
         factor, first, out = state.factor, self.prior.n_nominal, []
         for group in groups:
-            shapes = {g.shape for g in self.prior.groups if g.key == group.key}
-            shape = group.shape if group.shape in shapes else 0
-            own = [g.key == group.key and g.shape == shape for g in self.prior.groups]
+            away = [
+                abs(g.shape - group.shape) if g.key == group.key else np.inf
+                for g in self.prior.groups
+            ]
+            own = np.isfinite(away) & (away == np.min(away, initial=np.inf))
             at = first + np.flatnonzero(own)
             unit = np.zeros((len(state.theta) + state.effects.width, len(at)))
             unit[at, np.arange(len(at))] = 1.0
