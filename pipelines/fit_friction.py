@@ -26,14 +26,10 @@ from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.estimation.nominal import fitted_arm
 from pipelines.model.estimation.outcome import validity
-from pipelines.model.friction.acting import friction_of
-from pipelines.model.friction.findings import findings
-from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
+from pipelines.model.friction.findings import log_findings, misfits, nuisance_findings
+from pipelines.model.friction.joint import METHODS, JointFit, JointLogs, Seen, by_method, fit_joint, friction_of
 from pipelines.model.friction.laws import LADDER, Law, law_named
-from pipelines.model.friction.methods import METHODS, by_method
-from pipelines.model.friction.misfit import misfits
-from pipelines.model.friction.nuisances import nuisance_findings
-from pipelines.model.friction.polish import refuse_unpolished
+from pipelines.model.friction.output_error import refuse_unpolished
 from pipelines.model.friction.result import JointResult, Result, joint_result, several_results
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
@@ -83,11 +79,11 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
     seen, said = _examined(used, Reconstruction(order=settings.order))
     joints = [by_method(fit_joint(part, settings.window, law), settings.method) for part in _by_joint(seen)]
-    found = tuple(check for joint in joints for check in findings(joint))
     robot = identify[0].robot
-    found += tuple(check for joint in joints for check in nuisance_findings(joint, robot.joints[joint.logs.joint - 1].name))
     results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method) for joint in joints)
-    found += misfits(results, inputs.label)
+    found = (*(check for joint in joints for check in log_findings(joint)),
+             *(check for pair in zip(joints, results, strict=True) for check in nuisance_findings(*pair)),
+             *misfits(results, inputs.label))
     arm = _arm(identify[0], joints)
     motions = tuple(pair for joint in joints for pair in joint.logs.identify)
     sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
@@ -131,7 +127,7 @@ def _law(settings: Settings) -> Law | None:
     if unknown := [part for part in parts if part not in known]:
         raise UsageError("C02", f"'{unknown[0]}' is no friction law{did_you_mean(unknown[0], known)}", where="--law",
                          remedy=f"one of {', '.join(names)}, or several joined by +")
-    law = law_named(settings.law) or Law(settings.law, tuple(dict.fromkeys(parts)))
+    law = law_named(settings.law)
     if settings.method == "output-error":
         refuse_unpolished(law)
     return law

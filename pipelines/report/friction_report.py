@@ -7,11 +7,12 @@ import re
 import numpy as np
 
 from pipelines.model.effects import find_effect
-from pipelines.model.friction.break_away import REST, WITHIN
+from pipelines.model.friction.breakaway import BreakAwayConfig
+from pipelines.model.friction.findings import FindingsConfig, drift_in_words
+from pipelines.model.friction.fit import Value
 from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.misfit import MisfitConfig
-from pipelines.model.friction.nuisances import drift_in_words, sticking_in_words
-from pipelines.model.friction.result import JointResult, Result, Value
+from pipelines.model.friction.result import JointResult, Result, Sticking
+from pipelines.model.words import plain_number
 from pipelines.report.diagnosis_words import spoken
 from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
 from pipelines.report.friction_ripple import ripple_in_words, ripple_section
@@ -77,7 +78,7 @@ def _verdict(result: Result) -> str:
     if poor:
         words += f" The simulation of {', '.join(poor)} does not follow the measurement well."
     words += "".join(f" {words}" for joint in result.joints if (words := ripple_in_words(joint)))
-    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint.drift, joint.name, joint.revolute)))
+    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint.drift, joint)))
     if open_:
         words += f" What the logs of {', '.join(open_)} leave open is listed with what to record."
     return words
@@ -91,7 +92,7 @@ def _law_and_errors(joint: JointResult) -> str:
     words = f"{_capital(joint.name)}: {_plain(joint.law)}"
     if not judged.by:
         error = judged.torque_error
-        if error is None or error >= MisfitConfig().poor:  # the finding says it
+        if error is None or error >= FindingsConfig().poor:  # the finding says it
             return words
         return f"{words}, which leaves {format_number(100.0 * error, 2)} % of held-out torque (rms)"
     with_, without, unit = judged.velocity_error_with, judged.velocity_error_without, _speed_unit(joint)
@@ -124,10 +125,8 @@ def _called(name: str) -> str:
 
 def _meaning(joint: JointResult, name: str) -> str:
     """What a number of the joint's law stands for."""
-    law = law_named(joint.law)
-    members = joint.law.split("+") if law is None else law.members
     effect, _, quantity = name.rpartition(".")
-    for member in (effect,) if effect else members:
+    for member in (effect,) if effect else law_named(joint.law).members:
         for known in find_effect(member).parameters:
             if known.name == quantity:
                 return known.meaning
@@ -199,16 +198,30 @@ def _words(joint: JointResult) -> tuple[str, ...]:
     unit = _speed_unit(joint)
     words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}, for which the law holds; "
              f"logs: {', '.join(joint.logs)}."]
-    words += [text for text in (drift_in_words(joint.drift, joint.name, joint.revolute),
-                                sticking_in_words(joint.sticking, joint.name, joint.revolute)) if text]
+    words += [text for text in (drift_in_words(joint.drift, joint),
+                                _sticking_in_words(joint.sticking, joint)) if text]
     if joint.held is not None:
         low, high = joint.held
         words.append(f"At rest friction carried from {format_number(low, 3)} to {format_number(high, 3)} N m.")
     if joint.validation.by and (never := _never_broke_away(joint)):
-        words.append(f"No break-away torque {' or '.join(never)} is given: nowhere in these logs does the joint rest for {REST:g} "
-                     f"s and then run that way within {WITHIN:g} s. A slow ramp of torque from rest shows it, where the joint does "
-                     "not creep for longer before it runs.")
+        how = BreakAwayConfig()
+        words.append(f"No break-away torque {' or '.join(never)} is given: nowhere in these logs does the joint rest for "
+                     f"{how.rest:g} s and then run that way within {how.within:g} s. A slow ramp of torque from rest shows it, "
+                     "where the joint does not creep for longer before it runs.")
     return tuple(words)
+
+
+def _sticking_in_words(sticking: Sticking | None, joint: JointResult) -> str:
+    """How many rows are left out, and why."""
+    if sticking is None:
+        return ""
+    travel = f"{plain_number(sticking.distance)} {'rad' if joint.revolute else 'm'}"
+    words = (f"{plain_number(100.0 * sticking.share)} % of the rows of {joint.name} are left out: the joint rests or bends its "
+             f"contacts there, up to a travel of {travel}, and friction is no function of its speed.")
+    if sticking.slips:
+        words += (f" It sticks and slips on {sticking.slips} times amid motion one way: only the slips are fitted, and the law "
+                  "holds from the slowest speed that was driven on. Drive faster or with a stiffer loop to see slower sliding.")
+    return words
 
 
 def _never_broke_away(joint: JointResult) -> list[str]:

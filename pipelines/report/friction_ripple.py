@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from pipelines.model.friction.misfit import NAMED, depends_in_words, inertia_in_words
-from pipelines.model.friction.result import JointResult, Value
+from pipelines.model.friction.findings import NAMED, depends_in_words, inertia_in_words
+from pipelines.model.friction.fit import Value
+from pipelines.model.friction.result import JointResult
 from pipelines.model.friction.ripple import Along
 from pipelines.report import style
 from pipelines.report.report import Figure, Section

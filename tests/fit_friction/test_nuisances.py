@@ -19,8 +19,9 @@ from pipelines import fit_friction
 from pipelines.fit_friction import Settings
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
-from pipelines.model.friction.misfit import misfits
-from pipelines.model.friction.result import JointResult, Result, Value
+from pipelines.model.friction.findings import misfits
+from pipelines.model.friction.fit import Value
+from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs
 from tests.cli.commands import rrrid
 from tests.model.friction.closed_loop import draw, logs_of

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.findings import misfits
+from pipelines.model.friction.fit import LawEquations, Value
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.misfit import misfits
-from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.result import Value, joint_result
+from pipelines.model.friction.result import joint_result
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.report.friction_ripple import ripple_in_words
 from tests.model.friction.one_joint import ENCODER, INERTIA, JOINT, NOISE, TRUTHS, as_log, driven, recorded, torque_plan
 
@@ -42,21 +40,10 @@ def held_back(more: Callable[[float, float], float] | None, seed: int = 1, noise
     return as_log(np.round(states[:, 0] / ENCODER) * ENCODER, torque, f"held-back-{seed}")
 
 
-@dataclass(frozen=True)
-class Truth:
-    """A torque of the angle, as a column."""
-
-    torque: Callable[[float, float], float]
-    pointwise: bool = True
-
-    def columns(self, motion: Motion, arm: OneJoint, theta: Array) -> Array:
-        return np.array([[self.torque(q, 0.0)] for q in motion.q[:, 0].tolist()])
-
-
 def outside(found: JointFit, torque: Callable[[float, float], float]) -> float:
     """What the fitted law cannot take of `torque` in the rows [N m] rms."""
     equations = LawEquations.of(found.stretches, found.fit.joint)
-    truth = equations.build(Truth(torque), equations.arms(), found.fit.theta)[:, 0]
+    truth = equations.means(lambda motion, _: np.array([[torque(q, 0.0)] for q in motion.q[:, 0].tolist()]), equations.arms())[:, 0]
     law = found.fit.found.jacobian
     law = law / np.linalg.norm(law, axis=0)
     return float(np.sqrt(np.mean(np.square(truth - law @ np.linalg.lstsq(law, truth, rcond=1e-5)[0]))))
