@@ -8,19 +8,18 @@ import numpy as np
 
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.breakaway import BreakAwayConfig
-from pipelines.model.friction.findings import FindingsConfig, drift_in_words
+from pipelines.model.friction.findings import NAMED, FindingsConfig, depends_in_words, drift_in_words, inertia_in_words
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.result import JointResult, Result, Sticking
 from pipelines.model.words import plain_number
 from pipelines.report.diagnosis_words import spoken
-from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
-from pipelines.report.friction_ripple import ripple_in_words, ripple_section
+from pipelines.report.friction_figures import curve_figure, fraction_figure, ripple_figure, simulation_figure
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number, format_unit, with_std
 
-__all__ = ["friction_report"]
+__all__ = ["friction_report", "ripple_in_words"]
 
 _GOOD = 0.05  # of the speed error without friction: what the law has to leave
 _GOOD_TORQUE = 0.1  # of held-out torque, where nothing was simulated: the same
@@ -179,8 +178,31 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
     simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion. Gravity is "
                                   "compensated at the measured position.", joint.series, revolute)
     alone = (Section(f"{joint.name}: simulation", _simulation_words(joint), (), (simulated, parts)),) if joint.validation.by else ()
-    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *ripple_section(joint), *alone,
+    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *_ripple_section(joint), *alone,
             Section(f"{joint.name}: choice of the law", _ladder_words(joint), (_ladder(joint),)))
+
+
+def ripple_in_words(joint: JointResult) -> str:
+    """What, how much, and how it is known to be no friction; empty where there is no ripple."""
+    ripple = joint.ripple
+    if ripple is None:
+        return ""
+    return (f"Most of what the law leaves at {joint.name} is no friction: {with_std(ripple.rms.value, ripple.rms.std)} "
+            f"{ripple.rms.unit} rms of it {depends_in_words(joint, ripple)}.")
+
+
+def _ripple_section(joint: JointResult) -> tuple[Section, ...]:
+    """Its size, what it does to the inertia, what to do, and the torque by angle."""
+    ripple = joint.ripple
+    if ripple is None:
+        return ()
+    place = "angle" if joint.revolute else "position"
+    figure = ripple_figure(f"ripple-{joint.joint}", f"{joint.name}: what friction and inertia leave, by the {place} of the joint: "
+                           "the same forth and back, as no friction is.", ripple.along, joint.revolute)
+    inertia = inertia_in_words(joint, ripple, lambda value: f"{with_std(value.value, value.std)} {format_unit(value.unit)}")
+    text = (f"{ripple_in_words(joint)} It explains {format_number(100.0 * ripple.share, 2)} % of the law's residual on held-out "
+            f"blocks (mean square).{inertia and f' {inertia}.'}", f"{_capital(NAMED)}.")
+    return (Section(f"{joint.name}: a torque of the {place}", text, (), (figure,)),)
 
 
 def _band(joint: JointResult) -> str:

@@ -18,7 +18,8 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.joint import JointFit
-from pipelines.model.friction.result import Drift, JointResult, Rippled
+from pipelines.model.friction.result import Drift, JointResult
+from pipelines.model.friction.ripple import Ripple
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.words import plain_number
 
@@ -32,33 +33,19 @@ NAMED = "let 'rrrid diagnose' say what makes it: a motor that cogs, a spring, a 
 
 @dataclass(frozen=True)
 class FindingsConfig:
-    """When a fit shows that its logs are wrong, and what it may leave.
+    """When a fit shows that its logs are wrong, and what it may leave."""
 
-    Attributes:
-        sure: std below zero (two-sided .003)
-        far: times the inertia of the described links; a choice, not measured
-        nothing: of the torque (std): no gravity; a choice, not measured
-        coarse: bias of the inertia by errors in variables; a choice, not measured
-        poor: of the held-out torque (rms): a quarter of its power is not described
-        seen: std; an inertia that is less may be zero (two-sided .05)
-        resolved: of a wave along the travel, by which two of them differ (Rayleigh: 1)
-        several: waves along the travel; fewer, with others like it, a bend has as well
-        most: of all waves (mean square): the largest is more than all others together
-        moved: of the inertia; more is not to be relied on; a choice
-        many: deviations in a value: it has digits before the first of the deviation
-    """
-
-    sure: float = 3.0
-    far: float = 2.0
-    nothing: float = 0.01
-    coarse: float = 0.05
-    poor: float = 0.5
-    seen: float = 2.0
-    resolved: float = 0.9
-    several: float = 4.0
-    most: float = 0.5
-    moved: float = 0.1
-    many: float = 10.0
+    sure: float = 3.0  # std below zero (two-sided .003)
+    far: float = 2.0  # times the inertia of the described links; a choice, not measured
+    nothing: float = 0.01  # of the torque (std): no gravity; a choice, not measured
+    coarse: float = 0.05  # bias of the inertia by errors in variables; a choice, not measured
+    poor: float = 0.5  # of the held-out torque (rms): a quarter of its power is not described
+    seen: float = 2.0  # std: an inertia that is less may be zero (two-sided .05)
+    resolved: float = 0.9  # of a wave along the travel, by which two differ (Rayleigh: 1)
+    several: float = 4.0  # waves along the travel: fewer, with others like it, a bend has as well
+    most: float = 0.5  # of all waves (mean square): the largest is more than all others together
+    moved: float = 0.1  # of the inertia: more is not to be relied on; a choice
+    many: float = 10.0  # deviations in a value: it has digits before the first of the deviation
 
 
 _CONFIG = FindingsConfig()
@@ -243,7 +230,7 @@ def _rippling(joint: JointResult, where: str) -> Check | None:
         f"inertia leave (mean square){inertia and f'. {inertia}'}", where=where, remedy=NAMED)
 
 
-def depends_in_words(joint: JointResult, ripple: Rippled) -> str:
+def depends_in_words(joint: JointResult, ripple: Ripple) -> str:
     """Return on what a ripple depends, and how it is known to be no friction.
 
     The largest wave is named but where it is a bend: where others are too near for the travel to tell
@@ -261,7 +248,7 @@ def depends_in_words(joint: JointResult, ripple: Rippled) -> str:
             "all speeds and both ways")
 
 
-def inertia_in_words(joint: JointResult, ripple: Rippled, shown: Callable[[Value], str]) -> str:
+def inertia_in_words(joint: JointResult, ripple: Ripple, shown: Callable[[Value], str]) -> str:
     """Return what the ripple does to the inertia; empty where only one of the two is known.
 
     Args:

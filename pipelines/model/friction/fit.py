@@ -14,6 +14,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -182,37 +183,33 @@ class LawFit:
         return np.asarray(np.sqrt(np.maximum(square, 0.0)))
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Equations(ABC):
     """Rows of one joint that a law can be fitted to."""
 
+    y: Array  # (rows,) torque [N m]
+    fixed: Array  # (rows, postures × numbers of one) columns that are no friction
+    parts: tuple[npt.NDArray[np.intp], ...]  # all rows, by what is thinned on its own
+    nodes: Motion  # (nodes, 1) in which searches look for speeds and travel
+    largest: float  # [N m] torque on the joint, rests and reversals included
     joint: OneJoint
-    postures: tuple[tuple[float, ...], ...]
-    every: int  # the rows are every `every`-th one of all
+    postures: tuple[tuple[float, ...], ...] = ((),)
+    every: int = 1  # the rows are every `every`-th one of a part
 
     @property
-    @abstractmethod
-    def y(self) -> Array:
-        """Return the torque (rows,) [N m]."""
-
-    @property
-    @abstractmethod
-    def fixed(self) -> Array:
-        """Return the columns that are no friction (rows, postures × numbers of one)."""
-
-    @property
-    @abstractmethod
     def rows(self) -> npt.NDArray[np.intp]:
         """Return which of all rows these are."""
+        return np.concatenate([part[::self.every] for part in self.parts])
+
+    def thinned(self, rows: int) -> Self:
+        """Return about `rows` of all rows, for a scan."""
+        few = replace(self, every=max(1, len(self.y) // rows))
+        return replace(few, y=self.y[few.rows], fixed=self.fixed[few.rows])
 
     @property
-    @abstractmethod
-    def nodes(self) -> Motion:
-        """Return a motion (nodes, 1) in which searches look for speeds and travel."""
-
-    @property
-    @abstractmethod
-    def largest(self) -> float:
-        """Return the largest torque on the joint, rests and reversals included [N m]."""
+    def width(self) -> int:
+        """Return how many numbers of one posture are no friction."""
+        return int(self.fixed.shape[1]) // len(self.postures)
 
     @abstractmethod
     def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]:
@@ -220,51 +217,33 @@ class Equations(ABC):
 
     @abstractmethod
     def means(self, columns: Columns, arms: Sequence[OneJoint], pointwise: bool = True) -> Array:
-        """Return the rows (rows, k) of what is a function of the motion.
-
-        Args:
-            pointwise: it depends on a moment alone, and can be asked for some of them.
-        """
-
-    @property
-    def width(self) -> int:
-        """Return how many numbers of one posture are no friction."""
-        return int(self.fixed.shape[1]) // len(self.postures)
-
-    def thinned(self, rows: int) -> Equations:
-        """Return about `rows` of the rows, for a scan."""
-        return replace(self, every=max(1, len(self.y) // rows))  # type: ignore[type-var]
-
-    def law_columns(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array:
-        """Return the law's columns (rows, amplitudes)."""
-        return self.means(lambda motion, arm: law.columns(motion, arm, theta), arms, law.pointwise)
+        """Return the rows (rows, k) of columns of the motion; `pointwise` ones have no memory."""
 
     def slopes(self, law: Law) -> Callable[[Array, Array], Array] | None:
         """Return the slopes of the law's rows by θ; None: by differences."""
         return None
+
+    def law_columns(self, law: Law, arms: Sequence[OneJoint], theta: Array) -> Array:
+        """Return the law's columns (rows, amplitudes)."""
+        return self.means(lambda motion, arm: law.columns(motion, arm, theta), arms, law.pointwise)
 
     def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable:
         return Separable(self.y, self.fixed, lambda theta: self.law_columns(law, arms, theta),
                          *law.bounds, self.slopes(law))
 
     def residual(self, fit: LawFit) -> Array:
-        """Return what `fit` leaves of these rows (rows,) [N m].
-
-        A posture that it does not know takes the numbers of the nearest.
-        """
+        """Return what `fit` leaves of these rows (rows,) [N m], in unknown postures the nearest."""
         own = fit.rigid[[_nearest(posture, fit.postures) for posture in self.postures]].ravel()
         law = self.law_columns(fit.law, self.arms(own), fit.theta) @ fit.amplitudes
         return np.asarray(self.y - (self.fixed @ own + law))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LawEquations(Equations):
     """Windows of stretches of a joint that was driven alone."""
 
     stretches: tuple[Stretch, ...]
-    joint: OneJoint
-    postures: tuple[tuple[float, ...], ...]
-    every: int = 1
+    groups: tuple[int, ...]  # posture of every stretch
 
     @classmethod
     def of(cls, stretches: Sequence[Stretch], joint: OneJoint) -> LawEquations:
@@ -272,45 +251,20 @@ class LawEquations(Equations):
         for stretch in stretches:
             if not any(same_posture(stretch.posture, known) for known in postures):
                 postures.append(stretch.posture)
-        return cls(tuple(stretches), joint, tuple(postures))
-
-    @cached_property
-    def _groups(self) -> tuple[int, ...]:
-        """Return the posture of every stretch."""
-        return tuple(_nearest(stretch.posture, self.postures) for stretch in self.stretches)
+        groups = tuple(_nearest(stretch.posture, postures) for stretch in stretches)
+        fixed = [np.hstack([stretch.rigid * float(k == group) for k in range(len(postures))])
+                 for stretch, group in zip(stretches, groups, strict=True)]
+        ends = np.cumsum([stretch.rows for stretch in stretches])
+        means = (np.diff(one.impulse[one.edges]) / one.length for one in stretches)
+        return cls(y=np.concatenate([stretch.torque for stretch in stretches]),
+                   fixed=np.vstack(fixed), parts=tuple(np.split(np.arange(ends[-1]), ends[:-1])),
+                   nodes=max(stretches, key=lambda stretch: len(stretch.t)).nodes,
+                   largest=max(float(np.abs(mean).max()) for mean in means), joint=joint,
+                   postures=tuple(postures), stretches=tuple(stretches), groups=groups)
 
     @cached_property
     def _few(self) -> tuple[Windows, ...]:
         return tuple(stretch.windows.thinned(self.every) for stretch in self.stretches)
-
-    @cached_property
-    def y(self) -> Array:
-        return np.concatenate([stretch.torque[::self.every] for stretch in self.stretches])
-
-    @cached_property
-    def fixed(self) -> Array:
-        width, parts = self.stretches[0].rigid.shape[1], []
-        for stretch, k in zip(self.stretches, self._groups, strict=True):
-            own = stretch.rigid[::self.every]
-            part = np.zeros((len(own), width * len(self.postures)))
-            part[:, width * k:width * (k + 1)] = own
-            parts.append(part)
-        return np.vstack(parts)
-
-    @property
-    def rows(self) -> npt.NDArray[np.intp]:
-        count = [len(stretch.torque) for stretch in self.stretches]
-        return np.concatenate([np.arange(k, k + n, self.every) for k, n
-                               in zip(np.cumsum([0, *count[:-1]]), count, strict=True)])
-
-    @property
-    def nodes(self) -> Motion:
-        return max(self.stretches, key=lambda stretch: len(stretch.t)).nodes
-
-    @property
-    def largest(self) -> float:
-        means = (np.diff(one.impulse[one.edges]) / one.length for one in self.stretches)
-        return max(float(np.abs(mean).max()) for mean in means)
 
     def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]:
         if beta is None:
@@ -320,7 +274,7 @@ class LawEquations(Equations):
 
     def means(self, columns: Columns, arms: Sequence[OneJoint], pointwise: bool = True) -> Array:
         parts = []
-        for stretch, few, k in zip(self.stretches, self._few, self._groups, strict=True):
+        for stretch, few, k in zip(self.stretches, self._few, self.groups, strict=True):
             if pointwise:
                 parts.append(few.means(columns(few.nodes, arms[k])))
             else:
@@ -331,12 +285,8 @@ class LawEquations(Equations):
     def slopes(self, law: Law) -> Callable[[Array, Array], Array] | None:
         if not (law.pointwise and law.sloped):
             return None
-
-        def slopes(theta: Array, amplitudes: Array) -> Array:
-            return np.vstack([few.means(np.asarray(law.slopes(few.nodes, theta, amplitudes)))
-                              for few in self._few])
-
-        return slopes
+        return lambda theta, amplitudes: np.vstack([
+            few.means(np.asarray(law.slopes(few.nodes, theta, amplitudes))) for few in self._few])
 
 
 def fit_law(equations: Equations, law: Law, starts: Sequence[Array] | None = None,

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.fit.varpro import SeparableFit, with_block_covariance
+from pipelines.fit.varpro import with_block_covariance
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.robot import RobotDescription
 from pipelines.model.arm import Acting
@@ -27,29 +27,10 @@ from pipelines.model.friction.laws import LADDER, Law, OneJoint, gravity_columns
 from pipelines.model.friction.model_selection import Ladder, climb, no_worse
 from pipelines.model.friction.output_error import Simulated, polished, simulate_joint
 from pipelines.model.friction.refine import refined
-from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
-from pipelines.model.friction.sliding import (
-    Sliding,
-    SlidingConfig,
-    drift_of,
-    left_out,
-    sliding_rows,
-)
-from pipelines.model.friction.speed_map import (
-    Coverage,
-    Missing,
-    SpeedMap,
-    coverage,
-    speed_map,
-    unseen,
-)
-from pipelines.model.friction.weak_form import (
-    Course,
-    Stretch,
-    blocks_of_time,
-    stretches_of,
-    swaying,
-)
+from pipelines.model.friction.ripple import Ripple, ripple_of, with_inertia
+from pipelines.model.friction.sliding import Sliding, SlidingConfig, drift_of, left_out, sliding_rows
+from pipelines.model.friction.speed_map import Coverage, Missing, SpeedMap, coverage, speed_map, unseen
+from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 
@@ -66,25 +47,14 @@ Stretches = tuple[Stretch, ...]
 
 @dataclass(frozen=True)
 class JointConfig:
-    """Numbers of the fit of one joint.
+    """Numbers of the fit of one joint."""
 
-    Attributes:
-        bent: of friction; a curve that departs less from straight lines does not show whether it
-            lags
-        memory: [s] over which errors of a law may depend on one another: a joint moves some of its
-            travel in it
-        courses: steps of Gauss and Newton for the time constant of a drift
-        rounds: of refining before laws are compared
-        curve: points of a curve, each way, from 1e-3 of the fastest speed on
-        fastest: of them, over which its slope at the highest speeds is taken: the upper half
-    """
-
-    bent: float = 1e-3
-    memory: float = 1.0
-    courses: int = 5
-    rounds: int = 2
-    curve: int = 100
-    fastest: int = 9
+    bent: float = 1e-3  # of friction: a curve that bends less does not show whether it lags
+    memory: float = 1.0  # [s] over which errors of a law may depend: a joint moves some way in it
+    courses: int = 5  # steps of Gauss and Newton for the time constant of a drift
+    rounds: int = 2  # of refining before laws are compared
+    curve: int = 100  # points of a curve, each way, from 1e-3 of the fastest speed on
+    fastest: int = 9  # of them, that give its slope at the highest speeds: the upper half
 
 
 _CONFIG, _SLIDING = JointConfig(), SlidingConfig()
@@ -150,7 +120,6 @@ class JointFit:
     ripple: Ripple | None
     sliding: Sliding
     course: Course | None  # of friction that changes in time
-    beside_ripple: SeparableFit | None  # rigid numbers first, then the law, with the ripple known
 
 
 def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFit:
@@ -185,6 +154,8 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
         final = _with_dependent_errors(final, identify, sliding.attenuation)
     equations, covered = LawEquations.of(identify, arm), coverage(identify)
     ripple = ripple_of(equations, final)
+    if ripple is not None:
+        ripple = with_inertia(ripple, equations, final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     at_rest = [stretch for stretch in logs.stretches(logs.hold, window)
                if any(same_posture(stretch.posture, posture) for posture in final.postures)]
@@ -192,7 +163,7 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
         logs, final, choice.ladder, identify, _simulated(judging, bool(validate), final), covered,
         unseen(covered, choice.ladder), speed_map(identify, final),
         break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window, ripple,
-        sliding, course, None if ripple is None else refitted(equations, final, ripple))
+        sliding, course)
 
 
 def _usable_rows(logs: JointLogs, window: float,
@@ -349,8 +320,9 @@ def by_method(joint: JointFit, method: str) -> JointFit:
     else:
         fit = filtered(joint.stretches, joint.fit.joint, joint.logs.resolution)
     driven = _simulated(joint.driven.stretch, joint.driven.judging, fit)
+    ripple = None if joint.ripple is None else replace(joint.ripple, inertia=None)
     return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit),
-                   beside_ripple=None)
+                   ripple=ripple)
 
 
 def fractions(joint: JointFit) -> tuple[Array, Array, Array]:

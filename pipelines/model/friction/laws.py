@@ -19,7 +19,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -199,19 +199,13 @@ class Law:
         low, high = np.log(pairs).reshape(-1, 2).T
         return low, high
 
-    @cached_property
-    def _defaults(self) -> tuple[dict[str, float], ...]:
-        """Return the non-linear numbers of every effect where θ does not hold them."""
-        return tuple({q.name: getattr(effect, q.name) for q in effect.parameters if q.shape}
-                     for effect in self.effects)
-
     def shaped(self, theta: Array) -> tuple[Effect, ...]:
         """Return the effects with their non-linear numbers out of θ."""
-        values = [dict(default) for default in self._defaults]
+        values: list[dict[str, Any]] = [{} for _ in self.effects]
         for number, logarithm in zip(self.nonlinear, theta, strict=True):
             for k in number.effects:
                 values[k][number.name] = math.exp(logarithm)
-        return tuple(effect.at(own) if own else effect
+        return tuple(replace(effect, **own) if own else effect
                      for effect, own in zip(self.effects, values, strict=True))
 
     def theta(self, effects: Sequence[Effect]) -> Array:

@@ -29,28 +29,16 @@ __all__ = ["CandidateFit", "Ladder", "climb", "no_worse", "undecided"]
 
 @dataclass(frozen=True)
 class LadderConfig:
-    """Limits of a measurable difference between laws.
+    """Limits of a measurable difference between laws."""
 
-    Attributes:
-        sure: standard errors of a difference, beyond which it is one: two-sided .05
-        worth: of the mean square; a smaller difference does not count, however sure: .5 % rms
-        blocks: of the rows that judge, whose sums give a difference its deviation: 20 know it to
-            a sixth
-        folds: of the rows, each held out in turn (Kohavi 1995, IJCAI, p. 1137)
-        further: causes after the first
-        more: of the residual (mean square), the least that each of these must explain
-        hopeful: of them are fitted at a time, those that explain most to first order
-        points: speeds, each way, at which curves are compared
-    """
-
-    sure: float = 2.0
-    worth: float = 0.01
-    blocks: int = 20
-    folds: int = 10
-    further: int = 2
-    more: float = 0.1
-    hopeful: int = 3
-    points: int = 60
+    sure: float = 2.0  # standard errors of a difference, beyond which it is one: two-sided .05
+    worth: float = 0.01  # of the mean square: a smaller difference does not count, .5 % rms
+    blocks: int = 20  # of the rows that judge, whose sums give a deviation: known to a sixth
+    folds: int = 10  # of the rows, each held out in turn (Kohavi 1995, IJCAI, p. 1137)
+    further: int = 2  # causes after the first
+    more: float = 0.1  # of the residual (mean square), the least that each of these explains
+    hopeful: int = 3  # of them that are fitted at a time: they explain most to first order
+    points: int = 60  # speeds, each way, at which curves are compared
 
 
 _CONFIG = LadderConfig()

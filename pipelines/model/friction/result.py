@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,12 +17,12 @@ from pipelines.model.friction.fit import LawFit, Value
 from pipelines.model.friction.joint import JointFit, fractions
 from pipelines.model.friction.laws import gravity_names
 from pipelines.model.friction.model_selection import Ladder, undecided
-from pipelines.model.friction.ripple import Along, Ripple
+from pipelines.model.friction.ripple import Ripple
 from pipelines.model.friction.several import SeveralFit
 from pipelines.model.friction.speed_map import Missing
 from pipelines.model.friction.weak_form import moved
 
-__all__ = ["CandidateLaw", "Drift", "JointResult", "Posture", "Result", "Rippled", "Series",
+__all__ = ["CandidateLaw", "Drift", "JointResult", "Posture", "Result", "Series",
            "Sticking", "Validation", "joint_result", "several_results"]
 
 _POINTS = 1500  # of a figure
@@ -91,18 +90,6 @@ class Sticking:
 
 
 @dataclass(frozen=True)
-class Rippled:
-    """Torque that depends on the angle of the joint alone: no law of friction holds it."""
-
-    rms: Value  # [N m], of a slide [N]: rms of what it explains of what the law leaves
-    share: float  # of what the law leaves of blocks held out (mean square)
-    orders: tuple[float, ...]  # [1/rev] waves in a turn, of a slide [1/(2π m)] in 2π m; the largest first
-    inertia: Value | None  # of the joint, with the ripple known; null where the law was fitted by another method
-    along: Along
-    largest_share: float = math.nan  # of the largest wave in all of them (mean square); not known of results stored before it was
-
-
-@dataclass(frozen=True)
 class Series:
     """What figures are drawn from."""
 
@@ -147,7 +134,7 @@ class JointResult:
     driven: tuple[float, float]  # [rad/s] slowest and fastest
     logs: tuple[str, ...]
     series: Series
-    ripple: Rippled | None = None
+    ripple: Ripple | None = None
     moved: bool = True  # whether the logs move it at all
     drift: Drift | None = None  # of friction in time
     sticking: Sticking | None = None  # rows that were left out
@@ -181,10 +168,6 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
     for simulated in (driven.with_friction, driven.without):
         error = driven.error(simulated)
         errors.append(error if np.isfinite(error) else None)
-    beside = None
-    if joint.beside_ripple is not None:
-        std = float(np.sqrt(max(joint.beside_ripple.covariance[0, 0], 0.0)))
-        beside = Value(float(joint.beside_ripple.beta[0]), std, _inertia_unit(fit.joint.revolute))
     drift, open_ = _drift(joint), joint.unseen
     if drift is not None and joint.course is not None and not joint.course.named:
         open_ = (*open_, _not_excluded(drift))
@@ -197,7 +180,7 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
         _candidates(ladder), ladder.by, open_, joint.break_away, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)),
-        _series(joint), _rippled(joint.ripple, beside, fit.joint.revolute), True, drift,
+        _series(joint), joint.ripple, True, drift,
         _sticking(joint))
 
 
@@ -271,14 +254,6 @@ def _torque_error(ladder: Ladder) -> float | None:
     return ladder.chosen.validate_rms / ladder.torque if ladder.torque > 0.0 else None
 
 
-def _rippled(ripple: Ripple | None, inertia: Value | None, revolute: bool) -> Rippled | None:
-    if ripple is None:
-        return None
-    rms = Value(ripple.rms, ripple.std, "N m" if revolute else "N")
-    return Rippled(rms, ripple.share, ripple.orders, inertia, ripple.along,
-                   ripple.along.share_of(ripple.orders[0]))
-
-
 def _curve(fit: LawFit, fastest: float) -> tuple[Array, Array, Array]:
     """Return speeds up to the fastest, dense about zero, the curve and its deviation (points,)."""
     side = np.concatenate([[0.0], np.geomspace(1e-3 * fastest, fastest, _CURVE // 2)])
@@ -314,7 +289,7 @@ def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[Joi
 
 def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
              names: tuple[str, ...], moves: bool) -> JointResult:
-    ladder, revolute = found.ladders[j], arm.robot.joints[j].revolute
+    ladder, ripple = found.ladders[j], found.ripples[j]
     fit, law, first = ladder.chosen.fit, ladder.chosen.law, f":{j + 1}:"
     known = {key.replace(first, "."): parameter for key, parameter in arm.parameters.items()
              if first in key}
@@ -325,9 +300,9 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
     numbers = {key if several else key.partition(".")[2]: Value(p.value, std.get(key), p.unit)
                for key, p in known.items() if key.partition(".")[0] in law.members}
     fastest, slowest = float(speed.max()), float(np.quantile(speed, 0.02))
-    inertia, beside = (None if one is None else _inertia(one, arm, j, middle)
-                       for one in (found.fitted, found.beside_ripples))
-    assert inertia is not None
+    inertia = _inertia(found.fitted, arm, j, middle)
+    if ripple is not None and found.beside_ripples is not None:
+        ripple = replace(ripple, inertia=_inertia(found.beside_ripples, arm, j, middle))
     missing: tuple[Missing, ...] = (_UNMOVED,)
     if moves:
         laws = undecided(ladder, slowest, fastest, alone=False)
@@ -338,7 +313,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
         Validation(None, None, "", False, _torque_error(ladder)), _candidates(ladder), ladder.by,
         missing, (), None, (slowest, fastest), names,
         Series(*_curve(fit, fastest), *(np.zeros(0),) * 15),
-        _rippled(found.ripples[j], beside, revolute) if moves else None, moves)
+        ripple if moves else None, moves)
 
 
 def _inertia(fitted: Fitted, arm: Arm, j: int, q: Array) -> Value:

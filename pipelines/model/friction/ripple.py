@@ -10,6 +10,7 @@ of the angle does neither. Magnets, teeth, a spring, a stop: what makes it is no
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,15 +18,15 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.fit.varpro import SeparableFit, fit_separable
+from pipelines.fit.varpro import fit_separable
 from pipelines.model.effects.base import ArmModel, Parameters, Quantity
 from pipelines.model.effects.fast import Fast
-from pipelines.model.friction.fit import Columns, Equations, LawFit
+from pipelines.model.friction.fit import Columns, Equations, LawFit, Value
 from pipelines.model.friction.laws import gravity_columns
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import orders_along
 
-__all__ = ["Along", "Ripple", "RippleConfig", "Wave", "refitted", "ripple_of"]
+__all__ = ["Along", "Ripple", "RippleConfig", "Wave", "ripple_of", "with_inertia"]
 
 _AT_ONCE = 16  # orders: memory
 _RANK = 1e-5  # singular values of unit columns below it: two columns that are one
@@ -33,35 +34,22 @@ _RANK = 1e-5  # singular values of unit columns below it: two columns that are o
 
 @dataclass(frozen=True)
 class RippleConfig:
-    """Limits beyond which a torque of the angle is reported.
+    """Limits beyond which a torque of the angle is reported."""
 
-    Attributes:
-        rows: that are looked at, or up to twice as many: more than ten for every order
-        folds: blocks of time, each held out in turn (Efron 1979)
-        most: waves
-        each: of the residual (mean square), the least that a further wave explains
-        explained: of the residual of blocks held out (mean square), the least: as much as all else
-            together. Compliance of other joints follows the angle too: up to .24 on a healthy arm.
-            Cogging of 4 % of the torque came to .98, an outrunner's to .89
-        sides: of the same, forth and back, slow and fast, each
-        worth: of the joint's torque (rms): what friction laws are good for
-        few: rows that each side has at least: a side that was not driven shows nothing
-        sure: standard deviations of a size, that it has to be: two-sided .003
-        classes: of angle, at most, a degree of a turn each
-        of_class: rows of one
-    """
-
-    rows: int = 4000
-    folds: int = 10
-    most: int = 8
-    each: float = 0.05
+    rows: int = 4000  # looked at, or up to twice as many: more than ten for every order
+    folds: int = 10  # blocks of time, each held out in turn (Efron 1979)
+    most: int = 8  # waves
+    each: float = 0.05  # of the residual (mean square), the least that a further wave explains
+    # Of the residual of blocks held out, the least: as much as all else together. Compliance of other
+    # joints follows the angle too: up to .24 on a healthy arm. Cogging of 4 % of the torque came to
+    # .98, an outrunner's to .89
     explained: float = 0.5
-    sides: float = 0.1
-    worth: float = 0.01
-    few: int = 100
-    sure: float = 3.0
-    classes: int = 360
-    of_class: int = 8
+    sides: float = 0.1  # of the same, forth and back, slow and fast, each
+    worth: float = 0.01  # of the joint's torque (rms): what friction laws are good for
+    few: int = 100  # rows that each side has at least: one that was not driven shows nothing
+    sure: float = 3.0  # standard deviations of a size, that it has to be: two-sided .003
+    classes: int = 360  # of angle, at most, a degree of a turn each
+    of_class: int = 8  # rows of one
 
 
 _CONFIG = RippleConfig()
@@ -116,13 +104,14 @@ class Along:
 
 @dataclass(frozen=True)
 class Ripple:
-    """Torque of the joint's angle that is the same at every speed and in both directions."""
+    """Torque that depends on the angle of the joint alone: no law of friction holds it."""
 
-    rms: float  # [N m] over the rows, without what the law would take of it
-    std: float  # of rms: the blocks left out one by one
-    share: float  # of what the law leaves of held-out blocks (mean square), what the waves explain
-    orders: tuple[float, ...]  # [1/rev] of the waves, the largest first
+    rms: Value  # [N m], of a slide [N]: rms of what it explains of what the law leaves
+    share: float  # of what the law leaves of blocks held out (mean square)
+    orders: tuple[float, ...]  # [1/rev] waves in a turn, of a slide [1/(2π m)] in 2π m; the largest first
+    inertia: Value | None  # of the joint, with the ripple known; null where the law was fitted by another method
     along: Along
+    largest_share: float = math.nan  # of the largest wave in all of them (mean square); not known of results stored before it was
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,8 +229,10 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
     rms, std = _size(rows, chosen)
     if rms < max(_CONFIG.worth * np.sqrt(power), _CONFIG.sure * std):
         return None
-    waves = tuple(orders[k] for k in chosen)
-    return Ripple(rms, std, share, waves, _along(rows, chosen, q, dq, waves, arms[0].revolute))
+    waves, revolute = tuple(orders[k] for k in chosen), arms[0].revolute
+    along = _along(rows, chosen, q, dq, waves, revolute)
+    return Ripple(Value(rms, std, "N m" if revolute else "N"), share, waves, None, along,
+                  along.share_of(waves[0]))
 
 
 def _held_out(rows: _Rows, speed: Array) -> float | None:
@@ -314,8 +305,12 @@ def _along(rows: _Rows, chosen: Sequence[int], q: Array, dq: Array, orders: Sequ
     return Along(middle, means[0], means[1], whole - taken)
 
 
-def refitted(equations: Equations, fit: LawFit, ripple: Ripple) -> SeparableFit:
-    """Fit the same law with the waves known: rigid numbers come first, as without them."""
+def with_inertia(ripple: Ripple, equations: Equations, fit: LawFit) -> Ripple:
+    """Return `ripple` with the inertia of the same law where its waves are known."""
     waves = equations.means(_along_angle(ripple.orders), equations.arms())
     problem = equations.problem(fit.law, equations.arms(fit.found.beta))
-    return fit_separable(replace(problem, fixed=np.hstack([problem.fixed, waves])), [fit.theta])
+    problem = replace(problem, fixed=np.hstack([problem.fixed, waves]))
+    found = fit_separable(problem, [fit.theta])
+    std = float(np.sqrt(max(found.covariance[0, 0], 0.0)))
+    unit = "kg m^2" if fit.joint.revolute else "kg"
+    return replace(ripple, inertia=Value(float(found.beta[0]), std, unit))

@@ -14,14 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.estimation.logs import (
-    Fitted,
-    Motions,
-    Recipe,
-    equations_of,
-    fit_logs,
-    with_cutoff,
-)
+from pipelines.model.estimation.logs import Fitted, Motions, Recipe, equations_of, fit_logs, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns as RigidColumns
 from pipelines.model.estimation.regression import LogEquations
@@ -67,48 +60,23 @@ def _runs_of(log: LogEquations, j: int) -> list[_Run]:
     return runs
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class RowEquations(Equations):
     """One joint's rows of several logs, conditioned as the rigid body's columns are."""
 
-    torque: Array  # (rows,) [N m]
-    rigid: Array  # (rows, columns) of the rigid body that act on this row
     runs: tuple[_Run, ...]
-    longest: Motion  # (samples, 1)
-    joint: OneJoint
-    postures: tuple[tuple[float, ...], ...] = ((),)
-    every: int = 1
 
     @classmethod
     def of(cls, logs: Sequence[LogEquations], j: int) -> RowEquations:
-        """Return the rows of joint `j`, from 0."""
+        """Return the rows of joint `j`, from 0; other joints load it without a bound."""
         blocks = [(np.array(block.y[j]), np.array(block.values[j].T))
                   for log in logs for block in log]
-        torque, rigid = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        y, fixed = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
         motion = max(logs, key=lambda log: len(log.found.motion.t)).found.motion
         alone = Motion(motion.t, motion.q[:, [j]], motion.dq[:, [j]], motion.ddq[:, [j]])
-        return cls(torque, rigid, tuple(run for log in logs for run in _runs_of(log, j)), alone,
-                   OneJoint.of(logs[0].columns.body.robot, j + 1))
-
-    @property
-    def y(self) -> Array:
-        return self.torque[::self.every]
-
-    @property
-    def fixed(self) -> Array:
-        return self.rigid[::self.every]
-
-    @property
-    def rows(self) -> npt.NDArray[np.intp]:
-        return np.arange(0, len(self.torque), self.every)
-
-    @property
-    def nodes(self) -> Motion:
-        return self.longest
-
-    @property
-    def largest(self) -> float:
-        return float("inf")  # nothing bounds it: the other joints load this one as well
+        return cls(y=y, fixed=fixed, parts=(np.arange(len(y)),), nodes=alone, largest=float("inf"),
+                   joint=OneJoint.of(logs[0].columns.body.robot, j + 1),
+                   runs=tuple(run for log in logs for run in _runs_of(log, j)))
 
     def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]:
         del beta  # laws that ask for the load are not tried here
@@ -117,7 +85,7 @@ class RowEquations(Equations):
     def means(self, columns: Columns, arms: Sequence[OneJoint], pointwise: bool = True) -> Array:
         del pointwise  # the low-pass needs all samples
         parts = [run.conditioned(columns(run.motion, arms[0])) for run in self.runs]
-        return np.vstack(parts)[::self.every]
+        return np.vstack(parts)[self.rows]
 
 
 @dataclass(frozen=True, eq=False)

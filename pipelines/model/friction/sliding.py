@@ -45,63 +45,36 @@ _RANK = 1e-7  # singular values of unit columns below it: two columns that are o
 
 @dataclass(frozen=True)
 class SlidingConfig:
-    """Which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances.
+    """Which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
-    Attributes:
-        rest: standard deviations; a slower speed may be zero (two-sided .003)
-        worse: median square of a class over that of the first rows: 3 std of the logarithm of the
-            median square of 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
-        good: of friction, what a law is good for; with `margin`, its fourth power, 1e-6, remains
-        rows: for every column of the free curve, that the first class has at least
-        margin: times the travel from which rows follow the curve: bristles straighten as
-            exp(-travel) (Dahl 1968), 2 %
-        classes: of speed, a decade: friction runs straight over a factor of 1.6
-        decades: of speed; slower rows are one class
-        course: knots of a change of friction in time: what drifts still is a function of speed
-        halving: of travel, from class to class
-        windows: times the shortest, tried in turn
-        attenuation: noise variance of the acceleration over its own: relative bias of the inertia
-    """
-
-    rest: float = 3.0
+    rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
+    # Median square of a class over that of the first rows: 3 std of the logarithm of the median square
+    # of 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
     worse: float = 4.0
-    good: float = 0.03
-    rows: int = 3
-    margin: float = 4.0
-    classes: int = 5
-    decades: int = 4
-    course: int = 8
-    halving: float = 2.0
-    windows: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0, 16.0)
-    attenuation: float = 2e-3
+    good: float = 0.03  # of friction: what a law is good for; `margin` leaves its fourth power
+    rows: int = 3  # for every column of the free curve, that the first class has at least
+    margin: float = 4.0  # times the travel: bristles straighten as exp(-travel) (Dahl 1968), 2 %
+    classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
+    decades: int = 4  # of speed; slower rows are one class
+    course: int = 8  # knots of friction in time: what drifts still is a function of speed
+    halving: float = 2.0  # of travel, from class to class
+    windows: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0, 16.0)  # times the shortest, tried in turn
+    attenuation: float = 2e-3  # noise of the acceleration over itself (variance): bias of inertia
 
 
 @dataclass(frozen=True)
 class DriftConfig:
-    """Whether friction drifts.
+    """Whether friction drifts."""
 
-    Attributes:
-        chance: that a joint without drift gains as much in blocks held out: none in 100 joints
-        block: [s] of rows whose errors may depend on one another; .1 s apart they do by .15 (ten
-            joints, one .28)
-        fewest: blocks; fewer give no covariance of two numbers to rely on
-        rows: for every other column; fewer leave no residual to judge by
-        ends: of all rows, that lie before and after a step
-        times: over the duration; 5: straight
-        least: of friction; a smaller change is within what a law is good for
-        sure: standard deviations beyond which a larger change is excluded: two-sided .05
-        rounds: of scanning for a course and fitting the curve that changes
-    """
-
-    chance: float = 1e-3
-    block: float = 0.5
-    fewest: int = 12
-    rows: int = 3
-    ends: float = 0.08
-    times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)
-    least: float = 0.03
-    sure: float = 2.0
-    rounds: int = 4
+    chance: float = 1e-3  # to gain as much in blocks held out without a drift: none in 100 joints
+    block: float = 0.5  # [s] in which errors depend; .1 s apart they do by .15 (10 joints, one .28)
+    fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
+    rows: int = 3  # for every other column: fewer leave no residual to judge by
+    ends: float = 0.08  # of all rows, that lie before and after a step
+    times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)  # over the duration; 5: straight
+    least: float = 0.03  # of friction: a smaller change is within what a law is good for
+    sure: float = 2.0  # std beyond which a larger change is excluded: two-sided .05
+    rounds: int = 4  # of scanning for a course and fitting the curve that changes
 
 
 _CONFIG, _DRIFT = SlidingConfig(), DriftConfig()
