@@ -10,7 +10,7 @@ torque. A joint that never runs shows a least value.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,7 +74,7 @@ def held_at_least(stretches: Sequence[Stretch], fit: LawFit) -> tuple[float, flo
 
     The speed that is left is noise.
     """
-    loads = [_friction(stretch.moved(stretch.q, np.zeros_like(stretch.dq)), fit)[~stretch.spoilt]
+    loads = [_friction(replace(stretch, dq=np.zeros_like(stretch.dq)), fit)[~stretch.spoilt]
              for stretch in stretches]
     load = np.concatenate([*loads, np.zeros(0)])
     return (float(np.quantile(load, 0.01)), float(np.quantile(load, 0.99))) if load.size else None
@@ -84,8 +84,7 @@ def _friction(stretch: Stretch, fit: LawFit) -> Array:
     """Return what torque leaves for friction (samples,) [N m]."""
     arm, coupling = fit.at(stretch)
     tau = stretch.known_tau
-    if stretch.held:
-        tau = np.concatenate([tau[:1], 0.5 * (tau[1:] + tau[:-1])])
+    tau = np.concatenate([tau[:1], 0.5 * (tau[1:] + tau[:-1])])
     weight = gravity_columns(stretch.q, stretch.revolute) @ np.array(arm.gravity)
     rigid = arm.inertia * np.gradient(stretch.dq, stretch.t) + weight
     return np.asarray(tau - rigid - stretch.sway @ coupling)

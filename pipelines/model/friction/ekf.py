@@ -111,8 +111,6 @@ def filtered(stretches: Sequence[Stretch], joint: OneJoint, resolution: float) -
     for stretch in stretches:
         start.mean[:2] = stretch.q[0], stretch.dq[0]
         tau = stretch.known_tau - stretch.sway @ fit.at(stretch)[1]
-        if not stretch.held:
-            tau[:-1] = 0.5 * (tau[:-1] + tau[1:])
         step = float(np.median(np.diff(stretch.t)))
         run = run_ekf(stretch.measured, tau, step, start, _PASSES)
         start, covariance = replace(start, mean=run.mean.copy()), run.covariance

@@ -68,8 +68,7 @@ def simulate_joint(stretch: Stretch, fit: LawFit, friction: bool = True) -> Simu
     """
     joint, coupling = fit.at(stretch)
     weight = gravity_columns(stretch.q, stretch.revolute) @ np.array(joint.gravity)
-    if stretch.held:
-        weight[:-1] = 0.5 * (weight[1:] + weight[:-1])
+    weight[:-1] = 0.5 * (weight[1:] + weight[:-1])
     given = weight + stretch.sway @ coupling
     states = np.full((len(stretch.t), 2), np.nan)
     if joint.inertia > 0.0:
@@ -88,43 +87,30 @@ def simulate_joint(stretch: Stretch, fit: LawFit, friction: bool = True) -> Simu
 def _stepped(stretch: Stretch, J: float, lost: Lost, parts: int, states: Array) -> None:
     """Fill `states` (samples, 2) by steps of Runge and Kutta, `parts` a sample."""
     q, v = states[0] = float(stretch.q[0]), float(stretch.dq[0])
-    begin, end = (ends.tolist() for ends in _torque(stretch))
+    tau, steps = stretch.known_tau.tolist(), (np.diff(stretch.t) / parts).tolist()
 
     def rate(q: float, v: float, u: float) -> float:
         return (u - lost(q, v)) / J
 
-    for k, h in enumerate((np.diff(stretch.t) / parts).tolist()):
-        change = (end[k] - begin[k]) / parts
-        for part in range(parts):
-            u = begin[k] + part * change
-            q, v = _runge_kutta(rate, q, v, u, u + 0.5 * change, u + change, h)
+    for k, h in enumerate(steps):
+        for _ in range(parts):
+            q, v = _runge_kutta(rate, q, v, tau[k], h)
         if not abs(v) < _CONFIG.fastest:
             break
         states[k + 1] = q, v
 
 
-def _runge_kutta(rate: Callable[[T, T, T], T], q: T, v: T, u0: T, um: T, u1: T,
-                 h: float) -> tuple[T, T]:
-    """Return q and v after a step `h` [s] of dv/dt = rate(q, v, u), of fourth order.
-
-    Args:
-        u0, um, u1: torque at its beginning, middle and end [N m].
-    """
-    a1 = rate(q, v, u0)
+def _runge_kutta(rate: Callable[[T, T, T], T], q: T, v: T, u: T, h: float) -> tuple[T, T]:
+    """Return q and v after a step `h` [s] of dv/dt = rate(q, v, u), of fourth order."""
+    a1 = rate(q, v, u)
     v2 = v + 0.5 * h * a1
-    a2 = rate(q + 0.5 * h * v, v2, um)
+    a2 = rate(q + 0.5 * h * v, v2, u)
     v3 = v + 0.5 * h * a2
-    a3 = rate(q + 0.5 * h * v2, v3, um)
+    a3 = rate(q + 0.5 * h * v2, v3, u)
     v4 = v + h * a3
-    a4 = rate(q + h * v3, v4, u1)
+    a4 = rate(q + h * v3, v4, u)
     return (q + h / 6.0 * (v + 2.0 * v2 + 2.0 * v3 + v4),
             v + h / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4))
-
-
-def _torque(stretch: Stretch) -> tuple[Array, Array]:
-    """Return the torque at the beginning and at the end of every step (samples - 1,) [N m]."""
-    tau = stretch.known_tau
-    return tau[:-1], tau[:-1] if stretch.held else tau[1:]
 
 
 def _steepest(fit: LawFit) -> float:
@@ -187,9 +173,9 @@ def _with_hooks(stretch: Stretch, joint: OneJoint, fit: LawFit, given: Array, pa
     hooks = [effect.simulate(joint, values) for effect, values in effects]
     memory = [np.zeros((1, hook.states)) for hook in hooks]
     q, v = states[0] = float(stretch.q[0]), float(stretch.dq[0])
-    begin, _ = _torque(stretch)
+    tau = stretch.known_tau
     for k, step in enumerate(np.diff(stretch.t).tolist()):
-        h, command, load = step / parts, np.array([[begin[k]]]), float(given[k])
+        h, command, load = step / parts, np.array([[tau[k]]]), float(given[k])
         for _ in range(parts):
             a1, r1 = _rates(joint, hooks, memory, q, v, command, load)
             ahead = [z + h * r for z, r in zip(memory, r1, strict=True)]
@@ -235,7 +221,7 @@ class _Windows:
     step: float  # [s]
     start: Array  # (windows, 2) position and speed it begins with
     measured: Array  # (windows, samples + 1) [rad]
-    torque: Array  # (windows, samples, 2) [N m] at the beginning and the end of every step
+    torque: Array  # (windows, samples) [N m]
     sway: Array  # (windows, samples, columns) of joints that are held and sway
     posture: Array  # (windows,) which of the fit's
 
@@ -275,13 +261,13 @@ def _windows(stretches: Sequence[Stretch], fit: LawFit) -> _Windows:
     size = max(8, round(_CONFIG.window / step))
     parts: list[tuple[Array | int, ...]] = []
     for stretch in stretches:
-        ends, posture = np.stack(_torque(stretch), axis=1), fit.posture_of(stretch)
+        tau, posture = stretch.known_tau, fit.posture_of(stretch)
         for first in range(0, len(stretch.t) - size - 1, size):
             inner, rows = slice(first, first + size), slice(first, first + size + 1)
             measured = stretch.measured[rows]
             if not stretch.spoilt[rows].any() and np.isfinite(measured).all():
                 start = np.array([stretch.q[first], stretch.dq[first]])
-                parts.append((start, measured, ends[inner], stretch.sway[inner], posture))
+                parts.append((start, measured, tau[inner], stretch.sway[inner], posture))
     return _Windows(step, *(np.array(column) for column in zip(*parts, strict=True)))
 
 
@@ -321,12 +307,9 @@ def _simulated(windows: _Windows, fit: LawFit, sets: Array, begin: Array) -> Arr
     out = np.empty((len(sets), count, windows.measured.shape[1]))
     out[..., 0] = q
     for k in range(windows.torque.shape[1]):
-        sway = np.einsum("swc,wc->sw", coupling, windows.sway[:, k])
-        first, end = windows.torque[:, k].T
-        change = (end - first) / parts
-        for part in range(parts):
-            u = first + part * change - sway
-            q, v = _runge_kutta(rate, q, v, u, u + 0.5 * change, u + change, windows.step / parts)
+        u = windows.torque[:, k] - np.einsum("swc,wc->sw", coupling, windows.sway[:, k])
+        for _ in range(parts):
+            q, v = _runge_kutta(rate, q, v, u, windows.step / parts)
         out[..., k + 1] = q
     return out
 

@@ -12,7 +12,7 @@ over a sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -75,7 +75,7 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float, freedom: float = 1
     shown = (np.mean(np.square(second[np.isfinite(second)])) - 0.5 * jerk**2 * step**4) / 6.0
     observer = design(step, jerk, np.maximum(shown, resolution**2 / 12.0), _ORDER)
     states = smooth(deviation[:, None], observer).states[:, :, 0]
-    return stretch.moved(q + states[0], dq + states[1])
+    return replace(stretch, q=q + states[0], dq=dq + states[1])
 
 
 def _implied_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
@@ -103,7 +103,7 @@ def _implied_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
 
 
 def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, resolution: float,
-                     window: float = 0.02, held: bool = True, rounds: int = 1) -> LawFit:
+                     window: float = 0.02, rounds: int = 1) -> LawFit:
     """Fit `law` with inertia and gravity of a joint that was driven alone: the whole way in one call.
 
     every few samples smoothed → a rough fit → all samples smoothed about what it implies → the fit
@@ -114,10 +114,9 @@ def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, 
     Args:
         t: (samples,) [s] evenly spaced.
         q: (samples,) [rad] as the encoder gave it, NaN where it is missing.
-        tau: (samples,) [N m].
+        tau: (samples,) [N m] held until the next.
         resolution: step of the encoder [rad].
         window: of the equations [s].
-        held: the torque is a command held from sample to sample.
         rounds: of refining the motion, one or more.
 
     Raises:
@@ -129,11 +128,11 @@ def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, 
     if len(t) < 2.0 * _CONFIG.ends / step + _CONFIG.fewest * size:
         raise InputRejected("T08", f"{len(t)} samples are too few for a friction law",
                             remedy="record a few seconds at least")
-    coarse = _smoothed(t, q, tau, resolution, every, size // every, held, joint.revolute)
+    coarse = _smoothed(t, q, tau, resolution, every, size // every, joint.revolute)
     fit = _roughly(LawEquations.of((coarse,), joint), law)
     fine = Stretch("log", t, q, tau, np.interp(t, coarse.t, coarse.q),
-                   np.interp(t, coarse.t, coarse.dq), _spoilt(t, q, tau), held, size,
-                   joint.revolute, ())
+                   np.interp(t, coarse.t, coarse.dq), _spoilt(t, q, tau), size, joint.revolute,
+                   ())
     for _ in range(rounds):
         fine = refined(fine, fit, resolution, _CONFIG.freedom)
         equations = LawEquations.of((fine,), joint)
@@ -155,7 +154,7 @@ def _roughly(equations: LawEquations, law: Law, start: Array | None = None) -> L
 
 
 def _smoothed(t: Array, q: Array, tau: Array, resolution: float, every: int, window: int,
-              held: bool, revolute: bool) -> Stretch:
+              revolute: bool) -> Stretch:
     """Return every `every`-th sample, its torque the mean until the next, its motion smoothed."""
     whole = len(t) // every * every
     t, y = t[:whole:every], q[:whole:every]
@@ -164,7 +163,7 @@ def _smoothed(t: Array, q: Array, tau: Array, resolution: float, every: int, win
     observer = design(step, tuned.jerk_std, tuned.noise_variance, _CONFIG.order)
     states = smooth(y[:, None], observer).states[..., 0]
     return Stretch("log", t, y, mean, states[0], states[1], _spoilt(t, y, mean),
-                   held or every > 1, window, revolute, ())
+                   window, revolute, ())
 
 
 def _spoilt(t: Array, q: Array, tau: Array) -> Mask:

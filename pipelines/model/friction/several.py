@@ -36,12 +36,10 @@ class _Run:
     held: bool
     low_pass: LowPass | None
     rows: npt.NDArray[np.intp]  # samples of the run, after centring
-    scale: float
 
     def conditioned(self, columns: Array) -> Array:
         x = centre_samples(columns) if self.held else columns
-        filtered = x if self.low_pass is None else zero_phase(x, self.low_pass)
-        return self.scale * filtered[self.rows]
+        return (x if self.low_pass is None else zero_phase(x, self.low_pass))[self.rows]
 
 
 def _runs_of(log: LogEquations, j: int) -> list[_Run]:
@@ -56,7 +54,7 @@ def _runs_of(log: LogEquations, j: int) -> list[_Run]:
                   for x in (motion.q, motion.dq, motion.ddq))
         own = times[(times >= t[0]) & (times <= t[-1])]
         runs.append(_Run(Motion(t, *states), log.held, log.conditioning.low_pass,
-                         np.searchsorted(t, own) - int(log.held), float(np.sqrt(log.repeats))))
+                         np.searchsorted(t, own) - int(log.held)))
     return runs
 
 

@@ -37,7 +37,6 @@ __all__ = ["Course", "Mask", "Stretch", "Sway", "Windows", "blocks_of_time", "mo
 
 Mask = npt.NDArray[np.bool_]
 
-_MOTIONLESS = ("edges", "usable", "impulse", "length", "torque")
 _PART = 1e-3  # of a finite difference, relative
 _KINKED = 2  # order of a smoother for motion whose acceleration jumps
 _GAUSS = 0.5 / np.sqrt(3.0)  # of their time, from its middle: where two nodes lie
@@ -192,11 +191,10 @@ class Stretch:
     name: str  # of the log
     t: Array  # [s] (samples,)
     measured: Array  # [rad] (samples,) position by the encoder, NaN where it is missing
-    tau: Array  # [N m] (samples,)
+    tau: Array  # [N m] (samples,) held until the next
     q: Array  # [rad] (samples,) reconstructed
     dq: Array  # [rad/s] (samples,)
     spoilt: Mask  # (samples,) no row may use it
-    held: bool  # the torque is a command held from sample to sample
     window: int  # samples
     revolute: bool
     posture: tuple[float, ...]  # [rad] of the other joints
@@ -214,13 +212,6 @@ class Stretch:
         sticks = np.zeros(len(self.usable), dtype=bool)
         sticks[self.usable] = ~rows
         return replace(self, sticks=sticks if sticks.any() else None)
-
-    def moved(self, q: Array, dq: Array) -> Stretch:
-        """Return it with a better motion; what does not depend on that is kept."""
-        other = replace(self, q=q, dq=dq)
-        kept = {name: self.__dict__[name] for name in _MOTIONLESS if name in self.__dict__}
-        other.__dict__.update(kept)
-        return other
 
     @property
     def rows(self) -> int:
@@ -250,9 +241,7 @@ class Stretch:
     @cached_property
     def impulse(self) -> Array:
         """Return ∫ τ dt from the first sample (samples,) [N m s]."""
-        tau = self.known_tau
-        each = tau[:-1] if self.held else 0.5 * (tau[1:] + tau[:-1])
-        return np.concatenate([[0.0], np.cumsum(each * np.diff(self.t))])
+        return np.concatenate([[0.0], np.cumsum(self.known_tau[:-1] * np.diff(self.t))])
 
     @cached_property
     def length(self) -> Array:
@@ -461,7 +450,7 @@ def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: f
             log.name, good.log.t[run],
             np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j]),
             good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
-            np.where(np.isfinite(dq), dq, 0.0), spoilt, True, size, log.robot.joints[j].revolute,
+            np.where(np.isfinite(dq), dq, 0.0), spoilt, size, log.robot.joints[j].revolute,
             others, tuple(_sway(found, run, k - 1, log.sample_time, k < joint) for k in swaying),
             doubt, weighs, untimed=log.torque == "measured")
         if len(stretch.edges) > _CONFIG.fewest and stretch.rows >= _CONFIG.fewest:

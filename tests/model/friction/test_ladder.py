@@ -50,7 +50,7 @@ def plateaus(speeds: tuple[float, ...], friction: object, rest: bool, noise: flo
         spoilt[max(0, edge - 20):edge + 20] = True
     q = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (dq[1:] + dq[:-1]))])
     tau = np.array([friction(v) for v in dq.tolist()]) + 1.7 * np.sin(q) + noise * rng.standard_normal(len(dq))  # type: ignore[operator]
-    return Stretch("plateaus", t, q, tau, q, dq, spoilt, True, 20, True, ())
+    return Stretch("plateaus", t, q, tau, q, dq, spoilt, 20, True, ())
 
 
 def climbed(stretch: Stretch) -> tuple[object, tuple[str, ...], tuple[str, ...]]:

@@ -32,7 +32,7 @@ def known(law: Law, amplitudes: list[float], shapes: list[float]) -> LawFit:
 
 def stretch(tau: Array = TORQUE) -> Stretch:
     nothing = np.zeros(len(tau))
-    return Stretch("given", T, nothing, tau, nothing, nothing, np.zeros(len(tau), dtype=bool), True, 20, True, (0.0, 0.0),
+    return Stretch("given", T, nothing, tau, nothing, nothing, np.zeros(len(tau), dtype=bool), 20, True, (0.0, 0.0),
                    ())
 
 
