@@ -24,7 +24,7 @@ __all__ = ["BreakAwayConfig", "Event", "break_away", "held_at_least"]
 
 @dataclass(frozen=True)
 class BreakAwayConfig:
-    """What a break-away is; choices, not measured."""
+    """Limits that make a break-away; choices, not measured."""
 
     creep: float = 5e-3  # of the fastest speed
     rest: float = 0.1  # [s] rest before a break-away
@@ -61,7 +61,7 @@ def break_away(stretches: Sequence[Stretch], fit: LawFit) -> tuple[Event, ...]:
         noise.append(float(np.std(load - smooth)) / np.sqrt(size))
         for direction, first, last in _events(stretch, _CONFIG.creep * fastest, step):
             torques[direction].append(float(np.max(direction * smooth[first:last])))
-    unit, events = "N m" if fit.joint.revolute else "N", []
+    unit, events = fit.joint.units[0], []
     for side, values in torques.items():
         if values:
             std = float(np.std(values, ddof=1)) if len(values) > 1 else max(noise)

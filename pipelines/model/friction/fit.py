@@ -232,7 +232,7 @@ class Equations(ABC):
                          *law.bounds, self.slopes(law))
 
     def residual(self, fit: LawFit) -> Array:
-        """Return what `fit` leaves of these rows (rows,) [N m], in unknown postures the nearest."""
+        """Return the residual of `fit` (rows,) [N m]; unknown postures take the nearest's numbers."""
         own = fit.rigid[[_nearest(posture, fit.postures) for posture in self.postures]].ravel()
         law = self.law_columns(fit.law, self.arms(own), fit.theta) @ fit.amplitudes
         return np.asarray(self.y - (self.fixed @ own + law))
@@ -339,7 +339,7 @@ def takes_power(equations: Equations, law: Law, arm: OneJoint, found: SeparableF
 
 def _taking_power(equations: Equations, law: Law, arms: Sequence[OneJoint],
                   starts: Sequence[Array], found: SeparableFit) -> SeparableFit:
-    """Return the best other local optimum whose curve takes power; `found` where there is none."""
+    """Return the best other local optimum whose curve takes power, else `found`."""
     whole = equations.problem(law, arms)
     few = equations.thinned(_CONFIG.rough).problem(law, arms)
     grid = list(starts) if len(starts) > 1 else list(law.starts(equations.nodes, arms[0]))

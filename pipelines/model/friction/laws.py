@@ -35,7 +35,7 @@ __all__ = ["LADDER", "Law", "NonlinearNumber", "OneJoint", "gravity_acts", "grav
 
 _POSITIONS = 8  # of the driven joint, at which gravity is looked for
 _PARALLEL = 1e-6  # [rad] between axis and gravity: rounding of a description
-_SHARED = "sharpness"  # a joint changes the sign of its friction over one speed, whatever its law
+_SHARED = "sharpness"  # every law of a joint changes its sign over the same speed
 _SHARP = (10.0, 30.0, 100.0, 300.0)  # [s/rad] where a search for it begins
 
 
@@ -62,6 +62,11 @@ class OneJoint:
     @property
     def revolute(self) -> bool:
         return self.robot.joints[0].revolute
+
+    @property
+    def units(self) -> tuple[str, str, str]:
+        """Return the units of torque, speed and inertia."""
+        return ("N m", "rad/s", "kg m^2") if self.revolute else ("N", "m/s", "kg")
 
     @property
     def body(self) -> RigidBody:

@@ -256,7 +256,7 @@ def _difference(fit: LawFit, other: LawFit, speed: Array, alone: bool) -> str:
     curve = fit.curve(speed)
     apart = np.abs(curve - other.curve(speed))
     most = int(np.argmax(apart))
-    units = ("N m", "rad/s", "kg m²") if fit.joint.revolute else ("N", "m/s", "kg")
+    units = [unit.replace("^2", "²") for unit in fit.joint.units]
     share = 100.0 * float(apart[most]) / max(abs(float(curve[most])), 1e-300)
     words = (f"what the choice changes: the curve by at most {plain_number(float(apart[most]))} "
              f"{units[0]}, at {plain_number(abs(float(speed[most])))} {units[1]} "

@@ -195,7 +195,7 @@ def _rates(joint: OneJoint, hooks: Sequence[Hooks], memory: Sequence[Array], q: 
     for hook, z in zip(hooks, memory, strict=True):
         if hook.load is not None:
             load = load + hook.load(motion, z)
-        if hook.actuator is not None:  # friction that grows with load: what it leaves of the command
+        if hook.actuator is not None:  # friction that grows with load lowers the command
             applied = hook.actuator(applied, motion, z)
     rates = [hook.rate(motion, command, z) if hook.rate is not None else np.zeros_like(z)
              for hook, z in zip(hooks, memory, strict=True)]

@@ -57,7 +57,7 @@ class CandidateLaw:
 
 @dataclass(frozen=True)
 class Posture:
-    """What depends on where the other joints stand."""
+    """Inertia and gravity in one posture of the other joints."""
 
     others: tuple[float, ...]  # [rad]
     inertia: Value
@@ -91,7 +91,7 @@ class Sticking:
 
 @dataclass(frozen=True)
 class Series:
-    """What figures are drawn from."""
+    """Curves and samples for figures."""
 
     speed: Array  # [rad/s] (points,) of the curve
     curve: Array  # [N m]
@@ -185,17 +185,13 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
 
 
 def _posture(joint: JointFit, k: int) -> Posture:
-    fit, revolute = joint.fit, joint.fit.joint.revolute
-    first, names = fit.rigid_size * k, gravity_names(revolute)
+    fit, (torque, _, inertia) = joint.fit, joint.fit.joint.units
+    first, names = fit.rigid_size * k, gravity_names(fit.joint.revolute)
     values, std = (x[first:first + 1 + len(names)].tolist() for x in (fit.found.beta, fit.std))
     weighs = joint.stretches[0].weighs
-    gravity = {name: Value(value if weighs else 0.0, deviation, "N m" if revolute else "N")
+    gravity = {name: Value(value if weighs else 0.0, deviation, torque)
                for name, value, deviation in zip(names, values[1:], std[1:], strict=True)}
-    return Posture(fit.postures[k], Value(values[0], std[0], _inertia_unit(revolute)), gravity)
-
-
-def _inertia_unit(revolute: bool) -> str:
-    return "kg m^2" if revolute else "kg"
+    return Posture(fit.postures[k], Value(values[0], std[0], inertia), gravity)
 
 
 def _drift(joint: JointFit) -> Drift | None:
@@ -327,5 +323,5 @@ def _inertia(fitted: Fitted, arm: Arm, j: int, q: Array) -> Value:
     own = row[list(estimate.columns.kept)]
     spread = estimate.robust.covariance[:len(own), :len(own)]
     std = float(np.sqrt(own @ spread @ own)) if np.isfinite(spread).all() else None
-    return Value(float(own @ estimate.beta[:len(own)]), std,
-                 _inertia_unit(arm.robot.joints[j].revolute))
+    unit = "kg m^2" if arm.robot.joints[j].revolute else "kg"
+    return Value(float(own @ estimate.beta[:len(own)]), std, unit)

@@ -3,7 +3,7 @@
     r = F δ + Σ_k (a_k sin kq + b_k cos kq) + noise        F = ∂ŷ/∂(β, θ) of the fitted law
 
 k waves in a turn; of a slide, in 2π m. They are chosen on some blocks of time and judged on the
-others. They have to explain a good part of what is left there, and some of it forth and back, slow
+others. They have to explain a good part of the residual there, and some of it forth and back, slow
 and fast: friction turns with the motion, an acceleration that is wrong goes with the speed, a torque
 of the angle does neither. Magnets, teeth, a spring, a stop: what makes it is not asked here.
 """
@@ -84,7 +84,7 @@ def _along_angle(orders: Sequence[float]) -> Columns:
 
 @dataclass(frozen=True, eq=False)
 class Along:
-    """What the law leaves, and the waves that explain it, by angle, without gravity (points,).
+    """Residual of the law, and the waves that explain it, by angle, without gravity (points,).
 
     NaN where no row is.
     """
@@ -132,7 +132,7 @@ class _Normal:
         return np.asarray(_inverse(self.gram[np.ix_(at, at)]) @ self.gram[at, -1])
 
     def gains(self, chosen: Sequence[int]) -> Array:
-        """Return the share of what is left that each wave explains (orders,).
+        """Return the share of the residual that each wave explains (orders,).
 
         With G the products of what of its two columns lies outside the law and the chosen waves, and
         g theirs with what these leave: gᵀ G⁻¹ g.
@@ -191,7 +191,7 @@ class _Rows:
 
     def rest(self, normal: _Normal, chosen: Sequence[int],
              rows: npt.NDArray[np.intp] | slice) -> Array:
-        """Return what the law and the chosen waves leave of some rows, scaled (rows,)."""
+        """Return the residual of the law and the chosen waves in some rows, scaled (rows,)."""
         here = self.columns[rows]
         return here[:, -1] - here[:, normal.columns(chosen)] @ normal.solution(chosen)
 
@@ -229,9 +229,9 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
     rms, std = _size(rows, chosen)
     if rms < max(_CONFIG.worth * np.sqrt(power), _CONFIG.sure * std):
         return None
-    waves, revolute = tuple(orders[k] for k in chosen), arms[0].revolute
-    along = _along(rows, chosen, q, dq, waves, revolute)
-    return Ripple(Value(rms, std, "N m" if revolute else "N"), share, waves, None, along,
+    waves = tuple(orders[k] for k in chosen)
+    along = _along(rows, chosen, q, dq, waves, arms[0].revolute)
+    return Ripple(Value(rms, std, arms[0].units[0]), share, waves, None, along,
                   along.share_of(waves[0]))
 
 
@@ -312,5 +312,4 @@ def with_inertia(ripple: Ripple, equations: Equations, fit: LawFit) -> Ripple:
     problem = replace(problem, fixed=np.hstack([problem.fixed, waves]))
     found = fit_separable(problem, [fit.theta])
     std = float(np.sqrt(max(found.covariance[0, 0], 0.0)))
-    unit = "kg m^2" if fit.joint.revolute else "kg"
-    return replace(ripple, inertia=Value(float(found.beta[0]), std, unit))
+    return replace(ripple, inertia=Value(float(found.beta[0]), std, fit.joint.units[2]))

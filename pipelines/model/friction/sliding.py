@@ -45,7 +45,7 @@ _RANK = 1e-7  # singular values of unit columns below it: two columns that are o
 
 @dataclass(frozen=True)
 class SlidingConfig:
-    """Which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances."""
+    """Limits of sliding; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
     # Median square of a class over that of the first rows: 3 std of the logarithm of the median square
@@ -64,7 +64,7 @@ class SlidingConfig:
 
 @dataclass(frozen=True)
 class DriftConfig:
-    """Whether friction drifts."""
+    """Limits of friction that drifts."""
 
     chance: float = 1e-3  # to gain as much in blocks held out without a drift: none in 100 joints
     block: float = 0.5  # [s] in which errors depend; .1 s apart they do by .15 (10 joints, one .28)
@@ -256,7 +256,7 @@ class _Rows:
 
     @cached_property
     def left(self) -> Array:
-        """Return what is left of the torque without a drift (rows,) [N m]."""
+        """Return the residual without a drift (rows,) [N m]."""
         return np.asarray(self.y - self.basis @ (self.basis.T @ self.y))
 
     @cached_property

@@ -3,7 +3,7 @@
 The friction map takes torque at equal position and opposite speed in pairs:
 
     ½ (τ(q, v) - τ(q, -v))     odd in speed: friction
-    ½ (τ(q, v) + τ(q, -v))     even: gravity, offsets, whatever does not turn with the motion
+    ½ (τ(q, v) + τ(q, -v))     even: gravity, offsets, all that does not turn with the motion
 
 What acceleration takes, J ddq and the sway of held joints, is subtracted first. Nothing is assumed of
 friction: the points are a test of the fitted curve that did not depend on it.

@@ -44,7 +44,7 @@ _GAUSS = 0.5 / np.sqrt(3.0)  # of their time, from its middle: where two nodes l
 
 @dataclass(frozen=True)
 class WeakFormConfig:
-    """Which samples make equations, where their nodes lie, and which joints move."""
+    """Limits of samples that make equations, of their nodes, and of joints that move."""
 
     vague: float = 2.0  # times the usual std of the speed: near ends and gaps; a choice
     sway: float = 10.0  # encoder steps: rounding moves a held joint by one
@@ -63,7 +63,7 @@ _CONFIG = WeakFormConfig()
 
 @dataclass(frozen=True, eq=False)
 class Sway:
-    """A joint that is held and gives way while another one is driven."""
+    """A joint that is held and sways while another one is driven."""
 
     lean: Array  # δ [rad] (samples,) from where it is held
     speed: Array  # [rad/s] (samples,)
@@ -404,7 +404,7 @@ def blocks_of_time(stretches: Sequence[Stretch], length: float) -> npt.NDArray[n
 
 
 def swaying(motion: Reconstructed, joint: int) -> tuple[int, ...]:
-    """Return the joints, counted from 1, that are held but visibly give way to `joint`."""
+    """Return the joints, counted from 1, that are held but visibly sway with `joint`."""
     q = motion.motion.q[motion.good.kept[motion.good.fit]]
     moves = np.ptp(q, axis=0) > _CONFIG.sway * encoder_resolution(motion.good)
     return tuple(int(k) + 1 for k in np.flatnonzero(moves) if k != joint - 1)
