@@ -24,13 +24,13 @@ from pipelines.model.friction.breakaway import Event, break_away, held_at_least
 from pipelines.model.friction.ekf import filtered
 from pipelines.model.friction.fit import LawEquations, LawFit, fit_law, same_posture
 from pipelines.model.friction.laws import LADDER, Law, OneJoint, gravity_columns
-from pipelines.model.friction.model_selection import Ladder, climb, no_worse
+from pipelines.model.friction.model_selection import Ladder, Missing, climb, no_worse
 from pipelines.model.friction.output_error import Simulated, polished, simulate_joint
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.ripple import Ripple, ripple_of, with_inertia
 from pipelines.model.friction.sliding import Sliding, SlidingConfig, drift_of, left_out, sliding_rows
-from pipelines.model.friction.speed_map import Coverage, Missing, SpeedMap, coverage, speed_map, unseen
-from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time, stretches_of, swaying
+from pipelines.model.friction.speed_map import Coverage, coverage, speed_map, unseen
+from pipelines.model.friction.weak_form import Course, Mask, Stretch, blocks_of_time, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 
@@ -113,7 +113,7 @@ class JointFit:
     driven: Driven
     covered: Coverage
     unseen: tuple[Missing, ...]
-    map: SpeedMap
+    map: Array  # (4, points) of `speed_map`
     break_away: tuple[Event, ...]
     held: tuple[float, float] | None  # [N m] friction carried at rest, back and forth
     window: float  # [s]
@@ -133,8 +133,15 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
     """
     arm = OneJoint.of(logs.identify[0][0].robot, logs.joint)
     stretches, fitted, window, sliding = _usable_rows(logs, window, arm)
-    stretches, fit = _refined(stretches, fitted, sliding, arm, logs.resolution, law)
-    shown = _course(stretches, fitted, sliding, arm)
+    slide = bool(sliding.slides[:sum(stretch.rows for stretch in stretches[:fitted])].any())
+    moves = np.ones_like(sliding.resting)
+    if slide and (law is None or law.pointwise):
+        moves = ~sliding.resting
+    moving, fit = _refined(left_out(stretches, moves), fitted, arm, logs.resolution)
+    if slide and not _followed(moving, fit, sliding.slides[moves]):
+        moving = left_out(stretches, sliding.slides)
+    stretches = moving
+    shown = drift_of(left_out(stretches, sliding.slides)[:fitted], arm) if slide else None
     course = shown if shown is not None and shown.named else None
     choice = _choice(stretches, fitted, course, fit, arm, law)
     if shown is not course:  # neither shown nor excluded: it takes part where the law is better
@@ -190,42 +197,25 @@ def _usable_rows(logs: JointLogs, window: float,
     return best
 
 
-def _any_slide(stretches: Stretches, fitted: int, sliding: Sliding) -> bool:
-    """Return whether usable rows of the fitted stretches slide."""
-    count = sum(stretch.usable.sum() for stretch in stretches[:fitted])
-    return bool(sliding.slides[:count].any())
-
-
-def _refined(stretches: Stretches, fitted: int, sliding: Sliding, arm: OneJoint, resolution: float,
-             law: Law | None) -> tuple[Stretches, LawFit]:
-    """Return the rows to fit, their motion refined about a law that follows any curve, and that law.
-
-    Rows that rest are left out, and rows that do not slide where the flexible law does not follow
-    them as well as the others and most of its residual is theirs.
-    """
-    slide = _any_slide(stretches, fitted, sliding)
-    moves = np.ones_like(sliding.resting)
-    if slide and (law is None or law.pointwise):
-        moves = ~sliding.resting
-    refined_ = left_out(stretches, moves)
-    fit = fit_law(LawEquations.of(refined_[:fitted], arm), _FLEXIBLE)
+def _refined(stretches: Stretches, fitted: int, arm: OneJoint,
+             resolution: float) -> tuple[Stretches, LawFit]:
+    """Return the motion refined about a law that follows any curve, and that law."""
+    fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE)
     for _ in range(_CONFIG.rounds):
-        refined_ = tuple(refined(stretch, fit, resolution) for stretch in refined_)
-        fit = fit_law(LawEquations.of(refined_[:fitted], arm), _FLEXIBLE, [fit.theta])
-    if slide:
-        square = np.square(LawEquations.of(refined_, fit.joint).residual(fit))
-        doubt, sure = square[~sliding.slides[moves]], square[sliding.slides[moves]]
-        if (doubt.size and doubt.mean() > _SLIDING.worse * sure.mean()
-                and doubt.sum() > sure.sum()):
-            refined_ = left_out(stretches, sliding.slides)
-    return refined_, fit
+        stretches = tuple(refined(stretch, fit, resolution) for stretch in stretches)
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE, [fit.theta])
+    return stretches, fit
 
 
-def _course(stretches: Stretches, fitted: int, sliding: Sliding, arm: OneJoint) -> Course | None:
-    """Return how friction changes in time over the fitted logs; None where it does not."""
-    if not _any_slide(stretches, fitted, sliding):
-        return None
-    return drift_of(left_out(stretches, sliding.slides)[:fitted], arm)
+def _followed(stretches: Stretches, fit: LawFit, slides: Mask) -> bool:
+    """Return whether one curve fits the other rows as well as those that slide.
+
+    Or these make most of its residual.
+    """
+    square = np.square(LawEquations.of(stretches, fit.joint).residual(fit))
+    doubt, sure = square[~slides], square[slides]
+    return (not doubt.size or doubt.mean() <= _SLIDING.worse * sure.mean()
+            or doubt.sum() <= sure.sum())
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,7 +24,7 @@ from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.rigid.body import Array
 from pipelines.model.words import plain_number
 
-__all__ = ["CandidateFit", "Ladder", "climb", "no_worse", "undecided"]
+__all__ = ["CandidateFit", "Ladder", "Missing", "climb", "no_worse", "undecided"]
 
 
 @dataclass(frozen=True)
@@ -217,8 +217,16 @@ def _fault(fit: LawFit, takes: bool) -> str:
     return "" if takes else "its curve would push at speeds that are not in these logs"
 
 
+@dataclass(frozen=True)
+class Missing:
+    """Something these logs do not show, and what to record."""
+
+    what: str
+    record: str
+
+
 def undecided(ladder: Ladder, slowest: float, fastest: float,
-              alone: bool) -> tuple[tuple[str, str], ...]:
+              alone: bool) -> tuple[Missing, ...]:
     """Return, of every alternative, what is undecided, and what to record.
 
     Args:
@@ -228,9 +236,9 @@ def undecided(ladder: Ladder, slowest: float, fastest: float,
     side = np.geomspace(max(slowest, 1e-3 * fastest), fastest, _CONFIG.points)
     speed = np.concatenate([-side[::-1], side])
     chosen = ladder.chosen
-    return tuple((f"{chosen.law.title} or {other.law.title}: {_why(ladder, other)}; "
-                  f"{_difference(chosen.fit, other.fit, speed, alone)}",
-                  find_effect(other.law.members[-1]).words.experiment)
+    return tuple(Missing(f"{chosen.law.title} or {other.law.title}: {_why(ladder, other)}; "
+                         f"{_difference(chosen.fit, other.fit, speed, alone)}",
+                         find_effect(other.law.members[-1]).words.experiment)
                  for other in ladder.alternatives)
 
 

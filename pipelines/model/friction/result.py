@@ -16,10 +16,9 @@ from pipelines.model.friction.breakaway import Event
 from pipelines.model.friction.fit import LawFit, Value
 from pipelines.model.friction.joint import JointFit, fractions
 from pipelines.model.friction.laws import gravity_names
-from pipelines.model.friction.model_selection import Ladder, undecided
+from pipelines.model.friction.model_selection import Ladder, Missing, undecided
 from pipelines.model.friction.ripple import Ripple
 from pipelines.model.friction.several import SeveralFit
-from pipelines.model.friction.speed_map import Missing
 from pipelines.model.friction.weak_form import moved
 
 __all__ = ["CandidateLaw", "Drift", "JointResult", "Posture", "Result", "Series",
@@ -180,8 +179,7 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
         _candidates(ladder), ladder.by, open_, joint.break_away, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)),
-        _series(joint), joint.ripple, True, drift,
-        _sticking(joint))
+        _series(joint), joint.ripple, True, drift, _sticking(joint))
 
 
 def _posture(joint: JointFit, k: int) -> Posture:
@@ -258,13 +256,13 @@ def _curve(fit: LawFit, fastest: float) -> tuple[Array, Array, Array]:
 
 
 def _series(joint: JointFit) -> Series:
-    driven, points, stretch = joint.driven, joint.map, joint.driven.stretch
+    driven, stretch = joint.driven, joint.driven.stretch
     every = max(1, len(stretch.t) // _POINTS)
     samples = (stretch.t - stretch.t[0], stretch.tau, *fractions(joint), stretch.q, stretch.dq,
                driven.with_friction.q, driven.with_friction.dq, driven.without.q,
                driven.without.dq)
-    return Series(*_curve(joint.fit, joint.covered.fastest), points.speed, points.odd,
-                  points.odd_std, points.even, *(np.asarray(x[::every]) for x in samples))
+    return Series(*_curve(joint.fit, joint.covered.fastest), *joint.map,
+                  *(np.asarray(x[::every]) for x in samples))
 
 
 def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[JointResult, ...]:
@@ -272,13 +270,12 @@ def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[Joi
 
     Nothing was simulated: the joints did not move alone.
     """
-    motions = found.fitted.motions
-    q, dq = (np.concatenate(parts) for parts in zip(*(
-        (motion.motion.q[rows], motion.motion.dq[rows]) for _, motion in motions
-        for rows in (motion.good.kept[motion.good.fit],)), strict=True))
-    names = tuple(log.name for log, _ in (*motions, *validate))
-    moves = moved([motion for _, motion in motions]).tolist()
-    middle = np.median(q, axis=0)
+    motions = [motion for _, motion in found.fitted.motions]
+    rows = [motion.good.kept[motion.good.fit] for motion in motions]
+    q, dq = (np.concatenate([x[own] for x, own in zip(parts, rows, strict=True)]) for parts in (
+        [motion.motion.q for motion in motions], [motion.motion.dq for motion in motions]))
+    names = tuple(log.name for log, _ in (*found.fitted.motions, *validate))
+    moves, middle = moved(motions).tolist(), np.median(q, axis=0)
     return tuple(_several(found, arm, j, middle, np.abs(dq[:, j]), names, moves[j])
                  for j in range(arm.n_joints))
 
@@ -301,8 +298,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
         ripple = replace(ripple, inertia=_inertia(found.beside_ripples, arm, j, middle))
     missing: tuple[Missing, ...] = (_UNMOVED,)
     if moves:
-        laws = undecided(ladder, slowest, fastest, alone=False)
-        missing = tuple(Missing(*words) for words in laws)
+        missing = undecided(ladder, slowest, fastest, alone=False)
     return JointResult(
         j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
         (Posture(tuple(map(float, middle)), inertia, {}),),

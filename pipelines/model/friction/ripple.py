@@ -115,59 +115,15 @@ class Ripple:
 
 
 @dataclass(frozen=True, eq=False)
-class _Normal:
-    """Normal equations AᵀA of rows A = [what the law can take, every wave, what it leaves]."""
-
-    gram: Array  # columns scaled alike for all
-    numbers: int  # of the law's
-
-    def columns(self, chosen: Sequence[int]) -> npt.NDArray[np.intp]:
-        """Return where the law's numbers, and sines and cosines of the chosen waves, are."""
-        waves = [self.numbers + 2 * k + part for k in chosen for part in (0, 1)]
-        return np.array([*range(self.numbers), *waves], dtype=np.intp)
-
-    def solution(self, chosen: Sequence[int]) -> Array:
-        """Return least squares over those columns."""
-        at = self.columns(chosen)
-        return np.asarray(_inverse(self.gram[np.ix_(at, at)]) @ self.gram[at, -1])
-
-    def gains(self, chosen: Sequence[int]) -> Array:
-        """Return the share of the residual that each wave explains (orders,).
-
-        With G the products of what of its two columns lies outside the law and the chosen waves, and
-        g theirs with what these leave: gᵀ G⁻¹ g.
-        """
-        at, waves = self.columns(chosen), slice(self.numbers, -1)
-        inner, across = _inverse(self.gram[np.ix_(at, at)]), self.gram[at, waves]
-        taken = inner @ across
-        whole = self.gram[waves, waves].reshape(taken.shape[1] // 2, 2, -1, 2)
-        pairs = (across.reshape(len(at), -1, 2), taken.reshape(len(at), -1, 2))
-        own = np.einsum("kikj->kij", whole) - np.einsum("bki,bkj->kij", *pairs)
-        push = (self.gram[waves, -1] - taken.T @ self.gram[at, -1]).reshape(-1, 2)
-        left = self.gram[-1, -1] - self.gram[at, -1] @ inner @ self.gram[at, -1]
-        if left <= 0.0:
-            return np.zeros(len(push))
-        return np.asarray(np.einsum("ki,kij,kj->k", push, _inverse(own), push) / left)
-
-    def choice(self) -> list[int]:
-        """Return waves, that first which explains most, while each explains a good part."""
-        chosen: list[int] = []
-        while len(chosen) < _CONFIG.most:
-            gains = self.gains(chosen)
-            best = int(np.argmax(gains))
-            if gains[best] < _CONFIG.each or best in chosen:
-                break
-            chosen.append(best)
-        return chosen
-
-
-@dataclass(frozen=True, eq=False)
 class _Rows:
-    """Some of the fitted rows: what the law could take, every wave, what it leaves; scaled."""
+    """Some of the fitted rows A = [what the law can take, every wave, what it leaves], scaled.
+
+    A normal matrix is AᵀA of all of them, or of all blocks of time but one.
+    """
 
     columns: Array  # (rows, numbers + 2 × orders + 1)
     scale: Array  # of the columns
-    numbers: int
+    numbers: int  # of the law's
 
     @cached_property
     def parts(self) -> list[npt.NDArray[np.intp]]:
@@ -175,25 +131,64 @@ class _Rows:
         return np.array_split(np.arange(len(self.columns)), _CONFIG.folds)
 
     @cached_property
-    def whole(self) -> _Normal:
-        return _Normal(self.columns.T @ self.columns, self.numbers)
+    def whole(self) -> Array:
+        """Return the normal matrix of all rows."""
+        return np.asarray(self.columns.T @ self.columns)
 
     @cached_property
-    def others(self) -> tuple[_Normal, ...]:
-        """Return, of every block, the normal equations of all blocks but it."""
-        return tuple(_Normal(self.whole.gram - self.columns[part].T @ self.columns[part],
-                             self.numbers) for part in self.parts)
+    def others(self) -> tuple[Array, ...]:
+        """Return, of every block, the normal matrix of all blocks but it."""
+        return tuple(self.whole - self.columns[part].T @ self.columns[part] for part in self.parts)
 
-    def amplitudes(self, normal: _Normal, chosen: Sequence[int]) -> Array:
+    def places(self, chosen: Sequence[int]) -> npt.NDArray[np.intp]:
+        """Return where the law's numbers, and sines and cosines of the chosen waves, are."""
+        waves = [self.numbers + 2 * k + part for k in chosen for part in (0, 1)]
+        return np.array([*range(self.numbers), *waves], dtype=np.intp)
+
+    def solution(self, normal: Array, chosen: Sequence[int]) -> Array:
+        """Return least squares over these columns."""
+        at = self.places(chosen)
+        return np.asarray(_inverse(normal[np.ix_(at, at)]) @ normal[at, -1])
+
+    def gains(self, normal: Array, chosen: Sequence[int]) -> Array:
+        """Return the share of the residual that each wave explains (orders,).
+
+        With G the products of what of its two columns lies outside the law and the chosen waves, and
+        g theirs with what these leave: gᵀ G⁻¹ g.
+        """
+        at, waves = self.places(chosen), slice(self.numbers, -1)
+        inner, across = _inverse(normal[np.ix_(at, at)]), normal[at, waves]
+        taken = inner @ across
+        whole = normal[waves, waves].reshape(taken.shape[1] // 2, 2, -1, 2)
+        pairs = (across.reshape(len(at), -1, 2), taken.reshape(len(at), -1, 2))
+        own = np.einsum("kikj->kij", whole) - np.einsum("bki,bkj->kij", *pairs)
+        push = (normal[waves, -1] - taken.T @ normal[at, -1]).reshape(-1, 2)
+        left = normal[-1, -1] - normal[at, -1] @ inner @ normal[at, -1]
+        if left <= 0.0:
+            return np.zeros(len(push))
+        return np.asarray(np.einsum("ki,kij,kj->k", push, _inverse(own), push) / left)
+
+    def choice(self, normal: Array) -> list[int]:
+        """Return waves, that first which explains most, while each explains a good part."""
+        chosen: list[int] = []
+        while len(chosen) < _CONFIG.most:
+            gains = self.gains(normal, chosen)
+            best = int(np.argmax(gains))
+            if gains[best] < _CONFIG.each or best in chosen:
+                break
+            chosen.append(best)
+        return chosen
+
+    def amplitudes(self, normal: Array, chosen: Sequence[int]) -> Array:
         """Return sine and cosine of the chosen waves in turn (2 × waves,) [N m]."""
-        scale = self.scale[-1] / self.scale[normal.columns(chosen)]
-        return np.asarray(normal.solution(chosen) * scale)[self.numbers:]
+        scale = self.scale[-1] / self.scale[self.places(chosen)]
+        return np.asarray(self.solution(normal, chosen) * scale)[self.numbers:]
 
-    def rest(self, normal: _Normal, chosen: Sequence[int],
+    def rest(self, normal: Array, chosen: Sequence[int],
              rows: npt.NDArray[np.intp] | slice) -> Array:
         """Return the residual of the law and the chosen waves in some rows, scaled (rows,)."""
         here = self.columns[rows]
-        return here[:, -1] - here[:, normal.columns(chosen)] @ normal.solution(chosen)
+        return here[:, -1] - here[:, self.places(chosen)] @ self.solution(normal, chosen)
 
 
 def _inverse(gram: Array) -> Array:
@@ -220,7 +215,7 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
     scale = np.where(scale > 0.0, scale, 1.0)
     rows = _Rows(columns / scale, scale, law.shape[1])
     q, dq = few.means(lambda motion, arm: np.hstack([motion.q, motion.dq]), arms).T
-    chosen = rows.whole.choice()
+    chosen = rows.choice(rows.whole)
     share = _held_out(rows, dq) if chosen else None
     if share is None:
         return None
@@ -248,7 +243,7 @@ def _held_out(rows: _Rows, speed: Array) -> float | None:
     before, after = np.empty(len(speed)), np.empty(len(speed))
     for part, others in zip(rows.parts, rows.others, strict=True):
         before[part] = rows.rest(others, [], part)
-        after[part] = rows.rest(others, others.choice(), part)
+        after[part] = rows.rest(others, rows.choice(others), part)
     whole = _explained(before, after)
     least = min(_explained(before[side], after[side]) for side in sides)
     return whole if whole >= _CONFIG.explained and least >= _CONFIG.sides else None
@@ -266,12 +261,12 @@ def _size(rows: _Rows, chosen: Sequence[int]) -> tuple[float, float]:
     explain, and never more than is left. Efron 1979, the jackknife over blocks of time; at least what
     white noise as large as the rest would make.
     """
-    gram, count = rows.whole.gram, len(rows.columns)
-    law, waves = np.split(rows.whole.columns(chosen), [rows.numbers])
-    across = gram[np.ix_(law, waves)]
-    outside = gram[np.ix_(waves, waves)] - across.T @ _inverse(gram[np.ix_(law, law)]) @ across
+    normal, count = rows.whole, len(rows.columns)
+    law, waves = np.split(rows.places(chosen), [rows.numbers])
+    across, inner = normal[np.ix_(law, waves)], _inverse(normal[np.ix_(law, law)])
+    outside = normal[np.ix_(waves, waves)] - across.T @ inner @ across
 
-    def size(normal: _Normal) -> float:
+    def size(normal: Array) -> float:
         own = rows.amplitudes(normal, chosen) * rows.scale[waves]
         return float(np.sqrt(max(float(own @ outside @ own), 0.0) / count))
 
@@ -288,7 +283,7 @@ def _along(rows: _Rows, chosen: Sequence[int], q: Array, dq: Array, orders: Sequ
     What of the waves gravity could be, a + c sin q + c' cos q, no row tells from it: that is taken
     out of all.
     """
-    law = rows.columns[:, :rows.numbers] @ rows.whole.solution(chosen)[:rows.numbers]
+    law = rows.columns[:, :rows.numbers] @ rows.solution(rows.whole, chosen)[:rows.numbers]
     left = (rows.columns[:, -1] - law) * rows.scale[-1]
     classes = int(np.clip(len(q) // _CONFIG.of_class, 10, _CONFIG.classes))
     edges = np.linspace(float(q.min()), float(q.max()), classes + 1)

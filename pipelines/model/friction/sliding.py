@@ -133,8 +133,7 @@ def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint) -> Sliding:
 def _noise(columns: Array, y: Array) -> float:
     """Return the median square that least squares leaves by degree of freedom [N² m²]."""
     used = np.any(columns != 0.0, axis=0).sum() / len(y)
-    rest = y - columns @ _least_squares(columns, y)
-    return float(np.median(np.square(rest)) / max(1.0 - used, 1.0 / len(y)))
+    return float(np.median(np.square(_Fit(columns, y).residual)) / max(1.0 - used, 1.0 / len(y)))
 
 
 def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float) -> bool:
@@ -145,10 +144,10 @@ def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float) -> 
         noise: [N² m²] median square of the rows with the longest travel. It stays: rows that fit a
             little worse, taken in, would let in what fits worse again.
     """
-    beta = _least_squares(columns, y)
-    friction = np.square(columns[:, rigid:] @ beta[rigid:])
+    fit = _Fit(columns, y)
+    friction = np.square(columns[:, rigid:] @ fit.beta[rigid:])
     most = max(_CONFIG.worse * noise, _CONFIG.good**2 * float(np.median(friction)))
-    return float(np.median(np.square((y - columns @ beta)[more]))) <= most
+    return float(np.median(np.square(fit.residual[more]))) <= most
 
 
 def _late_friction(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
@@ -156,9 +155,8 @@ def _late_friction(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
 
     Zero before it (all rows, 2).
     """
-    basis = _orthonormal(columns[rows])
-    left = y[rows] - basis @ (basis.T @ y[rows])
-    first = np.flatnonzero(rows)[_step_row(np.sign(speed[rows]), basis, left)]
+    row = _step_row(np.sign(speed[rows]), _Fit(columns[rows], y[rows]))
+    first = np.flatnonzero(rows)[row]
     late = np.arange(len(y))[:, None] >= first
     return np.where(late, np.stack([np.sign(speed), speed], axis=1), 0.0)
 
@@ -209,19 +207,35 @@ def _free_course(speed: Array) -> Array:
     return np.hstack([hats * np.sign(speed)[:, None], hats * speed[:, None]])
 
 
-def _least_squares(columns: Array, y: Array, rank: float = 1e-9) -> Array:
-    """Return least squares over columns of unit length (columns,)."""
-    scale = np.linalg.norm(columns, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    return np.asarray(np.linalg.lstsq(columns / scale, y, rcond=rank)[0] / scale)
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Least squares of y (rows,) over columns (rows, columns) of which some may be one."""
 
+    columns: Array
+    y: Array
 
-def _orthonormal(columns: Array) -> Array:
-    """Return orthonormal columns of the same space."""
-    scale = np.linalg.norm(columns, axis=0)
-    columns = columns[:, scale > 0.0] / scale[scale > 0.0]
-    left, size, _ = np.linalg.svd(columns, full_matrices=False)
-    return np.asarray(left[:, size > _RANK * size.max(initial=0.0)])
+    @cached_property
+    def basis(self) -> Array:
+        """Return orthonormal columns of the same space."""
+        scale = np.linalg.norm(self.columns, axis=0)
+        unit = self.columns[:, scale > 0.0] / scale[scale > 0.0]
+        left, size, _ = np.linalg.svd(unit, full_matrices=False)
+        return np.asarray(left[:, size > _RANK * size.max(initial=0.0)])
+
+    @cached_property
+    def beta(self) -> Array:
+        """Return the coefficients (columns,)."""
+        scale = np.linalg.norm(self.columns, axis=0)
+        scale = np.where(scale > 0.0, scale, 1.0)
+        return np.asarray(np.linalg.lstsq(self.columns / scale, self.y, rcond=_RANK)[0] / scale)
+
+    @cached_property
+    def residual(self) -> Array:
+        return self.outside(self.y)
+
+    def outside(self, column: Array) -> Array:
+        """Return what of a column (rows,) lies outside."""
+        return np.asarray(column - self.basis @ (self.basis.T @ column))
 
 
 def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask,
@@ -235,46 +249,29 @@ def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask,
     width, shares = stretches[0].rigid.shape[1], []
     for k in range(postures):
         own, others = columns[:, width * k], np.delete(columns, width * k, axis=1)
-        outside = own - others @ _least_squares(others, own)
+        outside = _Fit(others, own).residual
         shares.append(float(noise[own != 0.0].sum()) / max(float(outside @ outside), 1e-300))
     return max(shares)
 
 
 @dataclass(frozen=True, eq=False)
 class _Rows:
-    """Rows of stretches that slide, and all that is fitted beside a drift."""
+    """Rows of stretches that slide, and all that is fitted with a drift."""
 
     stretches: Sequence[Stretch]
-    y: Array  # (rows,) [N m]
-    known: Array  # (rows, columns) no friction, then a free curve of friction
-    curve: Array  # (rows, columns) the last columns of `known`
-
-    @cached_property
-    def basis(self) -> Array:
-        """Return orthonormal columns of the space of `known`."""
-        return _orthonormal(self.known)
-
-    @cached_property
-    def left(self) -> Array:
-        """Return the residual without a drift (rows,) [N m]."""
-        return np.asarray(self.y - self.basis @ (self.basis.T @ self.y))
-
-    @cached_property
-    def blocks(self) -> npt.NDArray[np.intp]:
-        return blocks_of_time(self.stretches, _DRIFT.block)
-
-    def outside(self, column: Array) -> Array:
-        """Return what of a column (rows,) lies outside of `known`."""
-        return np.asarray(column - self.basis @ (self.basis.T @ column))
+    speed: Array  # (rows,) [rad/s]
+    curve: Array  # (rows, columns) of a free curve of friction
+    steady: _Fit  # without a drift; the last columns are those of the curve
+    blocks: npt.NDArray[np.intp]  # (rows,) of time
 
     def along(self, course: Course) -> Array:
         """Return c(t) of every row (rows,)."""
         return np.concatenate([course.at(part, stretch.middle[2])
                                for part, stretch in enumerate(self.stretches)])
 
-    def held_out(self, basis: Array) -> Array:
+    def held_out(self, fit: _Fit) -> Array:
         """Return Σ r² of every block as the other blocks predict it (blocks,)."""
-        rest = held_out(basis, self.y - basis @ (basis.T @ self.y), self.blocks)
+        rest = held_out(fit.basis, fit.residual, self.blocks)
         return np.asarray(np.maximum(np.bincount(self.blocks, np.square(rest)), 1e-300))
 
 
@@ -283,15 +280,13 @@ class _Drift:
     """The best course of one kind and form."""
 
     course: Course
-    column: Array  # (rows,) c(t) g(v)
+    fit: _Fit  # the last column is c(t) g(v)
     typical: float  # [N m] median of |g(v)|
-    change: float  # α
-    residual: Array  # (rows,) [N m]
 
     @property
     def size(self) -> float:
         """Return by how much it changes friction [N m]."""
-        return abs(self.change) * self.typical
+        return abs(float(self.fit.beta[-1])) * self.typical
 
 
 def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
@@ -307,20 +302,23 @@ def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
         stretches: they slide.
     """
     equations = LawEquations.of(stretches, joint)
-    curve = _free_curve(np.concatenate([stretch.middle[1] for stretch in stretches]))
-    rows = _Rows(stretches, equations.y, np.hstack([equations.fixed, curve]), curve)
-    few = len(rows.y) < _DRIFT.rows * rows.basis.shape[1]
+    speed = np.concatenate([stretch.middle[1] for stretch in stretches])
+    curve = _free_curve(speed)
+    rows = _Rows(stretches, speed, curve,
+                 _Fit(np.hstack([equations.fixed, curve]), equations.y),
+                 blocks_of_time(stretches, _DRIFT.block))
+    few = len(speed) < _DRIFT.rows * rows.steady.basis.shape[1]
     if few or rows.blocks.max() + 1 < _DRIFT.fewest:
         return None
     drifts = [_best(kind, form, rows) for form in ("whole", "coulomb", "viscous")
               for kind in ("trend", "step")]
-    best = min(drifts, key=lambda drift: float(drift.residual @ drift.residual))
-    columns = np.column_stack([rows.known, best.column])
-    gains = np.log(rows.held_out(rows.basis) / rows.held_out(_orthonormal(columns)))
-    beta = _least_squares(columns, rows.y, _RANK)[-1 - curve.shape[1]:-1]
-    least = _DRIFT.least * float(np.median(np.abs(curve @ beta)))
+    best = min(drifts, key=lambda drift: float(drift.fit.residual @ drift.fit.residual))
+    gains = np.log(rows.held_out(rows.steady) / rows.held_out(best.fit))
+    whole = curve @ best.fit.beta[-1 - curve.shape[1]:-1]
+    least = _DRIFT.least * float(np.median(np.abs(whole)))
     if best.size >= least and by_flips(gains) <= _DRIFT.chance:
-        return next(drift.course for drift in drifts if no_worse(drift.residual, best.residual))
+        return next(drift.course for drift in drifts
+                    if no_worse(drift.fit.residual, best.fit.residual))
     trend = drifts[0]
     most = trend.size + _DRIFT.sure * _deviation(trend, rows)
     return replace(trend.course, named=False) if most > least else None
@@ -331,26 +329,22 @@ def _best(kind: str, form: str, rows: _Rows) -> _Drift:
 
     The curve that changes as a whole is itself fitted: scan, fit, scan again.
     """
-    speed = np.concatenate([stretch.middle[1] for stretch in rows.stretches])
-    shape = speed if form == "viscous" else np.sign(speed)
-    beta, width = _least_squares(rows.known, rows.y, _RANK), rows.known.shape[1]
+    fit, shape = rows.steady, rows.speed if form == "viscous" else np.sign(rows.speed)
+    width, last = rows.curve.shape[1], fit.columns.shape[1]
     for _ in range(_DRIFT.rounds if form == "whole" else 1):
         if form == "whole":
-            shape = rows.curve @ beta[width - rows.curve.shape[1]:width]
+            shape = rows.curve @ fit.beta[last - width:last]
         course = (_step if kind == "step" else _trend)(form, shape, rows)
         own = rows.along(course) * shape
-        columns = np.column_stack([rows.known, own])
-        beta = _least_squares(columns, rows.y, _RANK)
-    typical = float(np.median(np.abs(shape)))
-    return _Drift(course, own, typical, float(beta[-1]), rows.y - columns @ beta)
+        fit = _Fit(np.column_stack([rows.steady.columns, own]), fit.y)
+    return _Drift(course, fit, float(np.median(np.abs(shape))))
 
 
 def _deviation(drift: _Drift, rows: _Rows) -> float:
     """Return the deviation of the size of a drift [N m], errors in a block dependent (White 1984)."""
-    outside = rows.outside(drift.column)
-    sums = np.bincount(rows.blocks, outside * drift.residual)
-    scatter = float(np.sqrt(np.sum(np.square(sums))))
-    return drift.typical * scatter / max(float(outside @ outside), 1e-300)
+    outside = rows.steady.outside(drift.fit.columns[:, -1])
+    sums = np.bincount(rows.blocks, outside * drift.fit.residual)
+    return drift.typical * float(np.linalg.norm(sums)) / max(float(outside @ outside), 1e-300)
 
 
 def _trend(form: str, shape: Array, rows: _Rows) -> Course:
@@ -358,41 +352,39 @@ def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     starts = tuple(float(stretch.t[0]) for stretch in rows.stretches)
     duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in rows.stretches)
 
-    def course(time: float) -> Course:
-        return Course("trend", form, starts, time * duration, 0.5 * duration, duration)
+    def course(logarithm: float) -> Course:
+        time = float(np.exp(logarithm)) * duration
+        return Course("trend", form, starts, time, 0.5 * duration, duration)
 
     def loss(logarithm: float) -> float:
-        outside = rows.outside(rows.along(course(float(np.exp(logarithm)))) * shape)
-        return -float(np.square(outside @ rows.left) / max(float(outside @ outside), 1e-300))
+        outside = rows.steady.outside(rows.along(course(logarithm)) * shape)
+        gain = np.square(outside @ rows.steady.residual)
+        return -float(gain / max(float(outside @ outside), 1e-300))
 
     times = np.log(_DRIFT.times)
     k = int(np.argmin([loss(time) for time in times]))
-    ends = (float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)]))
-    return course(float(np.exp(least_between(loss, *ends, _FINE))))
+    low, high = float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)])
+    return course(least_between(loss, low, high, _FINE))
 
 
 def _step(form: str, shape: Array, rows: _Rows) -> Course:
     """Return the course of a step at the instant between two rows from which it explains most."""
     t = np.concatenate([stretch.middle[2] for stretch in rows.stretches])
     log = np.repeat(np.arange(len(rows.stretches)), [stretch.rows for stretch in rows.stretches])
-    row = _step_row(shape, rows.basis, rows.left)
+    row = _step_row(shape, rows.steady)
     before, here = int(log[row - 1]), int(log[row])
     starts = tuple(float(stretch.t[0]) for stretch in rows.stretches)
     when = 0.5 * float(t[row - 1] + t[row]) - starts[here] if before == here else 0.0
     return Course("step", form, starts, when, 0.0, when, here)
 
 
-def _step_row(shape: Array, basis: Array, left: Array) -> int:
-    """Return the row from which on `shape` (rows,) lowers Σ r² most (Andrews 1993, sup F).
+def _step_row(shape: Array, fit: _Fit) -> int:
+    """Return the row from which on `shape` (rows,) lowers Σ r² of `fit` most (Andrews 1993, sup F).
 
     Its products with other columns are sums over the later rows. A step that lies within the other
     columns, but for less than a row, is not shown by any.
-
-    Args:
-        basis: (rows, columns) orthonormal columns of all else.
-        left: (rows,) residual of these.
     """
-    products = shape[:, None] * np.column_stack([left, shape, basis])
+    products = shape[:, None] * np.column_stack([fit.residual, shape, fit.basis])
     after, count = np.cumsum(products[::-1], axis=0)[::-1], len(shape)
     outside = after[:, 1] - np.square(after[:, 2:]).sum(axis=1)
     shown = outside > after[0, 1] / count

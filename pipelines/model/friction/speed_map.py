@@ -21,11 +21,11 @@ import numpy as np
 
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.fit import LawFit
-from pipelines.model.friction.model_selection import Ladder, undecided
+from pipelines.model.friction.model_selection import Ladder, Missing, undecided
 from pipelines.model.friction.weak_form import Mask, Stretch
 from pipelines.model.rigid.body import Array
 
-__all__ = ["Coverage", "Missing", "SpeedMap", "coverage", "speed_map", "unseen"]
+__all__ = ["Coverage", "coverage", "speed_map", "unseen"]
 
 _DRIVE = ("drive the joint alone at 7 to 10 constant speeds over two decades, in both directions, "
           "with ramps from rest")
@@ -48,18 +48,11 @@ class SpeedConfig:
 _CONFIG = SpeedConfig()
 
 
-@dataclass(frozen=True)
-class SpeedMap:
-    """A point for every class of speed that was driven both ways. (points,)"""
+def speed_map(stretches: Sequence[Stretch], fit: LawFit) -> Array:
+    """Return a point for every class of speed that was driven both ways at one place (4, points).
 
-    speed: Array  # [rad/s] mean of the pairs
-    odd: Array  # [N m]
-    odd_std: Array  # [N m] of the mean
-    even: Array  # [N m] mean over the positions
-
-
-def speed_map(stretches: Sequence[Stretch], fit: LawFit) -> SpeedMap:
-    """Return the map of one joint, empty where no speed was driven both ways at one place."""
+    Speed [rad/s], mean of the pairs; odd part [N m], its standard deviation, and even part.
+    """
     parts = []
     for stretch in stretches:
         arm, coupling = fit.at(stretch)
@@ -77,7 +70,7 @@ def speed_map(stretches: Sequence[Stretch], fit: LawFit) -> SpeedMap:
     points = [_point(place[rows], v[rows], torque[rows])
               for rows in (level == each for each in np.unique(level))]
     known = [point for point in points if point is not None]
-    return SpeedMap(*np.array(known, dtype=np.float64).reshape(-1, 4).T)
+    return np.array(known, dtype=np.float64).reshape(-1, 4).T
 
 
 def _point(place: Array, v: Array, torque: Array) -> tuple[float, ...] | None:
@@ -109,14 +102,6 @@ class Coverage:
     @property
     def decades(self) -> float:
         return float(np.log10(self.fastest / self.slowest)) if self.slowest > 0.0 else 0.0
-
-
-@dataclass(frozen=True)
-class Missing:
-    """Something these logs do not show, and what to record."""
-
-    what: str
-    record: str
 
 
 def coverage(stretches: Sequence[Stretch]) -> Coverage:
@@ -152,4 +137,4 @@ def unseen(covered: Coverage, ladder: Ladder) -> tuple[Missing, ...]:
                  for effect, _, quantity in vague]
         gaps.append(f"hardly known: {'; '.join(words)}")
     laws = undecided(ladder, covered.slowest, covered.fastest, alone=True)
-    return (*(Missing(gap, _DRIVE) for gap in gaps), *(Missing(*words) for words in laws))
+    return (*(Missing(gap, _DRIVE) for gap in gaps), *laws)

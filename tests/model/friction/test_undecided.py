@@ -29,7 +29,7 @@ def told() -> list[str]:
     stretch = plateaus(_SPEEDS, drag, False, 0.02)
     ladder = climb(LawEquations.of((stretch,), OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)), None)
     covered = coverage((stretch,))
-    return [what for what, _ in undecided(ladder, covered.slowest, covered.fastest, alone=True)]
+    return [gap.what for gap in undecided(ladder, covered.slowest, covered.fastest, alone=True)]
 
 
 def test_the_plainer_law_is_taken_where_nothing_tells_them_apart() -> None:
