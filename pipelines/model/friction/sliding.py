@@ -266,7 +266,7 @@ class _Rows:
 
     def along(self, course: Course) -> Array:
         """Return c(t) of every row (rows,)."""
-        return np.concatenate([course.at(part, stretch.middle[2])
+        return np.concatenate([course.at(part, stretch.middle[2] - stretch.t[0])
                                for part, stretch in enumerate(self.stretches)])
 
     def held_out(self, fit: _Fit) -> Array:
@@ -349,12 +349,11 @@ def _deviation(drift: _Drift, rows: _Rows) -> float:
 
 def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     """Return the course of a trend with the time constant by which it explains most."""
-    starts = tuple(float(stretch.t[0]) for stretch in rows.stretches)
     duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in rows.stretches)
 
     def course(logarithm: float) -> Course:
         time = float(np.exp(logarithm)) * duration
-        return Course("trend", form, starts, time, 0.5 * duration, duration)
+        return Course("trend", form, time, 0.5 * duration, duration)
 
     def loss(logarithm: float) -> float:
         outside = rows.steady.outside(rows.along(course(logarithm)) * shape)
@@ -373,9 +372,9 @@ def _step(form: str, shape: Array, rows: _Rows) -> Course:
     log = np.repeat(np.arange(len(rows.stretches)), [stretch.rows for stretch in rows.stretches])
     row = _step_row(shape, rows.steady)
     before, here = int(log[row - 1]), int(log[row])
-    starts = tuple(float(stretch.t[0]) for stretch in rows.stretches)
-    when = 0.5 * float(t[row - 1] + t[row]) - starts[here] if before == here else 0.0
-    return Course("step", form, starts, when, 0.0, when, here)
+    start = float(rows.stretches[here].t[0])
+    when = 0.5 * float(t[row - 1] + t[row]) - start if before == here else 0.0
+    return Course("step", form, when, 0.0, when, here)
 
 
 def _step_row(shape: Array, fit: _Fit) -> int:

@@ -112,8 +112,7 @@ class Course:
 
     kind: str  # "trend" | "step"
     form: str  # g: "whole", the curve of friction; "viscous", v; "coulomb", its sign
-    starts: tuple[float, ...]  # [s] first instant of every stretch
-    time: float  # [s] since the start: of a step when; of a trend its time constant
+    time: float  # [s] since the start of a stretch: of a step when; of a trend its time constant
     holds: float  # [s] since the start: where c is zero, of a trend
     until: float  # [s] duration of a trend's log; of a step when
     part: int = 0  # stretch of a step
@@ -121,12 +120,11 @@ class Course:
     change: float = 0.0  # α of the fit before, of a trend: α ∂c/∂(ln T) g then is a column, T fitted
     named: bool = True  # shown by the rows; else neither shown nor excluded
 
-    def at(self, part: int, t: Array) -> Array:
-        """Return c(t) in one of the stretches: it rises by one."""
-        since = t - self.starts[part]
+    def at(self, part: int, since: Array) -> Array:
+        """Return c(t) in one of the stretches, `since` its start [s]: it rises by one."""
         if self.kind == "trend":
             return self._risen(since, self.time)
-        after = since >= self.time if part == self.part else np.full(len(t), part > self.part)
+        after = since >= self.time if part == self.part else np.full(len(since), part > self.part)
         return after.astype(np.float64)
 
     def _risen(self, since: Array, time: float) -> Array:
@@ -147,10 +145,9 @@ class Course:
 
         (samples, 1 or 2); the last row is zero.
         """
-        middle = 0.5 * (t[1:] + t[:-1])
-        courses = [self.at(part, middle)]
+        since = 0.5 * (t[1:] + t[:-1]) - t[0]
+        courses = [self.at(part, since)]
         if self.change != 0.0:
-            since = middle - self.starts[part]
             ends = [self._risen(since, self.time * (1.0 + side * _PART)) for side in (1.0, -1.0)]
             courses.append(self.change * (ends[0] - ends[1]) / (2.0 * _PART))
         value = np.stack(courses, axis=1) * self.shape(0.5 * (dq[1:] + dq[:-1]))[:, None]
@@ -403,19 +400,22 @@ def blocks_of_time(stretches: Sequence[Stretch], length: float) -> npt.NDArray[n
     return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
+def _travels(motion: Reconstructed) -> Mask:
+    """Return whether a joint travels further than rounding moves one that is held (joints,)."""
+    q = motion.motion.q[motion.good.kept[motion.good.fit]]
+    return np.asarray(np.ptp(q, axis=0) > _CONFIG.sway * encoder_resolution(motion.good))
+
+
 def swaying(motion: Reconstructed, joint: int) -> tuple[int, ...]:
     """Return the joints, counted from 1, that are held but visibly sway with `joint`."""
-    q = motion.motion.q[motion.good.kept[motion.good.fit]]
-    moves = np.ptp(q, axis=0) > _CONFIG.sway * encoder_resolution(motion.good)
-    return tuple(int(k) + 1 for k in np.flatnonzero(moves) if k != joint - 1)
+    return tuple(int(k) + 1 for k in np.flatnonzero(_travels(motion)) if k != joint - 1)
 
 
 def moved(motions: Sequence[Reconstructed]) -> Mask:
     """Return whether any log moves a joint, beyond encoder steps and noise of the speed (joints,)."""
     moves = []
     for one in motions:
-        rows = one.good.kept[one.good.fit]
-        far = np.ptp(one.motion.q[rows], axis=0) > _CONFIG.sway * encoder_resolution(one.good)
+        far, rows = _travels(one), one.good.kept[one.good.fit]
         if one.std is not None:
             speed = np.sqrt(np.nanmean(np.square(one.motion.dq[rows]), axis=0))
             far &= speed > _CONFIG.fast * np.nanmedian(one.std[1][rows], axis=0)
