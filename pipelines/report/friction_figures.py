@@ -94,7 +94,7 @@ def simulation_figure(name: str, caption: str, series: Series, revolute: bool) -
 
 
 def ripple_figure(name: str, caption: str, along: Along, revolute: bool) -> Figure:
-    """What the law leaves against the angle: forth, back, and the waves that were fitted."""
+    """Residual of the law against the angle: forth, back, and the fitted waves."""
 
     def draw(drawing: Drawing) -> None:
         axis = drawing.subplots()

@@ -123,13 +123,10 @@ def _called(name: str) -> str:
 
 
 def _meaning(joint: JointResult, name: str) -> str:
-    """What a number of the joint's law stands for."""
+    """Return the meaning of a number of the joint's law."""
     effect, _, quantity = name.rpartition(".")
-    for member in (effect,) if effect else law_named(joint.law).members:
-        for known in find_effect(member).parameters:
-            if known.name == quantity:
-                return known.meaning
-    return ""
+    members = (effect,) if effect else law_named(joint.law).members
+    return next((q.meaning for member in members for q in find_effect(member).parameters if q.name == quantity), "")
 
 
 def _key_figures(result: Result) -> Table:
@@ -183,7 +180,7 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
 
 
 def ripple_in_words(joint: JointResult) -> str:
-    """What, how much, and how it is known to be no friction; empty where there is no ripple."""
+    """Return the size of a ripple, and why it is no friction; empty where there is none."""
     ripple = joint.ripple
     if ripple is None:
         return ""
@@ -281,7 +278,7 @@ def _ladder_words(joint: JointResult) -> tuple[str, ...]:
 
 
 def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
-    """What the best law with fewer numbers leaves more of what was held out."""
+    """Return by how much the held-out error of the best law with fewer numbers is larger."""
     chosen = next(rung for rung in joint.candidate_laws if rung.chosen)
     plainer = [rung for rung in joint.candidate_laws if rung.size < chosen.size and not rung.reason]
     if not plainer or min(rung.validate_rms for rung in joint.candidate_laws) <= 0.0:

@@ -132,15 +132,14 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
         InputRejected: T08, too few windows.
     """
     arm = OneJoint.of(logs.identify[0][0].robot, logs.joint)
-    stretches, fitted, window, sliding = _usable_rows(logs, window, arm)
-    slide = bool(sliding.slides[:sum(stretch.rows for stretch in stretches[:fitted])].any())
+    usable, fitted, window, sliding = _usable_rows(logs, window, arm)
+    slide = bool(sliding.slides[:sum(stretch.rows for stretch in usable[:fitted])].any())
     moves = np.ones_like(sliding.resting)
     if slide and (law is None or law.pointwise):
         moves = ~sliding.resting
-    moving, fit = _refined(left_out(stretches, moves), fitted, arm, logs.resolution)
-    if slide and not _followed(moving, fit, sliding.slides[moves]):
-        moving = left_out(stretches, sliding.slides)
-    stretches = moving
+    stretches, fit = _refined(left_out(usable, moves), fitted, arm, logs.resolution)
+    if slide and not _followed(stretches, fit, sliding.slides[moves]):
+        stretches = left_out(usable, sliding.slides)
     shown = drift_of(left_out(stretches, sliding.slides)[:fitted], arm) if slide else None
     course = shown if shown is not None and shown.named else None
     choice = _choice(stretches, fitted, course, fit, arm, law)

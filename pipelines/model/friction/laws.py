@@ -168,6 +168,10 @@ class Law:
         """Return the number of columns of every effect."""
         return tuple(sum(not q.shape for q in effect.parameters) for effect in self.effects)
 
+    def _split(self, amplitudes: Array) -> list[Array]:
+        """Return the amplitudes of every effect."""
+        return np.split(amplitudes, np.cumsum(self._counts)[:-1])
+
     @property
     def amplitudes(self) -> int:
         """Return the number of columns."""
@@ -234,16 +238,14 @@ class Law:
 
     def slopes(self, motion: Motion, theta: Array, amplitudes: Array) -> Array | None:
         """Return ∂τ/∂θ (samples, numbers of θ); None where an effect has no closed form of it."""
-        total, first = np.zeros((len(self.nonlinear), len(motion.dq))), 0
-        for k, effect in enumerate(self.shaped(theta)):
-            last = first + self._counts[k]
+        total, parts = np.zeros((len(self.nonlinear), len(motion.dq))), self._split(amplitudes)
+        for k, (effect, part) in enumerate(zip(self.shaped(theta), parts, strict=True)):
             own = [i for i, number in enumerate(self.nonlinear) if k in number.effects]
             if own:
-                part = shape_slopes(effect, motion, amplitudes[first:last])
-                if part is None:
+                slopes = shape_slopes(effect, motion, part)
+                if slopes is None:
                     return None
-                total[own] += part.T
-            first = last
+                total[own] += slopes.T
         return total.T
 
     def starts(self, motion: Motion, arm: ArmModel,
@@ -263,9 +265,8 @@ class Law:
 
     def values(self, theta: Array, amplitudes: Array) -> tuple[dict[str, float], ...]:
         """Return the parameters of every effect, by name."""
-        parts = np.split(amplitudes, np.cumsum(self._counts)[:-1])
-        return tuple(effect.values(own)
-                     for effect, own in zip(self.shaped(theta), parts, strict=True))
+        return tuple(effect.values(own) for effect, own
+                     in zip(self.shaped(theta), self._split(amplitudes), strict=True))
 
     def numbers(self, theta: Array, amplitudes: Array) -> dict[tuple[Effect, Quantity], float]:
         """Return the parameters of all effects; the shared sharpness once."""
