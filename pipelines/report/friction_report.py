@@ -11,7 +11,7 @@ from pipelines.model.friction.breakaway import BreakAwayConfig
 from pipelines.model.friction.findings import NAMED, FindingsConfig, depends_in_words, drift_in_words, inertia_in_words
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.result import JointResult, Result, Sticking
+from pipelines.model.friction.result import JointResult, Result
 from pipelines.model.words import plain_number
 from pipelines.report.diagnosis_words import spoken
 from pipelines.report.friction_figures import curve_figure, fraction_figure, ripple_figure, simulation_figure
@@ -77,7 +77,7 @@ def _verdict(result: Result) -> str:
     if poor:
         words += f" The simulation of {', '.join(poor)} does not follow the measurement well."
     words += "".join(f" {words}" for joint in result.joints if (words := ripple_in_words(joint)))
-    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint.drift, joint)))
+    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint)))
     if open_:
         words += f" What the logs of {', '.join(open_)} leave open is listed with what to record."
     return words
@@ -217,8 +217,8 @@ def _words(joint: JointResult) -> tuple[str, ...]:
     unit = _speed_unit(joint)
     words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}, for which the law holds; "
              f"logs: {', '.join(joint.logs)}."]
-    words += [text for text in (drift_in_words(joint.drift, joint),
-                                _sticking_in_words(joint.sticking, joint)) if text]
+    words += [text for text in (drift_in_words(joint),
+                                _sticking_in_words(joint)) if text]
     if joint.held is not None:
         low, high = joint.held
         words.append(f"At rest friction carried from {format_number(low, 3)} to {format_number(high, 3)} N m.")
@@ -230,8 +230,9 @@ def _words(joint: JointResult) -> tuple[str, ...]:
     return tuple(words)
 
 
-def _sticking_in_words(sticking: Sticking | None, joint: JointResult) -> str:
+def _sticking_in_words(joint: JointResult) -> str:
     """How many rows are left out, and why."""
+    sticking = joint.sticking
     if sticking is None:
         return ""
     travel = f"{plain_number(sticking.distance)} {'rad' if joint.revolute else 'm'}"

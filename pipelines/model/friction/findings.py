@@ -18,7 +18,7 @@ from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.joint import JointFit
-from pipelines.model.friction.result import Drift, JointResult
+from pipelines.model.friction.result import JointResult
 from pipelines.model.friction.ripple import Ripple
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.words import plain_number
@@ -125,7 +125,7 @@ def _compensated(joint: JointFit, log: ExperimentLog) -> Check | None:
 def nuisance_findings(joint: JointFit, result: JointResult) -> tuple[Check, ...]:
     """D26 drift, D08 a coarse encoder, D09 nothing to judge by, S14 viscous friction below zero."""
     drift = coarse = unjudged = None
-    if words := drift_in_words(result.drift, result):
+    if words := drift_in_words(result):
         drift = Check.of(
             "D26", "warn", words[:-1], where=_where(joint),
             remedy="warm the joint up before it is measured, or record one speed for minutes to "
@@ -146,8 +146,9 @@ def nuisance_findings(joint: JointFit, result: JointResult) -> tuple[Check, ...]
     return _known(drift, coarse, unjudged, _negative_viscous(joint))
 
 
-def drift_in_words(drift: Drift | None, joint: JointResult) -> str:
+def drift_in_words(joint: JointResult) -> str:
     """Return how friction drifts, by how much, and when the law holds; empty without a drift."""
+    drift = joint.drift
     if drift is None or drift.change.std is None:
         return ""
     change, std = 100.0 * drift.change.value, plain_number(100.0 * drift.change.std)

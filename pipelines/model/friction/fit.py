@@ -252,12 +252,14 @@ class LawEquations(Equations):
             if not any(same_posture(stretch.posture, known) for known in postures):
                 postures.append(stretch.posture)
         groups = tuple(_nearest(stretch.posture, postures) for stretch in stretches)
-        fixed = [np.hstack([stretch.rigid * float(k == group) for k in range(len(postures))])
-                 for stretch, group in zip(stretches, groups, strict=True)]
-        ends = np.cumsum([stretch.rows for stretch in stretches])
+        ends, width = np.cumsum([stretch.rows for stretch in stretches]), stretches[0].rigid.shape[1]
+        parts = tuple(np.split(np.arange(ends[-1]), ends[:-1]))
+        fixed = np.zeros((ends[-1], width * len(postures)))
+        for stretch, rows, k in zip(stretches, parts, groups, strict=True):
+            fixed[rows, width * k:width * (k + 1)] = stretch.rigid
         means = (np.diff(one.impulse[one.edges]) / one.length for one in stretches)
         return cls(y=np.concatenate([stretch.torque for stretch in stretches]),
-                   fixed=np.vstack(fixed), parts=tuple(np.split(np.arange(ends[-1]), ends[:-1])),
+                   fixed=fixed, parts=parts,
                    nodes=max(stretches, key=lambda stretch: len(stretch.t)).nodes,
                    largest=max(float(np.abs(mean).max()) for mean in means), joint=joint,
                    postures=tuple(postures), stretches=tuple(stretches), groups=groups)

@@ -97,11 +97,9 @@ def climb(identify: Equations, validate: Equations | None,
     tried: list[CandidateFit] = []
     sharpness: float | None = None
     for law in laws:
+        tried.append(_try(identify, validate, law, None, sharpness))
         if law.name == "coulomb+viscous":
-            tried.append(_try(identify, validate, law))
             sharpness = float(np.exp(tried[-1].fit.theta[0]))
-        else:
-            tried.append(_try(identify, validate, law, None, sharpness))
     # a law of several causes is no cause
     causes = [law.name for law in laws if len(law.members) > 2 and law.name in law.members]
     for _ in range(_CONFIG.further):
@@ -128,7 +126,7 @@ def climb(identify: Equations, validate: Equations | None,
 
 
 def _try(identify: Equations, validate: Equations | None, law: Law,
-         starts: Sequence[Array] | None = None, sharpness: float | None = None) -> CandidateFit:
+         starts: Sequence[Array] | None, sharpness: float | None = None) -> CandidateFit:
     fit = fit_law(identify, law, starts, sharpness)
     residual = _held_out(fit) if validate is None else validate.residual(fit)
     takes = takes_power(identify, law, fit.joint, fit.found)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
@@ -75,6 +76,11 @@ class RowEquations(Equations):
         return cls(y=y, fixed=fixed, parts=(np.arange(len(y)),), nodes=alone, largest=float("inf"),
                    joint=OneJoint.of(logs[0].columns.body.robot, j + 1),
                    runs=tuple(run for log in logs for run in _runs_of(log, j)))
+
+    def thinned(self, rows: int) -> Self:
+        """Return about `rows` of all rows, as views."""
+        every = max(1, len(self.y) // rows)
+        return replace(self, every=every, y=self.y[::every], fixed=self.fixed[::every])
 
     def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]:
         del beta  # laws that ask for the load are not tried here
