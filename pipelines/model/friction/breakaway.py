@@ -70,7 +70,7 @@ def break_away(stretches: Sequence[Stretch], fit: LawFit) -> tuple[Event, ...]:
 
 
 def held_at_least(stretches: Sequence[Stretch], fit: LawFit) -> tuple[float, float] | None:
-    """Return the least and largest torque [N m] that friction carried of a joint at rest throughout.
+    """Return the least and largest torque [N m] that friction carried while a joint rested.
 
     The speed that is left is noise.
     """

@@ -1,9 +1,10 @@
 """Estimate friction by the paper's extended Kalman filter over states and parameters at once.
 
 Kostić et al. 2004, Section IV.B, after its [22]: the states q and dq of eq. (11) and its constants
-1/J, c, f_k, w_k, b are filtered together; a further constant c' lets the equilibrium lie anywhere. It
-sees each sample once and forgets nothing it was wrong about early on, so a pass ends where its start
-and its noise let it: several passes are made, each from the constants that the last one found.
+1/J, c, f_k, w_k, b are filtered together; a further constant c' lets the equilibrium lie anywhere.
+It sees each sample once and forgets nothing it was wrong about early on, so a pass ends where its
+start and its noise let it: several passes are made, each from the constants that the last one
+found.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ class EkfStart:
 
 
 def joint_step(step: float) -> Advance:
-    """Return one sample of eq. (11) and (10) by midpoint steps, and its derivatives by the states."""
+    """Return one sample of eq. (11) and (10) by midpoint steps, with its derivatives."""
     h = step / _PARTS
 
     def acceleration(x: list[float], q: float, v: float,

@@ -1,7 +1,7 @@
 """Report what a friction fit shows that is wrong with its logs, or that no law of friction holds.
 
     S14 S10 D18 D10     torque with the wrong sign, in amperes, incomplete; motion one way only
-    D26 D08 D09 S14     friction that drifts, a coarse encoder, nothing to judge by, negative damping
+    D26 D08 D09 S14     a drift, a coarse encoder, nothing to judge by, negative viscous friction
     D19 S14 D21         most of the torque left, negative inertia, a torque of the joint's angle
 """
 
@@ -234,8 +234,8 @@ def _rippling(joint: JointResult, where: str) -> Check | None:
 def depends_in_words(joint: JointResult, ripple: Ripple) -> str:
     """Return on what a ripple depends, and how it is known to be no friction.
 
-    The largest wave is named but where it is a bend: where others are too near for the travel to tell
-    them apart, and it is few or not most. Orders of a slide count waves in 2π metres.
+    The largest wave is named but where it is a bend: where others are too near for the travel to
+    tell them apart, and it is few or not most. Orders of a slide count waves in 2π metres.
     """
     order, *others = ripple.orders
     apart = 2.0 * math.pi / max(float(np.ptp(ripple.along.angle)), 1e-12)

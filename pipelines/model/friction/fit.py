@@ -1,8 +1,8 @@
 """Fit one friction law, the joint's inertia and its gravity to rows of mean torque.
 
-Logs in which the other joints stand elsewhere have an inertia and a gravity of their own; friction is
-the same in all. Logs whose locked joints differ by less than encoders and controllers make of one
-posture are taken together.
+Logs in which the other joints stand elsewhere have an inertia and a gravity of their own; friction
+is the same in all. Logs whose locked joints differ by less than encoders and controllers make of
+one posture are taken together.
 
 The law's numbers in θ are searched for, the others follow by least squares (variable projection:
 Golub & Pereyra 1973). A scan over the grids of the law's effects finds where to begin.
@@ -161,7 +161,7 @@ class LawFit:
         return self._std(self._slopes(lambda *at: self.law.curve(speed, self.joint, *at)))
 
     def _slopes(self, of: Callable[[Array, Array], Array]) -> Array:
-        """Return ∂`of`(θ, amplitudes) by amplitudes and θ (values, numbers): central differences."""
+        """Return ∂`of` by amplitudes and θ (values, numbers): central differences."""
         count, both = len(self.amplitudes), np.concatenate([self.amplitudes, self.theta])
         slopes = []
         for i in range(len(both)):
@@ -232,7 +232,7 @@ class Equations(ABC):
                          *law.bounds, self.slopes(law))
 
     def residual(self, fit: LawFit) -> Array:
-        """Return the residual of `fit` (rows,) [N m]; unknown postures take the nearest's numbers."""
+        """Return the residual of `fit` (rows,) [N m]; an unknown posture takes the nearest."""
         own = fit.rigid[[_nearest(posture, fit.postures) for posture in self.postures]].ravel()
         law = self.law_columns(fit.law, self.arms(own), fit.theta) @ fit.amplitudes
         return np.asarray(self.y - (self.fixed @ own + law))
@@ -252,7 +252,8 @@ class LawEquations(Equations):
             if not any(same_posture(stretch.posture, known) for known in postures):
                 postures.append(stretch.posture)
         groups = tuple(_nearest(stretch.posture, postures) for stretch in stretches)
-        ends, width = np.cumsum([stretch.rows for stretch in stretches]), stretches[0].rigid.shape[1]
+        ends = np.cumsum([stretch.rows for stretch in stretches])
+        width = stretches[0].rigid.shape[1]
         parts = tuple(np.split(np.arange(ends[-1]), ends[:-1]))
         fixed = np.zeros((ends[-1], width * len(postures)))
         for stretch, rows, k in zip(stretches, parts, groups, strict=True):

@@ -1,6 +1,6 @@
 """Fit everything that friction logs of one joint show: its law, what judges it, what is not seen.
 
-    motion by the smoother → refined about a flexible law → ladder → refined about the chosen law → fit
+    smoothed motion → refined about a flexible law → ladder → refined about the chosen law → fit
 
 Rows in which the joint rests are left out, of all but laws that know these: torque at rest is an
 inequality (Karnopp 1985). So are other rows in which it does not slide (sliding.py), where the
@@ -176,8 +176,8 @@ def _usable_rows(logs: JointLogs, window: float,
                  arm: OneJoint) -> tuple[Stretches, int, float, Sliding]:
     """Return stretches, the fitted first, how many these are, their window [s], and what slides.
 
-    Windows are the shortest over which the encoder shows the acceleration; longer ones may all hold a
-    reversal.
+    Windows are the shortest over which the encoder shows the acceleration; longer ones may all hold
+    a reversal.
     """
     best: tuple[Stretches, int, float, Sliding] | None = None
     for size in (factor * window for factor in _SLIDING.windows):
@@ -241,7 +241,7 @@ def _choice(stretches: Stretches, fitted: int, course: Course | None, fit: LawFi
     identify = stretches[:fitted]
     validate = tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
     sticks = any(stretch.sticks is not None for stretch in identify)
-    laws = (law,) if law is not None else tuple(one for one in LADDER if one.pointwise or not sticks)
+    laws = tuple(one for one in LADDER if one.pointwise or not sticks) if law is None else (law,)
     ladder = climb(LawEquations.of(identify, arm),
                    LawEquations.of(validate, arm) if validate else None, laws)
     return _Choice((*identify, *validate), ladder, course)
@@ -250,9 +250,9 @@ def _choice(stretches: Stretches, fitted: int, course: Course | None, fit: LawFi
 def _along(stretches: Stretches, course: Course | None, fit: LawFit) -> Stretches:
     """Return the stretches with columns of `course`, and of friction that lags behind its speed.
 
-    f(v(t - T)) = f - T df/dt to first order (Armstrong-Hélouvry et al. 1994, Section 2.1). Of f, the
-    curve of `fit`, counts what departs from the slope at the highest speeds: viscous friction does
-    not lag, and its lag would be inertia. T < 0 where bristles straighten.
+    f(v(t - T)) = f - T df/dt to first order (Armstrong-Hélouvry et al. 1994, Section 2.1). Of f,
+    the curve of `fit`, counts what departs from the slope at the highest speeds: viscous friction
+    does not lag, and its lag would be inertia. T < 0 where bristles straighten.
     """
     rows = np.abs(np.concatenate([stretch.middle[1] for stretch in stretches]))
     fastest = float(max(np.abs(stretch.dq).max() for stretch in stretches))

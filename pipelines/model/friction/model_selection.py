@@ -1,13 +1,13 @@
 """Choose among friction laws: the simplest that is not measurably worse than the best.
 
-Each law is fitted on some rows and judged on others: other logs, or blocks of the same ones held out
-in turn. The interval is that of the difference of two laws on the same rows: what is common to both,
-a cable that pulls or a noisy minute, cancels. It is about the law, not about its numbers: labels may
-differ where curves agree.
+Each law is fitted on some rows and judged on others: other logs, or blocks of the same ones held
+out in turn. The interval is that of the difference of two laws on the same rows: what is common to
+both, a cable that pulls or a noisy minute, cancels. It is about the law, not about its numbers:
+labels may differ where curves agree.
 
-An alternative explains the rows that were fitted as well as the chosen law. It may be as good on those
-held out, or measurably worse: then these are evidence for the chosen law, but they are the same few
-rows, and another day may fall out otherwise.
+An alternative explains the rows that were fitted as well as the chosen law. It may be as good on
+those held out, or measurably worse: then these are evidence for the chosen law, but they are the
+same few rows, and another day may fall out otherwise.
 """
 
 from __future__ import annotations
@@ -174,9 +174,9 @@ def _gain(identify: Equations, best: CandidateFit, law: Law, starts: Sequence[Ar
 def no_worse(residual: Array, best: Array) -> bool:
     """Return whether residuals are not measurably larger than the best law's (rows,).
 
-    Σ r² - Σ b² = Σ δ² + 2 Σ δ b with δ = r - b. Where the best law is right, b is noise, and the last
-    sum is what chance does to the difference. Its deviation comes from sums over blocks, within which
-    noise may remember itself.
+    Σ r² - Σ b² = Σ δ² + 2 Σ δ b with δ = r - b. Where the best law is right, b is noise, and the
+    last sum is what chance does to the difference. Its deviation comes from sums over blocks,
+    within which noise may remember itself.
     """
     blocks = min(_CONFIG.blocks, len(best))
     sums = np.array([part.sum() for part in np.array_split(2.0 * (residual - best) * best, blocks)])
@@ -200,8 +200,9 @@ def _held_out(fit: LawFit) -> Array:
 def _fault(fit: LawFit, takes: bool) -> str:
     """Return why a law cannot be chosen; empty where it can.
 
-    A number that its cause cannot have, or a curve that gives power back at some speed. Numbers that
-    the rows hardly show are no fault: a law with too many of them judges no better than a simpler one.
+    A number that its cause cannot have, or a curve that gives power back at some speed. Numbers
+    that the rows hardly show are no fault: a law with too many of them judges no better than a
+    simpler one.
     """
     below = [number.name for number in fit.numbers
              if number.low >= 0.0 and number.value < number.low - _CONFIG.sure * number.std]

@@ -62,9 +62,10 @@ def simulate_joint(stretch: Stretch, fit: LawFit, friction: bool = True) -> Simu
     """Integrate eq. (11) under the torque of `stretch` from its first sample.
 
     Gravity is taken at the measured position, as the paper's experiment compensated it in a loop
-    around the joint; an arm that gravity would tip over can be simulated so as well. What joints that
-    are held and sway do is taken as measured too. A law of speed and position is evaluated once, as a
-    table, and the joint is stepped in plain numbers: a thousand times as fast as arrays of one.
+    around the joint; an arm that gravity would tip over can be simulated so as well. What joints
+    that are held and sway do is taken as measured too. A law of speed and position is evaluated
+    once, as a table, and the joint is stepped in plain numbers: a thousand times as fast as arrays
+    of one.
     """
     joint, coupling = fit.at(stretch)
     weight = gravity_columns(stretch.q, stretch.revolute) @ np.array(joint.gravity)
@@ -275,7 +276,8 @@ def _sensitivities(windows: _Windows, fit: LawFit, numbers: Array,
                    starts: Array) -> tuple[Array, Array]:
     """Return the output error (windows, samples + 1) [rad], and slopes of the output.
 
-    The slopes (numbers + 2, windows, samples + 1) are by the numbers, then by the two of each start.
+    The slopes (numbers + 2, windows, samples + 1) are by the numbers, then by the two of each
+    start.
     """
     count = len(numbers)
     steps = _TINY * np.concatenate([np.maximum(np.abs(numbers), 1e-3), [1e-2, 1e-1]])

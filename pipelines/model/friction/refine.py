@@ -1,8 +1,9 @@
 """Refine the motion of a joint about its fitted law, and fit a joint that was driven alone.
 
-A reversal of friction is a kink of the speed. A smoother that knows nothing of it rounds it off, and
-an inertia fitted to a rounded motion comes out too large. So the observer of Kostić et al. 2004,
-eq. (16)-(17), is given the reference it was made for: the motion that torque and fitted law imply,
+A reversal of friction is a kink of the speed. A smoother that knows nothing of it rounds it off,
+and an inertia fitted to a rounded motion comes out too large. So the observer of Kostić et al.
+2004, eq. (16)-(17), is given the reference it was made for: the motion that torque and fitted law
+imply,
 
     ddq_r = (τ - c sin q - c' cos q - τ_f)/J,     e = q - q_r,     ë = white torque noise / J
 
@@ -53,7 +54,7 @@ _CONFIG = RefineConfig()
 
 
 def refined(stretch: Stretch, fit: LawFit, resolution: float, freedom: float = 1.0) -> Stretch:
-    """Smooth the motion of `stretch` about that which `fit` implies; itself where that is impossible.
+    """Smooth the motion of `stretch` about that which `fit` implies, where that is possible.
 
     Args:
         resolution: step of the encoder [rad].
@@ -67,7 +68,7 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float, freedom: float = 1
     if not np.isfinite(deviation[~stretch.spoilt]).all():
         return stretch
     step = float(stretch.t[-1] - stretch.t[0]) / (len(stretch.t) - 1)
-    # Were it white from sample to sample: what the law misses makes it look larger and is let through
+    # Were it white by samples: what the law misses makes it look larger and is let through
     noise = freedom * max(fit.found.rms, _CONFIG.least * float(np.abs(stretch.torque).max()))
     jerk = np.array([noise * np.sqrt(stretch.window) / fit.inertia])
     # Δθ²/12, or more where second differences show it; they are 6 R + σ² T⁴/2
@@ -104,12 +105,12 @@ def _implied_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
 
 def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, resolution: float,
                      window: float = 0.02, rounds: int = 1) -> LawFit:
-    """Fit `law` with inertia and gravity of a joint that was driven alone: the whole way in one call.
+    """Fit `law` with inertia and gravity of a joint driven alone: the whole way in one call.
 
     every few samples smoothed → a rough fit → all samples smoothed about what it implies → the fit
 
-    A rough fit needs no more of the motion than a few samples a window: what it misses at reversals,
-    the motion refined about it shows again, at the rate of the log.
+    A rough fit needs no more of the motion than a few samples a window: what it misses at
+    reversals, the motion refined about it shows again, at the rate of the log.
 
     Args:
         t: (samples,) [s] evenly spaced.

@@ -4,8 +4,8 @@
 
 k waves in a turn; of a slide, in 2π m. They are chosen on some blocks of time and judged on the
 others. They have to explain a good part of the residual there, and some of it forth and back, slow
-and fast: friction turns with the motion, an acceleration that is wrong goes with the speed, a torque
-of the angle does neither. Magnets, teeth, a spring, a stop: what makes it is not asked here.
+and fast: friction turns with the motion, an acceleration that is wrong goes with the speed, a
+torque of the angle does neither. Magnets, teeth, a spring, a stop: what makes it is not asked here.
 """
 
 from __future__ import annotations
@@ -40,9 +40,9 @@ class RippleConfig:
     folds: int = 10  # blocks of time, each held out in turn (Efron 1979)
     most: int = 8  # waves
     each: float = 0.05  # of the residual (mean square), the least that a further wave explains
-    # Of the residual of blocks held out, the least: as much as all else together. Compliance of other
-    # joints follows the angle too: up to .24 on a healthy arm. Cogging of 4 % of the torque came to
-    # .98, an outrunner's to .89
+    # Of the residual of blocks held out, the least: as much as all else together. Compliance of
+    # other joints follows the angle too: up to .24 on a healthy arm. Cogging of 4 % of the torque
+    # came to .98, an outrunner's to .89
     explained: float = 0.5
     sides: float = 0.1  # of the same, forth and back, slow and fast, each
     worth: float = 0.01  # of the joint's torque (rms): what friction laws are good for
@@ -153,8 +153,8 @@ class _Rows:
     def gains(self, normal: Array, chosen: Sequence[int]) -> Array:
         """Return the share of the residual that each wave explains (orders,).
 
-        With G the products of what of its two columns lies outside the law and the chosen waves, and
-        g theirs with what these leave: gᵀ G⁻¹ g.
+        With G the products of what of its two columns lies outside the law and the chosen waves,
+        and g theirs with what these leave: gᵀ G⁻¹ g.
         """
         at, waves = self.places(chosen), slice(self.numbers, -1)
         inner, across = _inverse(normal[np.ix_(at, at)]), normal[at, waves]
@@ -233,8 +233,8 @@ def ripple_of(equations: Equations, fit: LawFit) -> Ripple | None:
 def _held_out(rows: _Rows, speed: Array) -> float | None:
     """Return the share that waves chosen on the other blocks explain of blocks held out.
 
-    None where it is too little, in all or on a side. Of a joint that goes one way friction is a torque
-    of its angle too.
+    None where it is too little, in all or on a side. Of a joint that goes one way friction is a
+    torque of its angle too.
     """
     quick = np.abs(speed) > np.median(np.abs(speed))
     sides = (speed > 0.0, speed < 0.0, quick, ~quick)
@@ -258,8 +258,8 @@ def _size(rows: _Rows, chosen: Sequence[int]) -> tuple[float, float]:
 
     Waves and law cancel where they are nearly one, a slow wave and gravity, and either alone is as
     large as it pleases: what lies outside, Wᵀ W - Wᵀ F (Fᵀ F)⁻¹ Fᵀ W with W the waves, is what they
-    explain, and never more than is left. Efron 1979, the jackknife over blocks of time; at least what
-    white noise as large as the rest would make.
+    explain, and never more than is left. Efron 1979, the jackknife over blocks of time; at least
+    what white noise as large as the rest would make.
     """
     normal, count = rows.whole, len(rows.columns)
     law, waves = np.split(rows.places(chosen), [rows.numbers])

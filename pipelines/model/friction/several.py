@@ -1,9 +1,9 @@
 """Fit friction of joints that were never driven alone, together with the base parameters.
 
-Of the equations τ_j = Y_j p + friction_j of one joint, Y_j p is linear and friction is linear but for
-a few numbers: variable projection solves for those with p as it pleases that row. It is done joint by
-joint, for p ties the rows together and the few numbers do not; then one fit of all rows, with every
-law's shape given, finds p and the amplitudes of all joints.
+Of the equations τ_j = Y_j p + friction_j of one joint, Y_j p is linear and friction is linear but
+for a few numbers: variable projection solves for those with p as it pleases that row. It is done
+joint by joint, for p ties the rows together and the few numbers do not; then one fit of all rows,
+with every law's shape given, finds p and the amplitudes of all joints.
 """
 
 from __future__ import annotations
@@ -106,8 +106,8 @@ def fit_several(identify: Motions, validate: Motions, recipe: Recipe,
                 law: Law | None = None) -> SeveralFit:
     """Choose a law for every joint, or take `law`, and fit amplitudes with the base parameters.
 
-    Laws with memory or load are not tried: a row of a moving arm does not show what its joint carries
-    before all is fitted.
+    Laws with memory or load are not tried: a row of a moving arm does not show what its joint
+    carries before all is fitted.
     """
     robot = identify[0][0].robot
     columns = nominal_columns(robot, friction=False, offset=False)

@@ -2,10 +2,11 @@
 
 A joint at rest, or one that has turned back and bends its contacts, carries any torque up to the
 break-away torque: an inequality |τ - load| ≤ τ_b, not a value of the sliding law (Karnopp 1985;
-Armstrong-Hélouvry et al. 1994, Section 2). Each row is ordered by its *travel*: how far the joint has
-moved one way since its last rest or reversal, and how far it will until the next, the lesser of the
-two. A rest is a speed that its own standard deviation does not tell from zero, so that the encoder
-decides. From the longest travel down, a further class of travel is taken in as long as a free curve
+Armstrong-Hélouvry et al. 1994, Section 2). Each row is ordered by its *travel*: how far the joint
+has moved one way since its last rest or reversal, and how far it will until the next, the lesser of
+the two. A rest is a speed that its own standard deviation does not tell from zero, so that the
+encoder decides. From the longest travel down, a further class of travel is taken in as long as a
+free curve
 
     τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed
 
@@ -48,8 +49,8 @@ class SlidingConfig:
     """Limits of sliding; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
-    # Median square of a class over that of the first rows: 3 std of the logarithm of the median square
-    # of 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
+    # Median square of a class over that of the first rows: 3 std of the logarithm of that of
+    # 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
     worse: float = 4.0
     good: float = 0.03  # of friction: what a law is good for; `margin` leaves its fourth power
     rows: int = 3  # for every column of the free curve, that the first class has at least
@@ -293,10 +294,10 @@ def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
     """Return the course of friction in time that rows show, or a trend not excluded.
 
     Of those shown the first that is not measurably worse than the best: all friction by one share
-    comes before a part of it, and a trend before a step. Logs that visit every speed once, one after
-    the other, show a drift as a part of the friction curve: where rows show none, a trend of all
-    friction that they do not exclude, not named; None where they do. A course that costs a number and
-    gains nothing loses in blocks held out. A step may lie between any two rows.
+    comes before a part of it, and a trend before a step. Logs that visit every speed once, one
+    after the other, show a drift as a part of the friction curve: where rows show none, a trend of
+    all friction that they do not exclude, not named; None where they do. A course that costs a
+    number and gains nothing loses in blocks held out. A step may lie between any two rows.
 
     Args:
         stretches: they slide.
@@ -341,7 +342,7 @@ def _best(kind: str, form: str, rows: _Rows) -> _Drift:
 
 
 def _deviation(drift: _Drift, rows: _Rows) -> float:
-    """Return the deviation of the size of a drift [N m], errors in a block dependent (White 1984)."""
+    """Return the std of the size of a drift [N m], errors in a block dependent (White 1984)."""
     outside = rows.steady.outside(drift.fit.columns[:, -1])
     sums = np.bincount(rows.blocks, outside * drift.fit.residual)
     return drift.typical * float(np.linalg.norm(sums)) / max(float(outside @ outside), 1e-300)

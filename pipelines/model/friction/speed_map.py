@@ -5,11 +5,11 @@ The friction map takes torque at equal position and opposite speed in pairs:
     ½ (τ(q, v) - τ(q, -v))     odd in speed: friction
     ½ (τ(q, v) + τ(q, -v))     even: gravity, offsets, all that does not turn with the motion
 
-What acceleration takes, J ddq and the sway of held joints, is subtracted first. Nothing is assumed of
-friction: the points are a test of the fitted curve that did not depend on it.
+What acceleration takes, J ddq and the sway of held joints, is subtracted first. Nothing is assumed
+of friction: the points are a test of the fitted curve that did not depend on it.
 
-Seven to ten speeds over two decades in both directions show a friction curve; standing still shows an
-offset apart from friction that is larger one way.
+Seven to ten speeds over two decades in both directions show a friction curve; standing still shows
+an offset apart from friction that is larger one way.
 """
 
 from __future__ import annotations

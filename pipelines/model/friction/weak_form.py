@@ -8,10 +8,10 @@ No acceleration has to be reconstructed, a held command is integrated exactly, a
 friction, which smears an acceleration over the reach of every filter, is a kink of the speed at a
 known instant. Divided by its length, a row is a mean torque [N m].
 
-The integrals are sums over nodes: one node a sample's interval; eight where speed passes zero in it,
-for friction jumps there; two for several samples whose speed keeps its sign and most of its size.
-Those two lie at the samples' mean speed ± its standard deviation, the rule of Gauss for a speed that
-runs straight, and right in the mean however it runs.
+The integrals are sums over nodes: one node a sample's interval; eight where speed passes zero in
+it, for friction jumps there; two for several samples whose speed keeps its sign and most of its
+size. Those two lie at the samples' mean speed ± its standard deviation, the rule of Gauss for a
+speed that runs straight, and right in the mean however it runs.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class Course:
     until: float  # [s] duration of a trend's log; of a step when
     part: int = 0  # stretch of a step
     curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
-    change: float = 0.0  # α of the fit before, of a trend: α ∂c/∂(ln T) g then is a column, T fitted
+    change: float = 0.0  # α of a trend in the fit before: α ∂c/∂(ln T) g is a column, T fitted
     named: bool = True  # shown by the rows; else neither shown nor excluded
 
     def at(self, part: int, since: Array) -> Array:
@@ -412,7 +412,7 @@ def swaying(motion: Reconstructed, joint: int) -> tuple[int, ...]:
 
 
 def moved(motions: Sequence[Reconstructed]) -> Mask:
-    """Return whether any log moves a joint, beyond encoder steps and noise of the speed (joints,)."""
+    """Return whether any log moves a joint beyond encoder steps and noise (joints,)."""
     moves = []
     for one in motions:
         far, rows = _travels(one), one.good.kept[one.good.fit]
