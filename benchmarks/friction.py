@@ -19,11 +19,10 @@ import statistics
 
 import numpy as np
 
-from pipelines.model.friction.driven_alone import fit_driven_alone
 from pipelines.model.friction.ekf import joint_step
-from pipelines.model.friction.law_fit import LawFit
-from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.friction.fit import LawFit
+from pipelines.model.friction.laws import OneJoint, law_named
+from pipelines.model.friction.refine import fit_driven_alone
 from pipelines.signal.kalman import ExtendedTextbook
 from tests.model.friction.one_joint import ENCODER, INERTIA, JOINT, SINE, STEP, TRUTHS, driven_speeds, recorded, relative
 

@@ -1,7 +1,7 @@
 """Fit the friction law of each joint, and choose it.
 
 Reads    "friction" logs of role "identify", each of one joint driven alone; those of role "validate" judge; "hold" logs;
-         where there are none, "excitation" and "free" logs: friction then is fitted with the base parameters
+         without them "excitation" and "free" logs: friction then is fitted with the base parameters
 Writes   result.json, result.h5, model.json with the friction, logs/ with its torque, report.html
 Source   Kostić et al. 2004, Section IV.B, eq. (10)-(11), Table III, Figs. 5 and 6
 """
@@ -20,21 +20,17 @@ from pipelines.log.derive import derive, recording
 from pipelines.log.doctor.checks import Subject, check_log
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import write_log
-from pipelines.log.model_file import Source, read_model, write_model
+from pipelines.log.model_file import ModelFile, Source, read_model, write_model
 from pipelines.log.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.estimation.nominal import fitted_arm
 from pipelines.model.estimation.outcome import validity
-from pipelines.model.friction.acting import friction_of
-from pipelines.model.friction.findings import findings
-from pipelines.model.friction.joint import JointFit, JointLogs, Seen, fit_joint
+from pipelines.model.friction.findings import log_findings, misfits, nuisance_findings
+from pipelines.model.friction.joint import METHODS, JointFit, JointLogs, Seen, by_method, fit_joint, friction_of
 from pipelines.model.friction.laws import LADDER, Law, law_named
-from pipelines.model.friction.methods import METHODS, by_method
-from pipelines.model.friction.misfit import misfits
-from pipelines.model.friction.nuisances import nuisance_findings
-from pipelines.model.friction.polish import refuse_unpolished
-from pipelines.model.friction.result import JointResult, Result, joint_result, several_results
+from pipelines.model.friction.output_error import refuse_unpolished
+from pipelines.model.friction.result import Result, joint_result, several_results
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
 from pipelines.model.parameter import Parameter
@@ -50,7 +46,7 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "report"]
 
 @dataclass(frozen=True)
 class Settings:
-    """Which law, fitted how, over which windows."""
+    """Law, method and windows of the fit."""
 
     law: str | None = None  # a friction law, or several joined by "+"; None: the simplest that is not measurably worse
     method: str = "varpro"  # how its numbers are found in the end: varpro, output-error or ekf
@@ -83,15 +79,16 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
     seen, said = _examined(used, Reconstruction(order=settings.order))
     joints = [by_method(fit_joint(part, settings.window, law), settings.method) for part in _by_joint(seen)]
-    found = tuple(check for joint in joints for check in findings(joint))
     robot = identify[0].robot
-    found += tuple(check for joint in joints for check in nuisance_findings(joint, robot.joints[joint.logs.joint - 1].name))
     results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method) for joint in joints)
-    found += misfits(results, inputs.label)
+    found = (*(check for joint in joints for check in log_findings(joint)),
+             *(check for pair in zip(joints, results, strict=True) for check in nuisance_findings(*pair)),
+             *misfits(results, inputs.label))
     arm = _arm(identify[0], joints)
-    motions = tuple(pair for joint in joints for pair in joint.logs.identify)
-    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
-    model = arm.to_model(validity=validity(motions), sources=sources, notes=_notes(arm, results))
+    notes = ["friction fitted by rrrid fit-friction, joint by joint"]
+    if arm.body.known_parameters() is None:
+        notes.append("base parameters were not fitted and are not known: zero stands for them; rrrid estimate-bps finds them")
+    model = _model(arm, tuple(pair for joint in joints for pair in joint.logs.identify), *notes)
     return Result(identify[0].robot_name, results, "one joint at a time", (*said, *found), model=model,
                   derived=tuple(_derived(pair, joint, arm, settings) for joint in joints
                                 for pair in (*joint.logs.identify, *joint.logs.validate)))
@@ -99,7 +96,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 
 def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], settings: Settings, law: Law | None,
               label: str) -> Result:
-    """No joint was driven alone: friction with the base parameters, from logs in which all move."""
+    """Fit friction with the base parameters, from logs in which all joints move."""
     how = Reconstruction(order=settings.order)
     if settings.method != "varpro":
         raise UsageError("C02", f"'{settings.method}' needs joints that were driven alone", where="--method", remedy="take varpro")
@@ -109,9 +106,7 @@ def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], sett
     (seen, said), (others, said_too) = _examined(identify, how), _examined(validate, how)
     found = fit_several(tuple(seen), tuple(others), Recipe(how), law)
     arm = fitted_arm(found.fitted.estimate, identify[0].robot_name)
-    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in seen)
-    model = arm.to_model(validity=validity(tuple(seen)), sources=sources,
-                         notes=("friction and base parameters fitted together by rrrid fit-friction",))
+    model = _model(arm, tuple(seen), "friction and base parameters fitted together by rrrid fit-friction")
     derived = tuple(_with_friction(pair, arm.friction_torque(pair[1].motion), settings) for pair in (*seen, *others))
     results = several_results(found, arm, tuple(others))
     return Result(identify[0].robot_name, results, "all joints at once", (*said, *said_too, *misfits(results, label)),
@@ -131,14 +126,14 @@ def _law(settings: Settings) -> Law | None:
     if unknown := [part for part in parts if part not in known]:
         raise UsageError("C02", f"'{unknown[0]}' is no friction law{did_you_mean(unknown[0], known)}", where="--law",
                          remedy=f"one of {', '.join(names)}, or several joined by +")
-    law = law_named(settings.law) or Law(settings.law, tuple(dict.fromkeys(parts)))
+    law = law_named(settings.law)
     if settings.method == "output-error":
         refuse_unpolished(law)
     return law
 
 
 def _examined(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[list[Seen], tuple[Check, ...]]:
-    """The motion of every log, and what the doctor says of it."""
+    """Return the motion of every log, and the findings of its quality checks."""
     seen, said = [], []
     for log in logs:
         subject = Subject(recording(log))
@@ -160,7 +155,7 @@ def _by_joint(seen: Sequence[Seen]) -> list[JointLogs]:
 
 
 def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:
-    """The arm with this friction; its base parameters are those of the described links, else unknown: zero, and said to be."""
+    """Return the arm with this friction and the base parameters of the described links; unknown ones are zero and marked."""
     body = rigid_body(log.robot)
     known = body.known_parameters()
     base = tuple(Parameter(p.name, 0.0 if known is None else float(known[i]), None, p.unit,
@@ -170,11 +165,10 @@ def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:
     return Arm(log.robot_name, body, base, friction, at_rest)
 
 
-def _notes(arm: Arm, joints: Sequence[JointResult]) -> tuple[str, ...]:
-    notes = ["friction fitted by rrrid fit-friction, joint by joint"]
-    if arm.body.known_parameters() is None:
-        notes.append("base parameters were not fitted and are not known: zero stands for them; rrrid estimate-bps finds them")
-    return tuple(notes)
+def _model(arm: Arm, motions: tuple[Seen, ...], *notes: str) -> ModelFile:
+    """Return the model of `arm`, which was fitted to `motions`."""
+    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
+    return arm.to_model(validity=validity(motions), sources=sources, notes=notes)
 
 
 def _derived(pair: Seen, joint: JointFit, arm: Arm, settings: Settings) -> tuple[str, ExperimentLog]:

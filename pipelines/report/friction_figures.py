@@ -1,4 +1,4 @@
-"""Figures of a friction fit: the curve with band and map, torque and its fractions, simulation beside measurement."""
+"""Figures of a friction fit: the curve with band and map, torque and its fractions, simulation beside measurement, ripple."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.model.friction.result import Series
+from pipelines.model.friction.ripple import Along
 from pipelines.report import figures, style
 from pipelines.report.report import Figure
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-__all__ = ["curve_figure", "fraction_figure", "simulation_figure"]
+__all__ = ["curve_figure", "fraction_figure", "ripple_figure", "simulation_figure"]
 
 _NEAR = 0.04  # of the fastest speed: the part of the curve where the sign of friction turns
 
@@ -90,3 +91,19 @@ def simulation_figure(name: str, caption: str, series: Series, revolute: bool) -
         grid[0, 1].legend(loc="best", borderpad=0.2)
 
     return Figure(name, caption, draw, size=(6.0, 4.0))
+
+
+def ripple_figure(name: str, caption: str, along: Along, revolute: bool) -> Figure:
+    """Residual of the law against the angle: forth, back, and the fitted waves."""
+
+    def draw(drawing: Drawing) -> None:
+        axis = drawing.subplots()
+        for values, color, label in ((along.forth, style.VERMILLION, "forth"), (along.back, style.GREEN, "back")):
+            axis.plot(along.angle, values, ".", markersize=3.5, color=color, label=label)
+        axis.plot(along.angle, along.waves, color=style.BLUE, linewidth=1.0, label="fitted waves")
+        axis.set_xlabel("angle [rad]" if revolute else "position [m]")
+        axis.set_ylabel("torque left [N m]" if revolute else "force left [N]")
+        axis.margins(x=0.01)
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3, borderpad=0.2)
+
+    return Figure(name, caption, draw, size=(6.0, 3.0))

@@ -7,19 +7,19 @@ import re
 import numpy as np
 
 from pipelines.model.effects import find_effect
-from pipelines.model.friction.break_away import REST, WITHIN
+from pipelines.model.friction.breakaway import BreakAwayConfig
+from pipelines.model.friction.findings import NAMED, FindingsConfig, depends_in_words, drift_in_words, inertia_in_words
+from pipelines.model.friction.fit import Value
 from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.misfit import MisfitConfig
-from pipelines.model.friction.nuisances import drift_in_words, sticking_in_words
-from pipelines.model.friction.result import JointResult, Result, Value
+from pipelines.model.friction.result import JointResult, Result
+from pipelines.model.words import plain_number
 from pipelines.report.diagnosis_words import spoken
-from pipelines.report.friction_figures import curve_figure, fraction_figure, simulation_figure
-from pipelines.report.friction_ripple import ripple_in_words, ripple_section
+from pipelines.report.friction_figures import curve_figure, fraction_figure, ripple_figure, simulation_figure
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import format_number, format_unit, with_std
 
-__all__ = ["friction_report"]
+__all__ = ["friction_report", "ripple_in_words"]
 
 _GOOD = 0.05  # of the speed error without friction: what the law has to leave
 _GOOD_TORQUE = 0.1  # of held-out torque, where nothing was simulated: the same
@@ -77,7 +77,7 @@ def _verdict(result: Result) -> str:
     if poor:
         words += f" The simulation of {', '.join(poor)} does not follow the measurement well."
     words += "".join(f" {words}" for joint in result.joints if (words := ripple_in_words(joint)))
-    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint.drift, joint.name, joint.revolute)))
+    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint)))
     if open_:
         words += f" What the logs of {', '.join(open_)} leave open is listed with what to record."
     return words
@@ -91,7 +91,7 @@ def _law_and_errors(joint: JointResult) -> str:
     words = f"{_capital(joint.name)}: {_plain(joint.law)}"
     if not judged.by:
         error = judged.torque_error
-        if error is None or error >= MisfitConfig().poor:  # the finding says it
+        if error is None or error >= FindingsConfig().poor:  # the finding says it
             return words
         return f"{words}, which leaves {format_number(100.0 * error, 2)} % of held-out torque (rms)"
     with_, without, unit = judged.velocity_error_with, judged.velocity_error_without, _speed_unit(joint)
@@ -123,15 +123,10 @@ def _called(name: str) -> str:
 
 
 def _meaning(joint: JointResult, name: str) -> str:
-    """What a number of the joint's law stands for."""
-    law = law_named(joint.law)
-    members = joint.law.split("+") if law is None else law.members
+    """Return the meaning of a number of the joint's law."""
     effect, _, quantity = name.rpartition(".")
-    for member in (effect,) if effect else members:
-        for known in find_effect(member).parameters:
-            if known.name == quantity:
-                return known.meaning
-    return ""
+    members = (effect,) if effect else law_named(joint.law).members
+    return next((q.meaning for member in members for q in find_effect(member).parameters if q.name == quantity), "")
 
 
 def _key_figures(result: Result) -> Table:
@@ -180,8 +175,31 @@ def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
     simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion. Gravity is "
                                   "compensated at the measured position.", joint.series, revolute)
     alone = (Section(f"{joint.name}: simulation", _simulation_words(joint), (), (simulated, parts)),) if joint.validation.by else ()
-    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *ripple_section(joint), *alone,
+    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *_ripple_section(joint), *alone,
             Section(f"{joint.name}: choice of the law", _ladder_words(joint), (_ladder(joint),)))
+
+
+def ripple_in_words(joint: JointResult) -> str:
+    """Return the size of a ripple, and why it is no friction; empty where there is none."""
+    ripple = joint.ripple
+    if ripple is None:
+        return ""
+    return (f"Most of what the law leaves at {joint.name} is no friction: {with_std(ripple.rms.value, ripple.rms.std)} "
+            f"{ripple.rms.unit} rms of it {depends_in_words(joint, ripple)}.")
+
+
+def _ripple_section(joint: JointResult) -> tuple[Section, ...]:
+    """Its size, what it does to the inertia, what to do, and the torque by angle."""
+    ripple = joint.ripple
+    if ripple is None:
+        return ()
+    place = "angle" if joint.revolute else "position"
+    figure = ripple_figure(f"ripple-{joint.joint}", f"{joint.name}: what friction and inertia leave, by the {place} of the joint: "
+                           "the same forth and back, as no friction is.", ripple.along, joint.revolute)
+    inertia = inertia_in_words(joint, ripple, lambda value: f"{with_std(value.value, value.std)} {format_unit(value.unit)}")
+    text = (f"{ripple_in_words(joint)} It explains {format_number(100.0 * ripple.share, 2)} % of the law's residual on held-out "
+            f"blocks (mean square).{inertia and f' {inertia}.'}", f"{_capital(NAMED)}.")
+    return (Section(f"{joint.name}: a torque of the {place}", text, (), (figure,)),)
 
 
 def _band(joint: JointResult) -> str:
@@ -199,16 +217,31 @@ def _words(joint: JointResult) -> tuple[str, ...]:
     unit = _speed_unit(joint)
     words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}, for which the law holds; "
              f"logs: {', '.join(joint.logs)}."]
-    words += [text for text in (drift_in_words(joint.drift, joint.name, joint.revolute),
-                                sticking_in_words(joint.sticking, joint.name, joint.revolute)) if text]
+    words += [text for text in (drift_in_words(joint),
+                                _sticking_in_words(joint)) if text]
     if joint.held is not None:
         low, high = joint.held
         words.append(f"At rest friction carried from {format_number(low, 3)} to {format_number(high, 3)} N m.")
     if joint.validation.by and (never := _never_broke_away(joint)):
-        words.append(f"No break-away torque {' or '.join(never)} is given: nowhere in these logs does the joint rest for {REST:g} "
-                     f"s and then run that way within {WITHIN:g} s. A slow ramp of torque from rest shows it, where the joint does "
-                     "not creep for longer before it runs.")
+        how = BreakAwayConfig()
+        words.append(f"No break-away torque {' or '.join(never)} is given: nowhere in these logs does the joint rest for "
+                     f"{how.rest:g} s and then run that way within {how.within:g} s. A slow ramp of torque from rest shows it, "
+                     "where the joint does not creep for longer before it runs.")
     return tuple(words)
+
+
+def _sticking_in_words(joint: JointResult) -> str:
+    """How many rows are left out, and why."""
+    sticking = joint.sticking
+    if sticking is None:
+        return ""
+    travel = f"{plain_number(sticking.distance)} {'rad' if joint.revolute else 'm'}"
+    words = (f"{plain_number(100.0 * sticking.share)} % of the rows of {joint.name} are left out: the joint rests or bends its "
+             f"contacts there, up to a travel of {travel}, and friction is no function of its speed.")
+    if sticking.slips:
+        words += (f" It sticks and slips on {sticking.slips} times amid motion one way: only the slips are fitted, and the law "
+                  "holds from the slowest speed that was driven on. Drive faster or with a stiffer loop to see slower sliding.")
+    return words
 
 
 def _never_broke_away(joint: JointResult) -> list[str]:
@@ -246,7 +279,7 @@ def _ladder_words(joint: JointResult) -> tuple[str, ...]:
 
 
 def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
-    """What the best law with fewer numbers leaves more of what was held out."""
+    """Return by how much the held-out error of the best law with fewer numbers is larger."""
     chosen = next(rung for rung in joint.candidate_laws if rung.chosen)
     plainer = [rung for rung in joint.candidate_laws if rung.size < chosen.size and not rung.reason]
     if not plainer or min(rung.validate_rms for rung in joint.candidate_laws) <= 0.0:

@@ -19,8 +19,9 @@ from pipelines import fit_friction
 from pipelines.fit_friction import Settings
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import Opened
-from pipelines.model.friction.misfit import misfits
-from pipelines.model.friction.result import JointResult, Result, Value
+from pipelines.model.friction.findings import misfits
+from pipelines.model.friction.fit import Value
+from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs
 from tests.cli.commands import rrrid
 from tests.model.friction.closed_loop import draw, logs_of
@@ -190,6 +191,19 @@ def test_a_validation_log_at_rest_judges_nothing() -> None:
                                   Settings(law="coulomb+viscous"))
     assert result.joints[0].judged_by == "blocks"
     assert any(check.code == "RRID-D09" and "validation" in check.message for check in result.checks)
+
+
+def test_a_log_after_the_step_judges_the_law_with_the_step() -> None:
+    """The last quarter of the log, as one of role "validate": the residual is less than a twentieth of its torque."""
+    log = logs()["step"]
+    after = {name: replace(signal, values=signal.values[-len(log.t) // 4:].copy()) for name, signal in log.signals.items()}
+    judging = replace(log, name="after", role="validate", signals=after)
+    (joint,) = fit_friction.compute(Inputs(tuple(Opened(Path(f"{one.name}.h5"), "", one, ()) for one in (log, judging)),
+                                           label="logs"), Settings(law="asymmetric_friction+stribeck")).joints
+    assert joint.drift is not None
+    assert joint.judged_by == "logs"
+    assert joint.validation.torque_error is not None
+    assert joint.validation.torque_error < 0.05
 
 
 @pytest.mark.slow

@@ -11,8 +11,9 @@ import pytest
 from pipelines import fit_friction, import_log
 from pipelines.fit_friction import Settings
 from pipelines.log.files import Opened, open_log
-from pipelines.model.friction.misfit import misfits
-from pipelines.model.friction.result import Result, Value
+from pipelines.model.friction.findings import misfits
+from pipelines.model.friction.fit import Value
+from pipelines.model.friction.result import Result
 from pipelines.stage import Inputs, Request, run_stage
 
 _TORQUE_CONSTANT = 0.0551  # N m/A of the outrunner

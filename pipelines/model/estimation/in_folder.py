@@ -16,8 +16,7 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.estimation.floor import averaged
 from pipelines.model.estimation.logs import Fitted, Motions, Recipe, fit_logs, motions_of, with_cutoff
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
-from pipelines.model.friction.acting import friction_of
-from pipelines.model.friction.joint import JointLogs, fit_joint
+from pipelines.model.friction.joint import JointLogs, fit_joint, friction_of
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import Reconstruction, reconstruct

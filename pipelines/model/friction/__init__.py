@@ -1,1 +1,1 @@
-"""From logs of a joint to its friction law: equations, fit, choice among laws, and what judges them."""
+"""Fit the friction law of a joint from its logs: equations, fit, choice among laws."""

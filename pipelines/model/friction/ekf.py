@@ -1,26 +1,36 @@
-"""The paper's estimator of friction: an extended Kalman filter over states and parameters at once.
+"""Estimate friction by the paper's extended Kalman filter over states and parameters at once.
 
-Kostić et al. 2004, Section IV.B, after its [22]: the states q and dq of eq. (11) and its constants 1/J, c, f_k, w_k, b are
-filtered together; a further constant c' lets the equilibrium lie anywhere. It sees each sample once and forgets nothing it
-was wrong about early on, so a pass ends where its start and its noise let it: several passes are made, each starting from
-the constants that the last one found.
+Kostić et al. 2004, Section IV.B, after its [22]: the states q and dq of eq. (11) and its constants
+1/J, c, f_k, w_k, b are filtered together; a further constant c' lets the equilibrium lie anywhere.
+It sees each sample once and forgets nothing it was wrong about early on, so a pass ends where its
+start and its noise let it: several passes are made, each from the constants that the last one
+found.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.errors import UsageError
+from pipelines.model.friction.fit import LawEquations, LawFit, fit_law
+from pipelines.model.friction.laws import OneJoint, law_named
+from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array
 from pipelines.signal.extended import Advance, Extended, filter_extended
 
-__all__ = ["EKF_NAMES", "EkfStart", "joint_step", "run_ekf"]
+__all__ = ["EKF_NAMES", "EkfStart", "filtered", "joint_step", "run_ekf"]
 
 EKF_NAMES = ("q", "dq", "1/J", "c", "f1", "f2", "f3", "w1", "w2", "w3", "b", "c'")
 
 _PARTS = 2  # midpoint steps a sample
+_PASSES = 2
+_SHARES = np.array([0.3, 0.8, -0.1])  # of Coulomb friction, sigmoids that the filter begins with,
+_SHARP = np.array([100.0, 40.0, 10.0])  # [s/rad] and their sharpness
+_UNSURE = 0.5  # of Coulomb friction, and of each sharpness
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,59 +43,110 @@ class EkfStart:
     position_noise: float  # [rad]
 
 
-def joint_step(step: float, parts: int = _PARTS) -> Advance:
-    """One sample of eq. (11) and (10) by midpoint steps, and the derivatives of q and dq by every state."""
-    h = step / parts
+def joint_step(step: float) -> Advance:
+    """Return one sample of eq. (11) and (10) by midpoint steps, with its derivatives."""
+    h = step / _PARTS
 
-    def acceleration(x: list[float], q: float, v: float, u: float) -> tuple[float, float, float, list[float]]:
-        """a, ∂a/∂q, ∂a/∂v, and ∂a/∂ of the constants."""
+    def acceleration(x: list[float], q: float, v: float,
+                     u: float) -> tuple[float, float, float, list[float]]:
+        """Return a, ∂a/∂q, ∂a/∂v, and ∂a/∂ of the constants."""
         theta, c, f1, f2, f3, w1, w2, w3, b = x[2:11]
         d = x[11] if len(x) > 11 else 0.0
         s, o = math.sin(q), math.cos(q)
         t1, t2, t3 = math.tanh(w1 * v), math.tanh(w2 * v), math.tanh(w3 * v)
         e1, e2, e3 = 1.0 - t1 * t1, 1.0 - t2 * t2, 1.0 - t3 * t3
         rest = u - c * s - d * o - f1 * t1 - f2 * t2 - f3 * t3 - b * v
-        own = [rest, -theta * s, -theta * t1, -theta * t2, -theta * t3, -theta * f1 * e1 * v, -theta * f2 * e2 * v,
-               -theta * f3 * e3 * v, -theta * v]
-        if len(x) > 11:
-            own.append(-theta * o)
-        return (theta * rest, theta * (d * s - c * o), -theta * (f1 * w1 * e1 + f2 * w2 * e2 + f3 * w3 * e3 + b), own)
+        own = [rest, -theta * s, -theta * t1, -theta * t2, -theta * t3, -theta * f1 * e1 * v,
+               -theta * f2 * e2 * v, -theta * f3 * e3 * v, -theta * v, -theta * o]
+        return (theta * rest, theta * (d * s - c * o),
+                -theta * (f1 * w1 * e1 + f2 * w2 * e2 + f3 * w3 * e3 + b), own[:len(x) - 2])
 
     def advance(x: Array, u: float) -> tuple[Array, Array]:
         values = x.tolist()
-        n = len(values)
-        q, v = values[0], values[1]
-        dq, dv = np.zeros(n), np.zeros(n)
-        dq[0], dv[1] = 1.0, 1.0
-        change = np.zeros(n)
-        for _ in range(parts):
-            a, aq, av, own = acceleration(values, q, v, u)
-            change[2:] = own
+        q, v = values[:2]
+        (dq, dv), change = np.eye(2, len(x)), np.zeros(len(x))
+        for _ in range(_PARTS):
+            a, aq, av, change[2:] = acceleration(values, q, v, u)
             q_mid, v_mid = q + 0.5 * h * v, v + 0.5 * h * a
             dq_mid = dq + (0.5 * h) * dv
             dv_mid = dv + (0.5 * h) * (aq * dq + av * dv + change)
-            a, aq, av, own = acceleration(values, q_mid, v_mid, u)
-            change[2:] = own
+            a, aq, av, change[2:] = acceleration(values, q_mid, v_mid, u)
             q, v = q + h * v_mid, v + h * a
             dq, dv = dq + h * dv_mid, dv + h * (aq * dq_mid + av * dv_mid + change)
         ahead = x.copy()
-        ahead[0], ahead[1] = q, v
+        ahead[:2] = q, v
         return ahead, np.stack([dq, dv])
 
     return advance
 
 
 def run_ekf(y: Array, tau: Array, step: float, start: EkfStart, passes: int = 1) -> Extended:
-    """Filter a log of one joint `passes` times; each pass begins with the constants of the one before, less sure of them."""
-    advance = joint_step(step)
-    mean, covariance = start.mean.copy(), np.diag(np.square(start.std))
-    noise = start.torque_noise * step * start.mean[2]
-    process = np.zeros_like(covariance)
-    reach = np.array([0.5 * step * noise, noise])
+    """Filter a log of one joint `passes` times, each from the constants of the pass before."""
+    advance, begin = joint_step(step), start.mean.copy()
+    reach = np.array([0.5 * step, 1.0]) * (start.torque_noise * step * start.mean[2])
+    process = np.zeros((len(begin), len(begin)))
     process[:2, :2] = np.outer(reach, reach)
-    found = filter_extended(advance, y, tau, mean, covariance, process, start.position_noise**2)
-    for _ in range(passes - 1):
-        begin = start.mean.copy()
-        begin[2:] = found.mean[2:]
-        found = filter_extended(advance, y, tau, begin, covariance, process, start.position_noise**2)
-    return found
+    for _ in range(passes):
+        run = filter_extended(advance, y, tau, begin, np.diag(np.square(start.std)), process,
+                              start.position_noise**2)
+        begin[2:] = run.mean[2:]
+    return run
+
+
+def filtered(stretches: Sequence[Stretch], joint: OneJoint, resolution: float) -> LawFit:
+    """Fit eq. (10) and (11) by the filter, stretch after stretch, from the constants of the last.
+
+    Args:
+        resolution: step of the encoder [rad].
+
+    Raises:
+        UsageError: C02, a prismatic joint, whose gravity is no sine.
+    """
+    if not joint.revolute:
+        raise UsageError("C02", "the filter takes gravity as c sin q + c' cos q, which a prismatic "
+                         "joint has not", where="--method", remedy="take --method varpro")
+    equations = LawEquations.of(stretches, joint)
+    fit = fit_law(equations, law_named("three_sigmoid"))
+    start = _start(fit_law(equations, law_named("coulomb+viscous")), stretches[0], resolution)
+    covariance = np.diag(np.square(start.std))
+    for stretch in stretches:
+        start.mean[:2] = stretch.q[0], stretch.dq[0]
+        tau = stretch.known_tau - stretch.sway @ fit.at(stretch)[1]
+        step = float(np.median(np.diff(stretch.t)))
+        run = run_ekf(stretch.measured, tau, step, start, _PASSES)
+        start, covariance = replace(start, mean=run.mean.copy()), run.covariance
+    return _with_constants(fit, equations, start.mean, covariance)
+
+
+def _start(coarse: LawFit, first: Stretch, resolution: float) -> EkfStart:
+    """Return where the filter begins: eq. (10) guessed from Coulomb and viscous friction.
+
+    The noise of the torque is what that fit leaves, were it white from sample to sample.
+    """
+    level, viscous = coarse.amplitudes.tolist()
+    arm, _ = coarse.at(first)
+    torque = 0.2 * (abs(level) + math.hypot(*arm.gravity))
+    mean = np.array([first.q[0], first.dq[0], 1.0 / arm.inertia, arm.gravity[0], *level * _SHARES,
+                     *_SHARP, viscous, arm.gravity[1]])
+    std = np.array([resolution, 0.01, 0.1 / arm.inertia, torque, *[_UNSURE * level] * 3,
+                    *_UNSURE * _SHARP, 0.5 * abs(viscous) + 0.01 * level, torque])
+    return EkfStart(mean, std, max(coarse.found.rms, 1e-9), resolution / np.sqrt(12.0))
+
+
+def _with_constants(fit: LawFit, equations: LawEquations, x: Array, covariance: Array) -> LawFit:
+    """Return `fit` with the filter's constants; what the filter does not know stays as it was."""
+    sign = np.where(x[7:10] < 0.0, -1.0, 1.0)
+    order = np.argsort(-np.abs(x[7:10]))
+    beta, count = fit.found.beta.copy(), len(fit.found.beta)
+    linear = [0, 1, 2, *(fit.rigid.size + k for k in range(4))]
+    beta[linear] = 1.0 / x[2], x[3], x[11], *(sign * x[4:7])[order], x[10]
+    # from (1/J, c, c', f, b, w) as the filter holds them to (J, c, c', f, b, ln w)
+    source = [2, 3, 11, *(4 + order), 10, *(7 + order)]
+    slope = np.array([-1.0 / x[2] ** 2, 1.0, 1.0, *sign[order], 1.0, *1.0 / x[7:10][order]])
+    whole = np.zeros_like(fit.found.covariance)
+    numbers = np.array([*linear, *range(count, count + 3)])
+    whole[np.ix_(numbers, numbers)] = covariance[np.ix_(source, source)] * np.outer(slope, slope)
+    found = replace(fit.found, beta=beta, theta=np.log(np.abs(x[7:10]))[order], covariance=whole,
+                    seen=np.ones(len(whole)))
+    fit = replace(fit, found=found, joint=equations.arms(beta)[0])
+    return replace(fit, found=replace(found, residual=equations.residual(fit)))

@@ -1,9 +1,10 @@
-"""Everything that friction logs of one joint show: its law and how it was chosen, what judges it, what is not seen.
+"""Fit everything that friction logs of one joint show: its law, what judges it, what is not seen.
 
-    motion by the smoother → refined about a flexible law → ladder → refined about the chosen law → the fit
+    smoothed motion → refined about a flexible law → ladder → refined about the chosen law → fit
 
-Rows in which the joint rests are left out, of all but laws that know these: torque at rest is an inequality (Karnopp 1985).
-So are other rows in which it does not slide (sliding.py), where the flexible law does not follow them as well.
+Rows in which the joint rests are left out, of all but laws that know these: torque at rest is an
+inequality (Karnopp 1985). So are other rows in which it does not slide (sliding.py), where the
+flexible law does not follow them as well.
 """
 
 from __future__ import annotations
@@ -14,56 +15,49 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.fit.varpro import SeparableFit, with_block_covariance
+from pipelines.fit.varpro import with_block_covariance
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.friction.break_away import BreakAway, break_away, held_at_least
-from pipelines.model.friction.coverage import Coverage, Unseen, coverage, unseen
-from pipelines.model.friction.drift import DriftConfig, drift_of
-from pipelines.model.friction.equations import LawEquations
-from pipelines.model.friction.fit_law import fit_law
-from pipelines.model.friction.ladder import Judge, Ladder, climb, no_worse
-from pipelines.model.friction.law_fit import LawFit
-from pipelines.model.friction.laws import LADDER, Law
-from pipelines.model.friction.one_joint import OneJoint, gravity_columns
-from pipelines.model.friction.postures import alike
+from pipelines.log.robot import RobotDescription
+from pipelines.model.arm import Acting
+from pipelines.model.effects import find_effect
+from pipelines.model.friction.breakaway import Event, break_away, held_at_least
+from pipelines.model.friction.ekf import filtered
+from pipelines.model.friction.fit import LawEquations, LawFit, fit_law, same_posture
+from pipelines.model.friction.laws import LADDER, Law, OneJoint, gravity_columns
+from pipelines.model.friction.model_selection import Ladder, Missing, climb, no_worse
+from pipelines.model.friction.output_error import Simulated, polished, simulate_joint
 from pipelines.model.friction.refine import refined
-from pipelines.model.friction.ripple import Ripple, refitted, ripple_of
-from pipelines.model.friction.simulate import Simulated, simulate_joint
-from pipelines.model.friction.sliding import Mask, Sliding, SlidingConfig, free_curve, left_out, sliding_rows
-from pipelines.model.friction.speed_map import SpeedMap, speed_map
-from pipelines.model.friction.weak_form import Course, Stretch, blocks_of_time, stretches_of, swaying
+from pipelines.model.friction.ripple import Ripple, ripple_of, with_inertia
+from pipelines.model.friction.sliding import Sliding, SlidingConfig, drift_of, left_out, sliding_rows
+from pipelines.model.friction.speed_map import Coverage, coverage, speed_map, unseen
+from pipelines.model.friction.weak_form import Course, Mask, Stretch, blocks_of_time, stretches_of, swaying
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["JointConfig", "JointFit", "JointLogs", "Seen", "fit_joint", "fractions", "with_fit"]
+__all__ = ["METHODS", "JointFit", "JointLogs", "Seen", "by_method", "fit_joint", "fractions",
+           "friction_of"]
 
-_FLEXIBLE = Law("flexible", ("three_sigmoid", "asymmetric_friction"))  # follows any curve: no law of the ladder is favoured
+METHODS = ("varpro", "output-error", "ekf")
+# follows any curve: no law of the ladder is favoured
+_FLEXIBLE = Law("flexible", ("three_sigmoid", "asymmetric_friction"))
+
+Seen = tuple[ExperimentLog, Reconstructed]
+Stretches = tuple[Stretch, ...]
 
 
 @dataclass(frozen=True)
 class JointConfig:
-    """Numbers of the fit of one joint.
+    """Numbers of the fit of one joint."""
 
-    Attributes:
-        bent: of friction; a curve that departs less from straight lines does not show whether it lags
-        memory: [s] over which errors of a law may depend on one another: a joint moves some of its travel in it
-        courses: steps of Gauss and Newton for the time constant of a drift
-        rounds: of refining before laws are compared
-        curve: points of a curve, each way, from 1e-3 of the fastest speed on
-        fastest: of them, over which its slope at the highest speeds is taken: the upper half of the speeds
-    """
-
-    bent: float = 1e-3
-    memory: float = 1.0
-    courses: int = 5
-    rounds: int = 2
-    curve: int = 100
-    fastest: int = 9
+    bent: float = 1e-3  # of friction: a curve that bends less does not show whether it lags
+    memory: float = 1.0  # [s] over which errors of a law may depend: a joint moves some way in it
+    courses: int = 5  # steps of Gauss and Newton for the time constant of a drift
+    rounds: int = 2  # of refining before laws are compared
+    curve: int = 100  # points of a curve, each way, from 1e-3 of the fastest speed on
+    fastest: int = 9  # of them, that give its slope at the highest speeds: the upper half
 
 
-_CONFIG = JointConfig()
-
-Seen = tuple[ExperimentLog, Reconstructed]
+_CONFIG, _SLIDING = JointConfig(), SlidingConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +69,22 @@ class JointLogs:
     validate: tuple[Seen, ...] = ()
     hold: tuple[Seen, ...] = ()
 
+    @property
+    def resolution(self) -> float:
+        """Return the largest step of its encoder [rad]."""
+        return max(float(encoder_resolution(motion.good)[self.joint - 1])
+                   for _, motion in self.identify)
+
+    def stretches(self, logs: Sequence[Seen], window: float) -> Stretches:
+        """Return the stretches of some of the logs in windows of `window` [s]."""
+        sways = sorted({k for _, motion in self.identify for k in swaying(motion, self.joint)})
+        return tuple(stretch for log, motion in logs
+                     for stretch in stretches_of(log, self.joint, motion, window, sways))
+
 
 @dataclass(frozen=True, eq=False)
 class Driven:
-    """A judged stretch beside its simulation."""
+    """The judged stretch and its simulation."""
 
     stretch: Stretch
     judging: bool  # of a validate log
@@ -86,9 +92,14 @@ class Driven:
     without: Simulated
 
     def error(self, simulated: Simulated) -> float:
-        """Root mean square of the simulated speed's error [rad/s]; infinite where the simulation ran away."""
-        apart = simulated.dq - self.stretch.dq
-        return float(np.sqrt(np.mean(np.square(apart)))) if np.isfinite(apart).all() else float("inf")
+        """Return the rms error of the simulated speed [rad/s]; infinite where it ran away."""
+        error = float(np.sqrt(np.mean(np.square(simulated.dq - self.stretch.dq))))
+        return error if np.isfinite(error) else float("inf")
+
+
+def _simulated(stretch: Stretch, judging: bool, fit: LawFit) -> Driven:
+    return Driven(stretch, judging, simulate_joint(stretch, fit),
+                  simulate_joint(stretch, fit, friction=False))
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,229 +109,215 @@ class JointFit:
     logs: JointLogs
     fit: LawFit
     ladder: Ladder
-    stretches: tuple[Stretch, ...]
+    stretches: Stretches
     driven: Driven
     covered: Coverage
-    unseen: tuple[Unseen, ...]
-    map: SpeedMap
-    break_away: tuple[BreakAway, ...]
+    unseen: tuple[Missing, ...]
+    map: Array  # (4, points) of `speed_map`
+    break_away: tuple[Event, ...]
     held: tuple[float, float] | None  # [N m] friction carried at rest, back and forth
     window: float  # [s]
     ripple: Ripple | None
     sliding: Sliding
     course: Course | None  # of friction that changes in time
-    beside_ripple: SeparableFit | None  # the law and the rigid numbers, the rigid ones first, with the ripple known
 
 
-def fit_joint(logs: JointLogs, window: float, law: Law | None = None, config: SlidingConfig | None = None) -> JointFit:
+def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFit:
     """Fit `law`, or choose one.
 
     Args:
         window: of the equations [s], the shortest: a coarse encoder needs longer ones.
+
+    Raises:
+        InputRejected: T08, too few windows.
     """
-    robot = logs.identify[0][0].robot
-    arm = OneJoint.of(robot, logs.joint)
-    resolution = max(float(encoder_resolution(found.good)[logs.joint - 1]) for _, found in logs.identify)
-    beside = _swaying(logs)
-    config = config or SlidingConfig()
-    rows = _usable_rows(logs, window, beside, arm, config)
-    moves = ~rows.sliding.resting if rows.any_slide and (law is None or law.pointwise) else np.ones_like(rows.sliding.resting)
-    stretches, fit = _about_a_flexible_law(left_out(rows.stretches, moves), rows.fitted, arm, resolution)
-    if rows.any_slide and not _followed(stretches, fit, rows.sliding, moves, config):
-        stretches = left_out(rows.stretches, rows.sliding.slides)
-    found = _course(stretches, rows, arm, config, DriftConfig())
-    course = found if found is not None and found.named else None
-    choice = _chosen(stretches, rows.fitted, course, fit, arm, law)
-    if found is not course:
-        other = _chosen(stretches, rows.fitted, found, fit, arm, choice.ladder.chosen.law)
+    arm = OneJoint.of(logs.identify[0][0].robot, logs.joint)
+    usable, fitted, window, sliding = _usable_rows(logs, window, arm)
+    slide = bool(sliding.slides[:sum(stretch.rows for stretch in usable[:fitted])].any())
+    moves = np.ones_like(sliding.resting)
+    if slide and (law is None or law.pointwise):
+        moves = ~sliding.resting
+    stretches, fit = _refined(left_out(usable, moves), fitted, arm, logs.resolution)
+    if slide and not _followed(stretches, fit, sliding.slides[moves]):
+        stretches = left_out(usable, sliding.slides)
+    shown = drift_of(left_out(stretches, sliding.slides)[:fitted], arm) if slide else None
+    course = shown if shown is not None and shown.named else None
+    choice = _choice(stretches, fitted, course, fit, arm, law)
+    if shown is not course:  # neither shown nor excluded: it takes part where the law is better
+        other = _choice(stretches, fitted, shown, fit, arm, choice.ladder.chosen.law)
         if not no_worse(choice.ladder.chosen.residual, other.ladder.chosen.residual):
-            choice = _chosen(stretches, rows.fitted, found, fit, arm, law)
-    identify, validate, ladder, course = choice.identify, choice.validate, choice.ladder, choice.course
-    sticks = any(stretch.sticks is not None for stretch in identify)
-    chosen = ladder.chosen.fit
+            choice = _choice(stretches, fitted, shown, fit, arm, law)
+    both, course, chosen = choice.stretches, choice.course, choice.ladder.chosen.fit
+    sticks = any(stretch.sticks is not None for stretch in both[:fitted])
     if not sticks:  # reversals are kinks of the speed, and where it sticks they are left out
-        identify, validate = (tuple(refined(stretch, chosen, resolution) for stretch in part) for part in (identify, validate))
+        both = tuple(refined(stretch, chosen, logs.resolution) for stretch in both)
     for _ in range(_CONFIG.courses if course is not None else 1):
-        both = _along((*identify, *validate), course, chosen)  # the same columns in both
-        identify, validate = both[:len(identify)], both[len(identify):]
-        final = fit_law(LawEquations.of(identify, arm), chosen.law, [chosen.theta])
+        both = _along(both, course, chosen)  # the same columns in both
+        final = fit_law(LawEquations.of(both[:fitted], arm), chosen.law, [chosen.theta])
         course, chosen = _next(course, final), final
+    identify, validate = both[:fitted], both[fitted:]
     if sticks:
-        robust = with_block_covariance(final.found, blocks_of_time(identify, _CONFIG.memory))
-        final = _with_errors_in_variables(replace(final, found=robust), rows.sliding.attenuation)
-    ripple = ripple_of(LawEquations.of(identify, arm), final)
+        final = _with_dependent_errors(final, identify, sliding.attenuation)
+    equations, covered = LawEquations.of(identify, arm), coverage(identify)
+    ripple = ripple_of(equations, final)
+    if ripple is not None:
+        ripple = with_inertia(ripple, equations, final)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
-    driven = Driven(judging, bool(validate), simulate_joint(judging, final), simulate_joint(judging, final, friction=False))
-    covered = coverage(identify)
-    at_rest = [stretch for stretch in _stretches(logs.hold, logs.joint, rows.window, beside)
-               if any(alike(stretch.posture, posture) for posture in final.postures)]
-    return JointFit(logs, final, ladder, identify, driven, covered, unseen(covered, ladder), speed_map(identify, final),
-                    break_away((*identify, *at_rest), final), held_at_least(at_rest, final), rows.window, ripple,
-                    rows.sliding, course,
-                    None if ripple is None else refitted(LawEquations.of(identify, arm), final, ripple))
+    at_rest = [stretch for stretch in logs.stretches(logs.hold, window)
+               if any(same_posture(stretch.posture, posture) for posture in final.postures)]
+    return JointFit(
+        logs, final, choice.ladder, identify, _simulated(judging, bool(validate), final), covered,
+        unseen(covered, choice.ladder), speed_map(identify, final),
+        break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window, ripple,
+        sliding, course)
 
 
-@dataclass(frozen=True, eq=False)
-class _Rows:
-    """Stretches to fit and to judge, and which of their rows slide."""
+def _usable_rows(logs: JointLogs, window: float,
+                 arm: OneJoint) -> tuple[Stretches, int, float, Sliding]:
+    """Return stretches, the fitted first, how many these are, their window [s], and what slides.
 
-    stretches: tuple[Stretch, ...]  # the fitted ones first
-    fitted: int
-    window: float  # [s]
-    sliding: Sliding
-
-    @property
-    def any_slide(self) -> bool:
-        """Return whether rows of the fitted stretches slide."""
-        return bool(self.sliding.slides[:sum(stretch.rows for stretch in self.stretches[:self.fitted])].any())
-
-
-def _usable_rows(logs: JointLogs, window: float, beside: tuple[int, ...], arm: OneJoint, config: SlidingConfig) -> _Rows:
-    """The shortest windows over which the encoder shows the acceleration."""
-    found: _Rows | None = None
-    for factor in config.windows:
-        identify, validate = (_stretches(part, logs.joint, factor * window, beside) for part in (logs.identify, logs.validate))
+    Windows are the shortest over which the encoder shows the acceleration; longer ones may all hold
+    a reversal.
+    """
+    best: tuple[Stretches, int, float, Sliding] | None = None
+    for size in (factor * window for factor in _SLIDING.windows):
+        identify, validate = (logs.stretches(part, size) for part in (logs.identify, logs.validate))
         if not identify:
             break
         both = tuple(replace(stretch, part=k) for k, stretch in enumerate((*identify, *validate)))
-        rows = _Rows(both, len(identify), factor * window, sliding_rows(both, arm, config))
-        if found is None or rows.sliding.attenuation < found.sliding.attenuation:  # longer ones may all hold a reversal
-            found = rows
-        if found.sliding.attenuation <= config.attenuation:
+        sliding = sliding_rows(both, arm)
+        if best is None or sliding.attenuation < best[-1].attenuation:
+            best = both, len(identify), size, sliding
+        if best[-1].attenuation <= _SLIDING.attenuation:
             break
-    if found is None:
-        raise InputRejected("T08", f"joint {logs.joint}: no log has enough windows of {window:g} s to fit a law to",
-                            remedy="record a few seconds at least")
-    return found
+    if best is None:
+        raise InputRejected("T08", f"joint {logs.joint}: no log has enough windows of {window:g} s "
+                            "to fit a law to", remedy="record a few seconds at least")
+    return best
 
 
-def _about_a_flexible_law(stretches: tuple[Stretch, ...], fitted: int, arm: OneJoint,
-                          resolution: float) -> tuple[tuple[Stretch, ...], LawFit]:
-    """The motion refined about a law that follows any curve, and that law."""
+def _refined(stretches: Stretches, fitted: int, arm: OneJoint,
+             resolution: float) -> tuple[Stretches, LawFit]:
+    """Return the motion refined about a law that follows any curve, and that law."""
     fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE)
     for _ in range(_CONFIG.rounds):
-        before, stretches = fit, tuple(refined(stretch, fit, resolution) for stretch in stretches)
-        fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE, [before.theta])
+        stretches = tuple(refined(stretch, fit, resolution) for stretch in stretches)
+        fit = fit_law(LawEquations.of(stretches[:fitted], arm), _FLEXIBLE, [fit.theta])
     return stretches, fit
 
 
-def _followed(stretches: tuple[Stretch, ...], fit: LawFit, sliding: Sliding, moves: Mask,
-              config: SlidingConfig) -> bool:
-    """Return whether one curve fits the other rows as well as those that slide, or these make most of its residual.
+def _followed(stretches: Stretches, fit: LawFit, slides: Mask) -> bool:
+    """Return whether one curve fits the other rows as well as those that slide.
 
-    Args:
-        moves: which rows of all are those of `stretches`.
+    Or these make most of its residual.
     """
-    square = np.square(LawEquations.of(stretches, fit.joint).predicted(fit).residual)
-    doubt, sure = square[~sliding.slides[moves]], square[sliding.slides[moves]]
-    return not doubt.size or float(doubt.mean()) <= config.worse * float(sure.mean()) or float(doubt.sum()) <= float(sure.sum())
-
-
-def _course(stretches: tuple[Stretch, ...], rows: _Rows, arm: OneJoint, config: SlidingConfig, drift: DriftConfig) -> Course | None:
-    """How friction changes in time over the logs that are fitted; None where it does not."""
-    if not rows.any_slide:
-        return None
-    fitted = left_out(stretches, rows.sliding.slides)[:rows.fitted]
-    equations, speed = LawEquations.of(fitted, arm), np.concatenate([stretch.middle[1] for stretch in fitted])
-    return drift_of(fitted, equations.y, equations.fixed, free_curve(speed, config), drift)
+    square = np.square(LawEquations.of(stretches, fit.joint).residual(fit))
+    doubt, sure = square[~slides], square[slides]
+    return (not doubt.size or doubt.mean() <= _SLIDING.worse * sure.mean()
+            or doubt.sum() <= sure.sum())
 
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
     """A law chosen with a course of friction in time, or without."""
 
-    identify: tuple[Stretch, ...]
-    validate: tuple[Stretch, ...]
+    stretches: Stretches  # the fitted ones first; of the others those with rows
     ladder: Ladder
     course: Course | None
 
 
-def _chosen(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit,
-            arm: OneJoint, law: Law | None) -> _Choice:
-    """Choose among laws, or fit `law`, while friction changes along `course`."""
-    stretches, fit, course = _with_course(stretches, fitted, course, fit, arm)
-    identify = stretches[:fitted]
-    validate = tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
-    judged = LawEquations.of(validate, arm) if validate else None
-    judge = Judge(LawEquations.of(identify, arm), judged)
-    sticks = any(stretch.sticks is not None for stretch in identify)
-    laws = tuple(one for one in LADDER if one.pointwise or not sticks)  # presliding is left out
-    return _Choice(identify, validate, climb(judge, (law,) if law is not None else laws), course)
+def _choice(stretches: Stretches, fitted: int, course: Course | None, fit: LawFit, arm: OneJoint,
+            law: Law | None) -> _Choice:
+    """Choose among laws, or fit `law`, while friction changes along `course`.
 
-
-def _with_course(stretches: tuple[Stretch, ...], fitted: int, course: Course | None, fit: LawFit,
-                 arm: OneJoint) -> tuple[tuple[Stretch, ...], LawFit, Course | None]:
-    """The stretches along `course`, its time constant fitted, and the flexible law fitted to these very stretches."""
+    The time constant is fitted first, with the flexible law `fit`.
+    """
     stretches = _along(stretches, course, fit)
     for k in range(_CONFIG.courses if course is not None else 0):
         fit = fit_law(LawEquations.of(stretches[:fitted], arm), fit.law, [fit.theta])
         if k + 1 < _CONFIG.courses:
             course = _next(course, fit)
             stretches = _along(stretches, course, fit)
-    return stretches, fit, course
+    identify = stretches[:fitted]
+    validate = tuple(stretch for stretch in stretches[fitted:] if stretch.rows)
+    sticks = any(stretch.sticks is not None for stretch in identify)
+    laws = tuple(one for one in LADDER if one.pointwise or not sticks) if law is None else (law,)
+    ladder = climb(LawEquations.of(identify, arm),
+                   LawEquations.of(validate, arm) if validate else None, laws)
+    return _Choice((*identify, *validate), ladder, course)
 
 
-def _along(stretches: tuple[Stretch, ...], course: Course | None, fit: LawFit) -> tuple[Stretch, ...]:
-    """The stretches with columns of `course`, a change of the curve of `fit`, and of friction that lags behind its speed.
+def _along(stretches: Stretches, course: Course | None, fit: LawFit) -> Stretches:
+    """Return the stretches with columns of `course`, and of friction that lags behind its speed.
 
-    f(v(t - T)) = f - T df/dt to first order (Armstrong-Hélouvry et al. 1994, Section 2.1). Of f counts what departs from the slope
-    at the highest speeds: viscous friction does not lag, and its lag would be inertia. T < 0 where bristles straighten.
+    f(v(t - T)) = f - T df/dt to first order (Armstrong-Hélouvry et al. 1994, Section 2.1). Of f,
+    the curve of `fit`, counts what departs from the slope at the highest speeds: viscous friction
+    does not lag, and its lag would be inertia. T < 0 where bristles straighten.
     """
-    if not stretches:
-        return stretches
     rows = np.abs(np.concatenate([stretch.middle[1] for stretch in stretches]))
     fastest = float(max(np.abs(stretch.dq).max() for stretch in stretches))
     side = np.geomspace(max(float(rows.min()), 1e-3 * float(rows.max())), fastest, _CONFIG.curve)
     speed = np.concatenate([-side[::-1], side])
-    curve = fit.curve(speed)
-    ends = (curve[_CONFIG.fastest] - curve[0], curve[-1] - curve[-1 - _CONFIG.fastest])
-    bent = curve - np.where(speed < 0.0, *ends) / (side[-1] - side[-1 - _CONFIG.fastest]) * speed
-    lags = max(np.ptp(bent[:_CONFIG.curve]), np.ptp(bent[_CONFIG.curve:])) > _CONFIG.bent * float(np.abs(curve).max())
-    lags = lags and any(stretch.sticks is not None for stretch in stretches)
+    curve, k = fit.curve(speed), _CONFIG.fastest
+    ends = (curve[k] - curve[0], curve[-1] - curve[-1 - k])
+    bent = curve - np.where(speed < 0.0, *ends) / (side[-1] - side[-1 - k]) * speed
+    reach = max(np.ptp(part) for part in np.split(bent, 2))
+    lags = (reach > _CONFIG.bent * float(np.abs(curve).max())
+            and any(stretch.sticks is not None for stretch in stretches))
     own = None if course is None else replace(course, curve=(speed, curve))
-    return tuple(replace(stretch, course=own, lag=(speed, bent) if lags else None) for stretch in stretches)
+    lag = (speed, bent) if lags else None
+    return tuple(replace(stretch, course=own, lag=lag) for stretch in stretches)
 
 
 def _next(course: Course | None, fit: LawFit) -> Course | None:
-    """The course with the time constant of a fit, one step of Gauss and Newton on."""
+    """Return the course with the time constant of a fit, one step of Gauss and Newton on."""
     if course is None or course.kind == "step":
         return course
     if course.change == 0.0:
-        return replace(course, change=float(fit.found.beta[fit.rigid_size - 1]))
-    change, step = fit.found.beta[fit.rigid_size - 2:fit.rigid_size]
-    time = float(np.clip(course.time * np.exp(np.clip(step, -0.5, 0.5)), 0.05 * course.until, 10.0 * course.until))
+        return replace(course, change=float(fit.rigid[0, -1]))
+    change, step = fit.rigid[0, -2:]
+    time = float(np.clip(course.time * np.exp(np.clip(step, -0.5, 0.5)), 0.05 * course.until,
+                         10.0 * course.until))
     return replace(course, change=float(change), time=time)
 
 
-def _with_errors_in_variables(fit: LawFit, attenuation: float) -> LawFit:
-    """`fit` with every inertia as uncertain as noise of the acceleration may have made it too small: J times that share."""
-    covariance = fit.found.covariance.copy()
+def _with_dependent_errors(fit: LawFit, stretches: Stretches, attenuation: float) -> LawFit:
+    """Return `fit` with a covariance for errors that depend on one another within a block of time.
+
+    Every inertia is as uncertain as noise of the acceleration may have made it too small: J times
+    `attenuation` (errors in variables).
+    """
+    found = with_block_covariance(fit.found, blocks_of_time(stretches, _CONFIG.memory))
+    covariance = found.covariance.copy()
     places = fit.rigid_size * np.arange(len(fit.postures))
-    covariance[places, places] += np.square(min(attenuation, 1.0) * fit.found.beta[places])
-    return replace(fit, found=replace(fit.found, covariance=covariance))
+    covariance[places, places] += np.square(min(attenuation, 1.0) * found.beta[places])
+    return replace(fit, found=replace(found, covariance=covariance))
 
 
-def _swaying(logs: JointLogs) -> tuple[int, ...]:
-    """Joints that give way in any of the logs that are fitted."""
-    found = {joint for _, motion in logs.identify for joint in swaying(motion, logs.joint, encoder_resolution(motion.good))}
-    return tuple(sorted(found))
+def by_method(joint: JointFit, method: str) -> JointFit:
+    """Return `joint`, which was fitted by variable projection, with the numbers of `method`.
 
+    It is judged again. How a ripple changes the inertia another method does not give.
 
-def _stretches(seen: Sequence[Seen], joint: int, window: float, beside: tuple[int, ...]) -> tuple[Stretch, ...]:
-    return tuple(stretch for log, found in seen for stretch in stretches_of(log, joint, found, window, beside))
-
-
-def with_fit(joint: JointFit, fit: LawFit) -> JointFit:
-    """The same with numbers from another method, judged again. What a ripple does to its inertia that method does not say."""
-    stretch = joint.driven.stretch
-    driven = replace(joint.driven, with_friction=simulate_joint(stretch, fit), without=simulate_joint(stretch, fit, friction=False))
-    return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit), beside_ripple=None)
+    Raises:
+        UsageError: C02, a law that the method cannot fit, or a prismatic joint for the filter.
+    """
+    if method == "varpro":
+        return joint
+    if method == "output-error":
+        fit = polished(joint.stretches, joint.fit)
+    else:
+        fit = filtered(joint.stretches, joint.fit.joint, joint.logs.resolution)
+    driven = _simulated(joint.driven.stretch, joint.driven.judging, fit)
+    ripple = None if joint.ripple is None else replace(joint.ripple, inertia=None)
+    return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit),
+                   ripple=ripple)
 
 
 def fractions(joint: JointFit) -> tuple[Array, Array, Array]:
-    """Friction, gravity and inertial torque (samples,) [N m] along the simulated motion, Fig. 5.
+    """Return friction, gravity and inertial torque along the simulated motion (samples,) [N m].
 
-    Gravity is that of the measured position, as in the simulation.
+    Kostić et al. 2004, Fig. 5. Gravity is that of the measured position, as in the simulation.
     """
     stretch, simulated, fit = joint.driven.stretch, joint.driven.with_friction, joint.fit
     arm, _ = fit.at(stretch)
@@ -329,3 +326,25 @@ def fractions(joint: JointFit) -> tuple[Array, Array, Array]:
     friction = np.asarray(fit.law.columns(motion, arm, fit.theta) @ fit.amplitudes)
     gravity = np.asarray(gravity_columns(stretch.q, stretch.revolute) @ np.array(arm.gravity))
     return friction, gravity, np.asarray(arm.inertia * ddq)
+
+
+def friction_of(joints: Sequence[JointFit],
+                robot: RobotDescription) -> tuple[tuple[Acting, ...], tuple[Acting, ...]]:
+    """Return the friction laws of an arm's joints, and what acts at rest as well: offsets."""
+    laws: list[Acting] = []
+    at_rest: list[Acting] = []
+    still = Motion(np.arange(2.0), *np.zeros((3, 2, 1)))
+    for joint in joints:
+        fit = joint.fit
+        std = {number.name: number.std for number in fit.numbers}
+        shared = {name.partition(".")[2]: value for name, value in std.items()
+                  if name.endswith(".sharpness")}
+        values = fit.law.values(fit.theta, fit.amplitudes)
+        for effect, numbers in zip(fit.law.shaped(fit.theta), values, strict=True):
+            known = {name: std.get(f"{effect.name}.{name}", shared.get(name)) for name in numbers}
+            acting = Acting.of(find_effect(effect.name)(joint=joint.logs.joint), numbers,
+                               {name: one for name, one in known.items() if one is not None},
+                               revolute=fit.joint.revolute)
+            acts = effect.columns(still, OneJoint.of(robot, 1, 1.0)).any()
+            (at_rest if acts else laws).append(acting)
+    return tuple(laws), tuple(at_rest)

@@ -1,39 +1,131 @@
-"""Friction laws as the ladder knows them: one effect, or a few that act together and share the width of their sign.
+"""Describe one joint, and the friction laws that can be fitted to it.
+
+With the other joints locked, Kostić et al. 2004, eq. (11), reads
+
+    J ddq + c sin q + c' cos q + τ_f = τ
+
+The printed equation has c sin q with q from the hanging position; c' cos q lets the equilibrium lie
+anywhere. A prismatic joint has its weight along the axis instead, a constant. τ_f is a law: one
+effect, or several that act together and share the speed over which they change sign.
 
     law = Law("stribeck", ("coulomb", "viscous", "stribeck"))
-    law.columns(motion, arm, θ)           θ: logarithms of the non-linear numbers
-    law.starts(motion, arm)               where a search may begin
+    law.columns(motion, joint, θ) @ amplitudes      θ: logarithms of the non-linear numbers
 """
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, NoReturn
 
 import numpy as np
 
 from pipelines.log.robot import Joint, RobotDescription
 from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
-from pipelines.model.effects.fast import shape_slopes
-from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve
+from pipelines.model.effects.fast import from_motion, own_memory, shape_slopes
+from pipelines.model.rigid.body import Array, Motion, RigidBody
+from pipelines.model.rigid.choose import rigid_body
 
-__all__ = ["LADDER", "Law", "Place", "law_named", "with_further"]
+__all__ = ["LADDER", "Law", "NonlinearNumber", "OneJoint", "gravity_acts", "gravity_columns",
+           "gravity_names", "law_named", "with_further"]
 
-_SHARED = "sharpness"  # one joint changes the sign of its friction over one speed, whatever the law is made of
+_POSITIONS = 8  # of the driven joint, at which gravity is looked for
+_PARALLEL = 1e-6  # [rad] between axis and gravity: rounding of a description
+_SHARED = "sharpness"  # every law of a joint changes its sign over the same speed
 _SHARP = (10.0, 30.0, 100.0, 300.0)  # [s/rad] where a search for it begins
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where one number of θ goes: into these effects, under this name."""
+class OneJoint:
+    """An arm of one joint: the `ArmModel` that a friction law acts on."""
+
+    robot: RobotDescription  # of this joint alone
+    inertia: float  # J [kg m^2]
+    gravity: tuple[float, ...]  # c, c' [N m]; prismatic: the weight along the axis [N]
+
+    @classmethod
+    def of(cls, whole: RobotDescription, joint: int, inertia: float = 0.0,
+           gravity: tuple[float, ...] = ()) -> OneJoint:
+        """Return joint `joint`, counted from 1, of a robot."""
+        own = whole.joints[joint - 1]
+        alone = RobotDescription(whole.name, whole.gravity, "dh", (Joint(own.name, own.type),))
+        return cls(alone, inertia, gravity or (0.0,) * len(gravity_names(own.revolute)))
+
+    @property
+    def n_joints(self) -> int:
+        return 1
+
+    @property
+    def revolute(self) -> bool:
+        return self.robot.joints[0].revolute
+
+    @property
+    def units(self) -> tuple[str, str, str]:
+        """Return the units of torque, speed and inertia."""
+        return ("N m", "rad/s", "kg m^2") if self.revolute else ("N", "m/s", "kg")
+
+    @property
+    def body(self) -> RigidBody:
+        raise TypeError("a joint on its own has no links")
+
+    @property
+    def p(self) -> Array:
+        return np.array([self.inertia, *self.gravity])
+
+    def torque(self, motion: Motion) -> Array:
+        """Return J ddq + c sin q + c' cos q, (samples, 1) [N m]."""
+        weight = gravity_columns(motion.q[:, 0], self.revolute) @ self.p[1:]
+        return np.asarray(self.inertia * motion.ddq + weight[:, None])
+
+    def friction_torque(self, motion: Motion) -> Array:
+        """Return zeros: its law of friction is what is fitted."""
+        return np.zeros_like(motion.dq)
+
+    def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...]:
+        return ()
+
+    def with_body(self, body: RigidBody, p: Array) -> NoReturn:
+        raise TypeError("a joint on its own has no links")
+
+    def carrying(self, rigid: Array) -> OneJoint:
+        """Return it with J, c, c' (3,) [kg m^2], [N m]; prismatic: mass and weight (2,)."""
+        inertia, *gravity = map(float, rigid[:1 + len(self.gravity)])
+        return replace(self, inertia=inertia, gravity=tuple(gravity))
+
+
+def gravity_columns(q: Array, revolute: bool) -> Array:
+    """Return sin q, cos q (samples, 2); of a prismatic joint ones (samples, 1)."""
+    return np.stack([np.sin(q), np.cos(q)]).T if revolute else np.ones((len(q), 1))
+
+
+def gravity_names(revolute: bool) -> tuple[str, ...]:
+    return ("sine", "cosine") if revolute else ("constant",)
+
+
+def gravity_acts(robot: RobotDescription, joint: int, others: Sequence[float]) -> bool:
+    """Return whether gravity has a moment about joint `joint`, or a part along one that slides.
+
+    Args:
+        joint: counted from 1.
+        others: (joints - 1,) positions of the other joints [rad].
+    """
+    q = np.tile(np.asarray(others, dtype=np.float64), (_POSITIONS, 1))
+    q = np.insert(q, joint - 1, np.linspace(-3.0, 3.0, _POSITIONS), axis=1)
+    row = rigid_body(robot).regressor(q, 0.0 * q, 0.0 * q)[:, joint - 1]
+    least = _PARALLEL * float(np.linalg.norm(robot.gravity))
+    return bool(np.abs(row).max(initial=0.0) > least)
+
+
+@dataclass(frozen=True)
+class NonlinearNumber:
+    """One number of θ, which several effects may share."""
 
     name: str
-    effects: tuple[int, ...]
+    effects: tuple[int, ...]  # of the law
     quantity: Quantity
 
 
@@ -46,183 +138,179 @@ class Law:
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """Each at the only joint of the arm `OneJoint`."""
+        """Return each at the only joint of `OneJoint`."""
         return tuple(find_effect(name)(joint=1) for name in self.members)
 
     @property
     def title(self) -> str:
-        """In words; joined by "+" where several causes act."""
+        """Return it in words, joined by "+" where several causes act."""
         return " + ".join(find_effect(name).words.title for name in self.name.split("+"))
 
     @cached_property
-    def places(self) -> tuple[Place, ...]:
-        """The numbers of θ. One that may be zero, such as a damping, stays at its default: it has no logarithm. So does one that a
-        model need not say, which only other forms of the law have."""
-        found: dict[str, Place] = {}
+    def nonlinear(self) -> tuple[NonlinearNumber, ...]:
+        """Return the numbers of θ.
+
+        One that may be zero, such as a damping, stays at its default: it has no logarithm. So does
+        one that a model need not give, which only other forms of the law have.
+        """
+        numbers: dict[str, NonlinearNumber] = {}
         for k, effect in enumerate(self.effects):
-            for quantity in effect.parameters:
-                if not quantity.shape or quantity.low <= 0.0 or quantity.unsaid is not None:
+            for q in effect.parameters:
+                if not q.shape or q.low <= 0.0 or q.unsaid is not None:
                     continue
-                key = quantity.name if quantity.name == _SHARED else f"{effect.name}.{quantity.name}"
-                before = found.get(key, Place(quantity.name, (), quantity))
-                found[key] = Place(quantity.name, (*before.effects, k), quantity)
-        return tuple(found.values())
+                key = q.name if q.name == _SHARED else f"{effect.name}.{q.name}"
+                before = numbers.get(key, NonlinearNumber(q.name, (), q))
+                numbers[key] = NonlinearNumber(q.name, (*before.effects, k), q)
+        return tuple(numbers.values())
 
     @cached_property
     def _counts(self) -> tuple[int, ...]:
-        """Columns of every effect."""
+        """Return the number of columns of every effect."""
         return tuple(sum(not q.shape for q in effect.parameters) for effect in self.effects)
+
+    def _split(self, amplitudes: Array) -> list[Array]:
+        """Return the amplitudes of every effect."""
+        return np.split(amplitudes, np.cumsum(self._counts)[:-1])
 
     @property
     def amplitudes(self) -> int:
-        """Number of columns."""
+        """Return the number of columns."""
         return sum(self._counts)
+
+    @property
+    def size(self) -> int:
+        """Return how many numbers are fitted."""
+        return self.amplitudes + len(self.nonlinear)
 
     @cached_property
     def pointwise(self) -> bool:
-        """Return whether its torque at one moment depends on that moment alone: not on what went before, as presliding does."""
-        motion, arm = _trial()
-        back = Motion(motion.t, motion.q[::-1], motion.dq[::-1], motion.ddq[::-1])
-        theta = np.mean(self.bounds, axis=0)
-        return bool(np.allclose(self.columns(back, arm, theta)[::-1], self.columns(motion, arm, theta), rtol=1e-9, atol=1e-12))
+        """Return whether its torque at a moment depends on that moment alone, unlike presliding."""
+        return all(own_memory(effect, effect.values(np.ones(count))) is None
+                   for effect, count in zip(self.effects, self._counts, strict=True))
 
     @cached_property
     def sees_load(self) -> bool:
         """Return whether it depends on the torque that the joint carries."""
-        motion, arm = _trial()
-        theta = np.mean(self.bounds, axis=0)
-        return not np.array_equal(self.columns(motion, arm, theta), self.columns(motion, arm.carrying(2.0, (1.0, 3.0)), theta))
+        return not all(from_motion(effect) for effect in self.effects)
 
-    @property
-    def size(self) -> int:
-        """Numbers to be fitted."""
-        return self.amplitudes + len(self.places)
+    @cached_property
+    def sloped(self) -> bool:
+        """Return whether `slopes` is known."""
+        still = np.zeros((1, 1))
+        motion = Motion(np.zeros(1), still, still, still)
+        theta = np.mean(self.bounds, axis=0)
+        return self.slopes(motion, theta, np.ones(self.amplitudes)) is not None
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Of θ."""
-        pairs = np.log([(place.quantity.low, place.quantity.high) for place in self.places]).reshape(-1, 2)
-        return pairs[:, 0], pairs[:, 1]
+        """Return the lower and the upper bounds of θ."""
+        pairs = [(number.quantity.low, number.quantity.high) for number in self.nonlinear]
+        low, high = np.log(pairs).reshape(-1, 2).T
+        return low, high
 
     def shaped(self, theta: Array) -> tuple[Effect, ...]:
-        """The effects with their non-linear numbers out of θ."""
-        numbers = [dict(fixed) for fixed in self._defaults]
-        for place, value in zip(self.places, theta, strict=True):
-            for k in place.effects:
-                numbers[k][place.name] = math.exp(value)
-        return tuple(effect.at(values) if values else effect for effect, values in zip(self.effects, numbers, strict=True))
+        """Return the effects with their non-linear numbers out of θ."""
+        values: list[dict[str, Any]] = [{} for _ in self.effects]
+        for number, logarithm in zip(self.nonlinear, theta, strict=True):
+            for k in number.effects:
+                values[k][number.name] = math.exp(logarithm)
+        return tuple(replace(effect, **own) if own else effect
+                     for effect, own in zip(self.effects, values, strict=True))
 
-    @cached_property
-    def _defaults(self) -> tuple[dict[str, float], ...]:
-        """Non-linear numbers of every effect as they are where θ says nothing of them."""
-        return tuple({q.name: getattr(effect, q.name) for q in effect.parameters if q.shape} for effect in self.effects)
-
-    def theta(self, effects: tuple[Effect, ...]) -> Array:
-        """The inverse of `shaped`."""
-        return np.array([math.log(getattr(effects[place.effects[0]], place.name)) for place in self.places])
+    def theta(self, effects: Sequence[Effect]) -> Array:
+        """Return θ of effects; the inverse of `shaped`."""
+        return np.array([math.log(getattr(effects[number.effects[0]], number.name))
+                         for number in self.nonlinear])
 
     def canonical(self, theta: Array) -> Array:
-        """The one of several equal θ that its effects name, such as w1 > w2 > w3."""
-        named = []
-        for effect, values in zip(self.shaped(theta), self.values(theta, np.ones(self.amplitudes)), strict=True):
+        """Return, of several equal θ, that in the order of its effects, such as w1 > w2 > w3."""
+        ordered = []
+        values = self.values(theta, np.ones(self.amplitudes))
+        for effect, own in zip(self.shaped(theta), values, strict=True):
             order = getattr(effect, "canonical", None)
-            named.append(effect.at(order(values)) if order is not None else effect)
-        return self.theta(tuple(named))
+            ordered.append(effect.at(order(own)) if order is not None else effect)
+        return self.theta(ordered)
 
     def columns(self, motion: Motion, arm: ArmModel, theta: Array) -> Array:
-        """(samples, amplitudes) on the joint's own row."""
+        """Return the torque per unit of each amplitude (samples, amplitudes)."""
         parts = [effect.columns(motion, arm)[:, 0] for effect in self.shaped(theta)]
         return np.hstack(parts) if len(parts) > 1 else parts[0]
 
     def slopes(self, motion: Motion, theta: Array, amplitudes: Array) -> Array | None:
-        """∂τ/∂θ (samples, numbers of θ) on the joint's own row; None where an effect does not say it."""
-        total, first = np.zeros((len(self.places), len(motion.dq))), 0
-        for k, effect in enumerate(self.shaped(theta)):
-            count = self._counts[k]
-            own = [i for i, place in enumerate(self.places) if k in place.effects]
+        """Return ∂τ/∂θ (samples, numbers of θ); None where an effect has no closed form of it."""
+        total, parts = np.zeros((len(self.nonlinear), len(motion.dq))), self._split(amplitudes)
+        for k, (effect, part) in enumerate(zip(self.shaped(theta), parts, strict=True)):
+            own = [i for i, number in enumerate(self.nonlinear) if k in number.effects]
             if own:
-                part = shape_slopes(effect, motion, amplitudes[first:first + count])
-                if part is None:
+                slopes = shape_slopes(effect, motion, part)
+                if slopes is None:
                     return None
-                for i, column in zip(own, part.T, strict=True):
-                    total[i] += column
-            first += count
+                total[own] += slopes.T
         return total.T
 
-    @cached_property
-    def sloped(self) -> bool:
-        """Return whether every effect with non-linear numbers says its slopes."""
-        motion, _ = _trial()
-        return self.slopes(motion, np.mean(self.bounds, axis=0), np.ones(self.amplitudes)) is not None
+    def starts(self, motion: Motion, arm: ArmModel,
+               sharpness: float | None = None) -> Iterator[Array]:
+        """Return θ over the grids of its effects.
 
-    def starts(self, motion: Motion, arm: ArmModel, sharpness: float | None = None) -> Iterator[Array]:
-        """θ over the grids that the effects themselves offer; the shared width near `sharpness` where that is known."""
-        grids = [[effect] if {q.name for q in effect.parameters if q.shape} <= {_SHARED} else list(effect.shapes(motion, arm))
-                 for effect in self.effects]
-        shared = [place for place in self.places if place.name == _SHARED]
+        Args:
+            sharpness: the shared one [s/rad], where it is known.
+        """
+        grids = [[effect] if {q.name for q in effect.parameters if q.shape} <= {_SHARED}
+                 else list(effect.shapes(motion, arm)) for effect in self.effects]
+        shared = np.array([number.name == _SHARED for number in self.nonlinear], dtype=bool)
         widths = (sharpness,) if sharpness is not None else _SHARP
         for effects in itertools.product(*grids):
-            for width in widths if shared else (1.0,):
-                yield np.array([math.log(width if place.name == _SHARED else getattr(effects[place.effects[0]], place.name))
-                                for place in self.places])
+            for width in widths if shared.any() else (1.0,):
+                yield np.where(shared, math.log(width), self.theta(effects))
 
     def values(self, theta: Array, amplitudes: Array) -> tuple[dict[str, float], ...]:
-        """Every parameter of every effect, by name."""
-        found, first = [], 0
-        for effect, count in zip(self.shaped(theta), self._counts, strict=True):
-            found.append(effect.values(amplitudes[first:first + count]))
-            first += count
-        return tuple(found)
+        """Return the parameters of every effect, by name."""
+        return tuple(effect.values(own) for effect, own
+                     in zip(self.shaped(theta), self._split(amplitudes), strict=True))
 
-    def named(self, theta: Array, amplitudes: Array) -> tuple[list[tuple[Effect, Quantity]], Array]:
-        """Every parameter of every effect and its value; the shared width once."""
-        names: list[tuple[Effect, Quantity]] = []
-        numbers: list[float] = []
-        for effect, values in zip(self.effects, self.values(theta, amplitudes), strict=True):
-            for quantity in effect.parameters:
-                if quantity.name != _SHARED or all(q.name != _SHARED for _, q in names):
-                    names.append((effect, quantity))
-                    numbers.append(values[quantity.name])
-        return names, np.array(numbers)
+    def numbers(self, theta: Array, amplitudes: Array) -> dict[tuple[Effect, Quantity], float]:
+        """Return the parameters of all effects; the shared sharpness once."""
+        numbers: dict[tuple[Effect, Quantity], float] = {}
+        for effect, own in zip(self.effects, self.values(theta, amplitudes), strict=True):
+            for q in effect.parameters:
+                if q.name != _SHARED or all(known.name != _SHARED for _, known in numbers):
+                    numbers[effect, q] = own[q.name]
+        return numbers
 
     def curve(self, speed: Array, arm: ArmModel, theta: Array, amplitudes: Array) -> Array:
-        """Torque (samples,) [N m] against speed alone."""
+        """Return the torque against speed alone (samples,) [N m]."""
         total = np.zeros(len(speed))
-        for effect, values in zip(self.shaped(theta), self.values(theta, amplitudes), strict=True):
-            total += effect.curve(speed, arm, values)
+        for effect, own in zip(self.shaped(theta), self.values(theta, amplitudes), strict=True):
+            total += effect.curve(speed, arm, own)
         return total
 
 
-def _trial() -> tuple[Motion, OneJoint]:
-    """A motion and a joint to learn by what a law depends on."""
-    t = np.linspace(0.0, 1.0, 40)[:, None]
-    arm = OneJoint(RobotDescription("trial", (0.0, 0.0, -9.81), "dh", (Joint("joint"),)), 1.0, (2.0, 1.0))
-    return Motion(t[:, 0], np.sin(7.0 * t + t**2), 7.0 * np.cos(7.0 * t), -49.0 * np.sin(7.0 * t)), arm
-
-
-_BASE = ("coulomb", "viscous")
-
-# In the order of their size. Each is Coulomb and viscous friction and one cause more, but the first two and eq. (10).
+# In the order of their size. Each is Coulomb and viscous friction and one cause more, but the first
+# two and eq. (10).
 LADDER = (
     Law("viscous", ("viscous",)),
     Law("coulomb", ("coulomb",)),
-    Law("coulomb+viscous", _BASE),
-    *(Law(name, (*_BASE, name)) for name in (
-        "torque_offset", "quadratic_drag", "load_friction", "presliding", "stribeck", "concave_friction",
-        "asymmetric_friction", "position_friction")),
+    Law("coulomb+viscous", ("coulomb", "viscous")),
+    *(Law(name, ("coulomb", "viscous", name)) for name in (
+        "torque_offset", "quadratic_drag", "load_friction", "presliding", "stribeck",
+        "concave_friction", "asymmetric_friction", "position_friction")),
     Law("three_sigmoid", ("three_sigmoid",)),
 )
 
 
-def law_named(name: str) -> Law | None:
-    """A law of the ladder, or several joined by "+" beyond the first: "stribeck+asymmetric_friction"."""
-    if known := next((law for law in LADDER if law.name == name), None):
-        return known
-    first, *more = name.split("+")
-    law = law_named(first) if more else None
-    return None if law is None else with_further(law, *more)
+def law_named(name: str) -> Law:
+    """Return a law of the ladder, or one with further causes: "stribeck+asymmetric_friction".
+
+    Raises:
+        KeyError: no law of the ladder has that name, or its part before the first "+".
+    """
+    laws = {law.name: law for law in LADDER}
+    if name in laws:
+        return laws[name]
+    first, *further = name.split("+")
+    return with_further(laws[first], *further)
 
 
 def with_further(law: Law, *causes: str) -> Law:
-    """`law` with more causes beside it."""
+    """Return `law` with more causes."""
     return Law("+".join((law.name, *causes)), (*law.members, *causes))

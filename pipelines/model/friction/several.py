@@ -1,37 +1,32 @@
-"""Friction of joints that were never driven alone: from excitation logs, law by law, together with the base parameters.
+"""Fit friction of joints that were never driven alone, together with the base parameters.
 
-Of the equations τ_j = Y_j p + friction_j of one joint, Y_j p is linear and friction is linear but for a few numbers: variable
-projection solves for those with p as it pleases that row. It is done joint by joint, for p ties the rows together and the few
-numbers do not; then one fit of all rows, with every law's shape given, finds p and the amplitudes of all joints.
+Of the equations τ_j = Y_j p + friction_j of one joint, Y_j p is linear and friction is linear but
+for a few numbers: variable projection solves for those with p as it pleases that row. It is done
+joint by joint, for p ties the rows together and the few numbers do not; then one fit of all rows,
+with every law's shape given, finds p and the amplitudes of all joints.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.fit.varpro import Separable
 from pipelines.model.estimation.logs import Fitted, Motions, Recipe, equations_of, fit_logs, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
-from pipelines.model.estimation.regression import Columns, LogEquations
-from pipelines.model.friction.equations import Columned, Predicted
-from pipelines.model.friction.ladder import Judge, Ladder, climb
-from pipelines.model.friction.law_fit import LawFit
-from pipelines.model.friction.laws import LADDER, Law
-from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.ripple import Ripple, ripple_of
+from pipelines.model.estimation.regression import Columns as RigidColumns
+from pipelines.model.estimation.regression import LogEquations
+from pipelines.model.friction.fit import Columns, Equations
+from pipelines.model.friction.laws import LADDER, Law, OneJoint
+from pipelines.model.friction.model_selection import Ladder, climb
+from pipelines.model.friction.ripple import Ripple, Wave, ripple_of
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.filters import LowPass, centre_samples, zero_phase
 
 __all__ = ["RowEquations", "SeveralFit", "fit_several"]
-
-
-def _alone(motion: Motion, j: int) -> Motion:
-    return Motion(motion.t, motion.q[:, [j]], motion.dq[:, [j]], motion.ddq[:, [j]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,107 +37,59 @@ class _Run:
     held: bool
     low_pass: LowPass | None
     rows: npt.NDArray[np.intp]  # samples of the run, after centring
-    scale: float
 
     def conditioned(self, columns: Array) -> Array:
         x = centre_samples(columns) if self.held else columns
-        return self.scale * (x if self.low_pass is None else zero_phase(x, self.low_pass))[self.rows]
+        return (x if self.low_pass is None else zero_phase(x, self.low_pass))[self.rows]
 
 
 def _runs_of(log: LogEquations, j: int) -> list[_Run]:
-    """The runs of `log`, its rows found by the times that its equations have."""
-    times, found = log.times(), []
-    motion, good = log.found.motion, log.found.good
+    """Return the runs of `log`, their rows found by the times that its equations have."""
+    times, motion, runs = log.times(), log.found.motion, []
     for run in log.runs:
-        rows = good.kept[run]
+        rows = log.found.good.kept[run]
         t = motion.t[rows]
         known = np.isfinite(motion.q[rows, j] + motion.dq[rows, j] + motion.ddq[rows, j])
         at = np.arange(len(t))
-        q, dq, ddq = (np.interp(at, at[known], x[rows, j][known])[:, None] for x in (motion.q, motion.dq, motion.ddq))
+        states = (np.interp(at, at[known], x[rows, j][known])[:, None]
+                  for x in (motion.q, motion.dq, motion.ddq))
         own = times[(times >= t[0]) & (times <= t[-1])]
-        found.append(_Run(Motion(t, q, dq, ddq), log.held, log.conditioning.low_pass,
-                          np.searchsorted(t, own) - int(log.held), float(np.sqrt(log.repeats))))
-    return found
+        runs.append(_Run(Motion(t, *states), log.held, log.conditioning.low_pass,
+                         np.searchsorted(t, own) - int(log.held)))
+    return runs
 
 
-@dataclass(frozen=True, eq=False)
-class _Row:
-    """What is made once of one joint's rows, however many of them are looked at."""
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RowEquations(Equations):
+    """One joint's rows of several logs, conditioned as the rigid body's columns are."""
 
-    logs: tuple[LogEquations, ...]  # with the rigid body's columns
-    joint: int  # from 0
+    runs: tuple[_Run, ...]
 
-    @cached_property
-    def blocks(self) -> tuple[Array, Array]:
-        """Columns of the rigid body that act on this row, and torque."""
-        fixed, y = [], []
-        for log in self.logs:
-            for block in log:
-                fixed.append(np.array(block.values[self.joint].T))
-                y.append(np.array(block.y[self.joint]))
-        return np.vstack(fixed), np.concatenate(y)
+    @classmethod
+    def of(cls, logs: Sequence[LogEquations], j: int) -> RowEquations:
+        """Return the rows of joint `j`, from 0; other joints load it without a bound."""
+        blocks = [(np.array(block.y[j]), np.array(block.values[j].T))
+                  for log in logs for block in log]
+        y, fixed = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
+        motion = max(logs, key=lambda log: len(log.found.motion.t)).found.motion
+        alone = Motion(motion.t, motion.q[:, [j]], motion.dq[:, [j]], motion.ddq[:, [j]])
+        return cls(y=y, fixed=fixed, parts=(np.arange(len(y)),), nodes=alone, largest=float("inf"),
+                   joint=OneJoint.of(logs[0].columns.body.robot, j + 1),
+                   runs=tuple(run for log in logs for run in _runs_of(log, j)))
 
-    @cached_property
-    def runs(self) -> tuple[_Run, ...]:
-        return tuple(run for log in self.logs for run in _runs_of(log, self.joint))
-
-
-@dataclass(frozen=True, eq=False)
-class RowEquations:
-    """One joint's rows of several logs."""
-
-    row: _Row
-    every: int = 1
-
-    @property
-    def y(self) -> Array:
-        return self.row.blocks[1][::self.every]
-
-    @property
-    def largest(self) -> float:
-        """Nothing bounds it: the other joints load this one as well [N m]."""
-        return float("inf")
-
-    @property
-    def fixed(self) -> Array:
-        return self.row.blocks[0][::self.every]
-
-    @property
-    def width(self) -> int:
-        return int(self.row.blocks[0].shape[1])
-
-    @property
-    def postures(self) -> tuple[tuple[float, ...], ...]:
-        return ((),)
-
-    @cached_property
-    def nodes(self) -> Motion:
-        longest = max(self.row.logs, key=lambda log: len(log.found.motion.t))
-        return _alone(longest.found.motion, self.row.joint)
+    def thinned(self, rows: int) -> Self:
+        """Return about `rows` of all rows, as views."""
+        every = max(1, len(self.y) // rows)
+        return replace(self, every=every, y=self.y[::every], fixed=self.fixed[::every])
 
     def arms(self, beta: Array | None = None) -> tuple[OneJoint, ...]:
         del beta  # laws that ask for the load are not tried here
-        return (OneJoint.of(self.row.logs[0].columns.body.robot, self.row.joint + 1),)
+        return (self.joint,)
 
-    def build(self, law: Columned, arms: Sequence[OneJoint], theta: Array) -> Array:
-        """The law's columns (rows, amplitudes), centred, filtered and thinned out as the body's were."""
-        return np.vstack([run.conditioned(law.columns(run.motion, arms[0], theta)) for run in self.row.runs])[::self.every]
-
-    def problem(self, law: Law, arms: Sequence[OneJoint]) -> Separable:
-        lower, upper = law.bounds
-        return Separable(self.y, self.fixed, lambda theta: self.build(law, arms, theta), lower, upper)
-
-    def thinned(self, rows: int) -> RowEquations:
-        return replace(self, every=max(1, len(self.y) // rows))
-
-    @property
-    def rows(self) -> npt.NDArray[np.intp]:
-        """Which of all rows these are."""
-        return np.arange(0, len(self.row.blocks[1]), self.every)
-
-    def predicted(self, fit: LawFit) -> Predicted:
-        law = self.build(fit.law, self.arms(), fit.theta) @ fit.amplitudes
-        return Predicted(self.y, self.fixed @ fit.found.beta[:self.width] + law)
+    def means(self, columns: Columns, arms: Sequence[OneJoint], pointwise: bool = True) -> Array:
+        del pointwise  # the low-pass needs all samples
+        parts = [run.conditioned(columns(run.motion, arms[0])) for run in self.runs]
+        return np.vstack(parts)[self.rows]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,25 +99,34 @@ class SeveralFit:
     ladders: tuple[Ladder, ...]
     fitted: Fitted
     ripples: tuple[Ripple | None, ...]
-    beside_ripples: Fitted | None  # the same fit with every ripple known; None where there is none
+    beside_ripples: Fitted | None  # the same fit with every ripple known; None without any
 
 
-def fit_several(identify: Motions, validate: Motions, recipe: Recipe, law: Law | None = None) -> SeveralFit:
-    """Choose a law for every joint, or take `law`, and fit its amplitudes together with the base parameters.
+def fit_several(identify: Motions, validate: Motions, recipe: Recipe,
+                law: Law | None = None) -> SeveralFit:
+    """Choose a law for every joint, or take `law`, and fit amplitudes with the base parameters.
 
-    Laws with memory or load are not tried: a row of a moving arm does not show what its joint carries before all is fitted.
+    Laws with memory or load are not tried: a row of a moving arm does not show what its joint
+    carries before all is fitted.
     """
     robot = identify[0][0].robot
     columns = nominal_columns(robot, friction=False, offset=False)
     recipe = with_cutoff(recipe, identify)
-    rows, others = (tuple(equations_of(part, recipe, columns)) if part else () for part in (identify, validate))
-    laws = (law,) if law is not None else tuple(one for one in LADDER if one.pointwise and not one.sees_load)
-    own = [RowEquations(_Row(rows, j)) for j in range(robot.n_joints)]
-    ladders = tuple(climb(Judge(one, RowEquations(_Row(others, j)) if others else None), laws) for j, one in enumerate(own))
-    placed = [replace(effect, joint=j + 1) for j, ladder in enumerate(ladders)
-              for effect in ladder.chosen.fit.law.shaped(ladder.chosen.fit.theta)]
-    everything = Columns(columns.body, columns.kept, (*placed, *columns.laws), columns.arm)
-    ripples = tuple(ripple_of(one, ladder.chosen.fit) for one, ladder in zip(own, ladders, strict=True))
-    waves = tuple(wave for j, ripple in enumerate(ripples) if ripple is not None for wave in ripple.waves.alone(j + 1))
-    beside = fit_logs(identify, replace(everything, laws=(*everything.laws, *waves)), recipe) if waves else None
-    return SeveralFit(ladders, fit_logs(identify, everything, recipe), ripples, beside)
+    rows = equations_of(identify, recipe, columns)
+    others = equations_of(validate, recipe, columns) if validate else None
+    laws = (law,) if law is not None else tuple(one for one in LADDER
+                                                if one.pointwise and not one.sees_load)
+    own = [RowEquations.of(rows, j) for j in range(robot.n_joints)]
+    ladders = tuple(climb(one, None if others is None else RowEquations.of(others, j), laws)
+                    for j, one in enumerate(own))
+    fits = [ladder.chosen.fit for ladder in ladders]
+    shaped = [replace(effect, joint=j + 1) for j, fit in enumerate(fits)
+              for effect in fit.law.shaped(fit.theta)]
+    whole = RigidColumns(columns.body, columns.kept, (*shaped, *columns.laws), columns.arm)
+    ripples = tuple(ripple_of(one, fit) for one, fit in zip(own, fits, strict=True))
+    waves = [Wave(joint=j + 1, order=order) for j, ripple in enumerate(ripples)
+             if ripple is not None for order in ripple.orders]
+    known = None
+    if waves:
+        known = fit_logs(identify, replace(whole, laws=(*whole.laws, *waves)), recipe)
+    return SeveralFit(ladders, fit_logs(identify, whole, recipe), ripples, known)

@@ -1,53 +1,84 @@
-"""Find the rows in which the joint slides: where friction is a function of its speed.
+"""Find the rows in which the joint slides, and whether its friction changes in time.
 
-A joint at rest, or one that has turned back and bends its contacts, carries any torque up to the break-away torque: an
-inequality |τ - load| ≤ τ_b, not a value of the sliding law (Karnopp 1985; Armstrong-Hélouvry et al. 1994, Section 2). Each row
-is ordered by its *travel*: how far the joint has moved one way since its last rest or reversal, and how far it will until
-the next, the lesser of the two. A rest is a speed that its own standard deviation does not tell from zero, so that the
-encoder decides. From the longest travel down, a further class of travel is taken in as long as a free curve
+A joint at rest, or one that has turned back and bends its contacts, carries any torque up to the
+break-away torque: an inequality |τ - load| ≤ τ_b, not a value of the sliding law (Karnopp 1985;
+Armstrong-Hélouvry et al. 1994, Section 2). Each row is ordered by its *travel*: how far the joint
+has moved one way since its last rest or reversal, and how far it will until the next, the lesser of
+the two. A rest is a speed that its own standard deviation does not tell from zero, so that the
+encoder decides. From the longest travel down, a further class of travel is taken in as long as a
+free curve
 
-    τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed, each way apart
+    τ̄ = J (dq(b) - dq(a))/T + gravity + f(v),    f piecewise straight over classes of speed
 
-leaves no more of it than of the first rows, or no more than a law is good for; f may change slowly in time, or at an instant
-that explains a class which does
-not follow otherwise. No law is assumed.
+leaves no more of it than of the first rows, or no more than a law is good for. No law is assumed.
+
+Friction that changes in time is τ_f(v, t) = f(v) + α c(t) g(v), with g = f, v or sign v. c(t) is a
+trend 1 - exp(-(t - t0)/T) that begins anew in every log, as a joint warms up, or a step at one
+instant. Both are tried on rows that slide, with the same free curve: what a curve can hold is no
+drift. The course that leaves least must predict blocks of time that were held out better than no
+change does: logarithms of the ratio of their squared errors, in closed form by leverage, against
+draws of their signs (fit/flips.py).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.friction.drift import DriftConfig, orthonormal, step_row
-from pipelines.model.friction.equations import LawEquations
-from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.weak_form import Stretch
+from pipelines.fit.bounded import least_between
+from pipelines.fit.flips import by_flips
+from pipelines.fit.varpro import held_out
+from pipelines.model.friction.fit import LawEquations
+from pipelines.model.friction.laws import OneJoint
+from pipelines.model.friction.model_selection import no_worse
+from pipelines.model.friction.weak_form import Course, Mask, Stretch, blocks_of_time
 from pipelines.model.rigid.body import Array
 
-__all__ = ["Sliding", "SlidingConfig", "free_curve", "left_out", "sliding_rows"]
+__all__ = ["DriftConfig", "Sliding", "SlidingConfig", "drift_of", "left_out", "sliding_rows"]
 
-Mask = npt.NDArray[np.bool_]
+_FINE = 1e-2  # of the logarithm of a time constant
+_RANK = 1e-7  # singular values of unit columns below it: two columns that are one
 
 
 @dataclass(frozen=True)
 class SlidingConfig:
-    """Numbers that decide which rows slide; judged on seeds never seen before by benchmarks.friction_nuisances."""
+    """Limits of sliding; judged on seeds never seen before by benchmarks.friction_nuisances."""
 
     rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
-    worse: float = 4.0  # median square of a class over that of the first rows: 3 std of the logarithm of the median square of
+    # Median square of a class over that of the first rows: 3 std of the logarithm of that of
     # 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
-    good: float = 0.03  # of friction: what a law is good for (DriftConfig.least); with `margin`, its fourth power, 1e-6, remains
+    worse: float = 4.0
+    good: float = 0.03  # of friction: what a law is good for; `margin` leaves its fourth power
     rows: int = 3  # for every column of the free curve, that the first class has at least
-    margin: float = 4.0  # times the travel from which rows follow the curve: bristles straighten as exp(-travel) (Dahl 1968), 2 %
+    margin: float = 4.0  # times the travel: bristles straighten as exp(-travel) (Dahl 1968), 2 %
     classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
     decades: int = 4  # of speed; slower rows are one class
-    course: int = 8  # knots of a change of friction in time: what drifts still is a function of speed
+    course: int = 8  # knots of friction in time: what drifts still is a function of speed
     halving: float = 2.0  # of travel, from class to class
     windows: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0, 16.0)  # times the shortest, tried in turn
-    attenuation: float = 2e-3  # noise variance of the acceleration over its own: the relative bias of the inertia
+    attenuation: float = 2e-3  # noise of the acceleration over itself (variance): bias of inertia
+
+
+@dataclass(frozen=True)
+class DriftConfig:
+    """Limits of friction that drifts."""
+
+    chance: float = 1e-3  # to gain as much in blocks held out without a drift: none in 100 joints
+    block: float = 0.5  # [s] in which errors depend; .1 s apart they do by .15 (10 joints, one .28)
+    fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
+    rows: int = 3  # for every other column: fewer leave no residual to judge by
+    ends: float = 0.08  # of all rows, that lie before and after a step
+    times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)  # over the duration; 5: straight
+    least: float = 0.03  # of friction: a smaller change is within what a law is good for
+    sure: float = 2.0  # std beyond which a larger change is excluded: two-sided .05
+    rounds: int = 4  # of scanning for a course and fitting the curve that changes
+
+
+_CONFIG, _DRIFT = SlidingConfig(), DriftConfig()
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,138 +87,307 @@ class Sliding:
 
     slides: Mask  # (rows,)
     resting: Mask  # (rows,) at rest throughout
-    travel: Array  # (rows,) [rad] since the last rest or reversal, or until the next
     distance: float  # [rad] of travel from which rows slide
-    attenuation: float  # noise of the acceleration over acceleration (variance), outside all other columns
+    attenuation: float  # noise over acceleration (variances), outside all other columns
 
 
-def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint, config: SlidingConfig) -> Sliding:
-    """Order rows by travel and take them in while friction is a function of speed."""
+def sliding_rows(stretches: Sequence[Stretch], joint: OneJoint) -> Sliding:
+    """Order rows by travel and take them in while friction is a function of speed.
+
+    Friction may change slowly in time, or at an instant that explains a class which does not follow
+    otherwise.
+    """
     equations = LawEquations.of(stretches, joint)
-    travel, rests = (np.concatenate([of(stretch, config)[stretch.kept] for stretch in stretches]) for of in (_travel, _rests))
+    each = [_travel(stretch) for stretch in stretches]
+    travel, rests = (np.concatenate(parts) for parts in zip(*each, strict=True))
     speed = np.concatenate([stretch.middle[1] for stretch in stretches])
-    rigid, steady = equations.fixed.shape[1], np.hstack([equations.fixed, free_curve(speed, config)])
-    columns = np.hstack([steady, _free_course(speed, config)])
+    y, rigid = equations.y, equations.fixed.shape[1]
+    steady = np.hstack([equations.fixed, _free_curve(speed)])
+    columns = np.hstack([steady, _free_course(speed)])
     moving = travel > 0.0
     if not moving.any():
-        return Sliding(moving, rests, travel, 0.0, np.inf)
+        return Sliding(moving, rests, 0.0, np.inf)
     reach = start = float(np.median(travel[moving]))
     slides = travel >= reach
-    while slides.sum() < min(config.rows * np.any(columns[slides] != 0.0, axis=0).sum(), moving.sum()):
-        reach = start = reach / config.halving
+    while slides.sum() < min(_CONFIG.rows * np.any(columns[slides] != 0.0, axis=0).sum(),
+                             moving.sum()):
+        reach = start = reach / _CONFIG.halving
         slides = moving & (travel >= reach)
-    noise = _noise(columns[slides], equations.y[slides])
+    noise = _noise(columns[slides], y[slides])
     while reach > 0.0:
-        lower = reach / config.halving if (moving & (travel < reach)).any() else 0.0
+        lower = reach / _CONFIG.halving if (moving & (travel < reach)).any() else 0.0
         wider = moving & (travel >= lower)
         more = wider & ~slides
         if more.any():
-            if not _follows(columns[wider], rigid, equations.y[wider], more[wider], noise, config):
-                columns = np.hstack([columns, _step(columns, equations.y, speed, wider)])
-                if not _follows(columns[wider], rigid, equations.y[wider], more[wider], noise, config):
+            if not _follows(columns[wider], rigid, y[wider], more[wider], noise):
+                columns = np.hstack([columns, _late_friction(columns, y, speed, wider)])
+                if not _follows(columns[wider], rigid, y[wider], more[wider], noise):
                     break
             slides = wider
         reach = lower
-    reach = min(config.margin * reach, start)
+    reach = min(_CONFIG.margin * reach, start)
     slides &= travel >= reach
-    return Sliding(slides, rests, travel, reach,
-                   _attenuation(stretches, steady[slides], slides, len(equations.postures)))
+    attenuation = _attenuation(stretches, steady[slides], slides, len(equations.postures))
+    return Sliding(slides, rests, reach, attenuation)
 
 
 def _noise(columns: Array, y: Array) -> float:
-    """Return the median square [N² m²] that least squares leaves, over the share of its degrees of freedom."""
+    """Return the median square that least squares leaves by degree of freedom [N² m²]."""
     used = np.any(columns != 0.0, axis=0).sum() / len(y)
-    return float(np.median(np.square(_least_squares(columns, y)[1])) / max(1.0 - used, 1.0 / len(y)))
+    return float(np.median(np.square(_Fit(columns, y).residual)) / max(1.0 - used, 1.0 / len(y)))
 
 
-def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float, config: SlidingConfig) -> bool:
-    """Return whether least squares fits `more` of the rows to within their `noise`, or as well as any law does.
+def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float) -> bool:
+    """Return whether least squares fits `more` of the rows to their noise, or as well as any law.
 
     Args:
         columns: (rows, columns) the first `rigid` of them are no friction.
-        noise: [N² m²] median square of the rows with the longest travel. It stays: rows that fit a little worse, taken in,
-            would let in what fits worse again.
+        noise: [N² m²] median square of the rows with the longest travel. It stays: rows that fit a
+            little worse, taken in, would let in what fits worse again.
     """
-    beta, residual = _least_squares(columns, y)
-    friction = np.square(columns[:, rigid:] @ beta[rigid:])
-    most = max(config.worse * noise, config.good**2 * float(np.median(friction)))
-    return float(np.median(np.square(residual[more]))) <= most
+    fit = _Fit(columns, y)
+    friction = np.square(columns[:, rigid:] @ fit.beta[rigid:])
+    most = max(_CONFIG.worse * noise, _CONFIG.good**2 * float(np.median(friction)))
+    return float(np.median(np.square(fit.residual[more]))) <= most
 
 
-def _step(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
-    """Columns of Coulomb and viscous friction from the row on that explains most of `rows` (all rows, 2)."""
-    basis = orthonormal(columns[rows])
-    left = y[rows] - basis @ (basis.T @ y[rows])
-    first = np.flatnonzero(rows)[step_row(np.sign(speed[rows]), basis, left, DriftConfig())]
-    return np.where(np.arange(len(y))[:, None] >= first, np.stack([np.sign(speed), speed], axis=1), 0.0)
+def _late_friction(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
+    """Return Coulomb and viscous friction after the step that explains most of `rows`.
+
+    Zero before it (all rows, 2).
+    """
+    row = _step_row(np.sign(speed[rows]), _Fit(columns[rows], y[rows]))
+    first = np.flatnonzero(rows)[row]
+    late = np.arange(len(y))[:, None] >= first
+    return np.where(late, np.stack([np.sign(speed), speed], axis=1), 0.0)
 
 
 def left_out(stretches: Sequence[Stretch], slides: Mask) -> tuple[Stretch, ...]:
-    """The stretches without those of their usable rows that do not slide."""
+    """Return the stretches without those of their usable rows that do not slide."""
     parts = np.split(slides, np.cumsum([stretch.usable.sum() for stretch in stretches])[:-1])
     return tuple(stretch.only(part) for stretch, part in zip(stretches, parts, strict=True))
 
 
-def _travel(stretch: Stretch, config: SlidingConfig) -> Array:
-    """(windows,) the least travel within each window; zero where the joint rests or turns back."""
+def _travel(stretch: Stretch) -> tuple[Array, Mask]:
+    """Return the least travel in each row [rad], and whether the joint rests throughout (rows,).
+
+    Travel is zero where the joint rests or turns back.
+    """
     side = np.sign(stretch.dq)
-    rests = np.abs(stretch.dq) <= config.rest * stretch.speed_std
+    rests = np.abs(stretch.dq) <= _CONFIG.rest * stretch.speed_std
     path = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(stretch.q)))])
     turns = np.concatenate([[True], side[1:] != side[:-1]])
     since = path - np.maximum.accumulate(np.where(rests | turns, path, -np.inf))
     until = np.where(rests | np.append(turns[1:], True), path, np.inf)
     travel = np.minimum(since, np.minimum.accumulate(until[::-1])[::-1] - path)
-    edges = stretch.edges
-    within = np.minimum.reduceat(travel, edges)[:len(edges) - 1]
-    return np.asarray(np.minimum(within, travel[edges[1:]]))
+    edges, windows = stretch.edges, len(stretch.edges) - 1
+    least = np.minimum(np.minimum.reduceat(travel, edges)[:windows], travel[edges[1:]])
+    throughout = np.logical_and.reduceat(rests, edges)[:windows]
+    return least[stretch.kept], throughout[stretch.kept]
 
 
-def _rests(stretch: Stretch, config: SlidingConfig) -> Mask:
-    """Return a mask (windows,): the speed does not differ from zero throughout."""
-    moves = np.abs(stretch.dq) > config.rest * stretch.speed_std
-    return ~np.logical_or.reduceat(moves, stretch.edges)[:len(stretch.edges) - 1]
-
-
-def free_curve(speed: Array, config: SlidingConfig) -> Array:
-    """Columns of a curve that runs straight in every class of speed, each way apart (rows, columns)."""
+def _free_curve(speed: Array) -> Array:
+    """Return columns of a curve that runs straight in every class of speed, each way apart."""
     fastest = max(float(np.abs(speed).max()), 1e-12)
-    lowest = -config.classes * config.decades
-    level = np.floor(config.classes * np.log10(np.maximum(np.abs(speed) / fastest, 1e-12)) + 1e-9)
-    code = 2 * np.maximum(level, lowest) + (speed < 0.0)
+    size = np.maximum(np.abs(speed) / fastest, 1e-12)
+    level = np.floor(_CONFIG.classes * np.log10(size) + 1e-9)
+    code = 2 * np.maximum(level, -_CONFIG.classes * _CONFIG.decades) + (speed < 0.0)
     columns = []
-    for one in np.unique(code):
-        here = code == one
+    for here in (code == each for each in np.unique(code)):
         columns += [here.astype(np.float64), np.where(here, speed - speed[here].mean(), 0.0)]
     return np.stack(columns, axis=1)
 
 
-def _free_course(speed: Array, config: SlidingConfig) -> Array:
-    """Columns of Coulomb and viscous friction that may change in time: hat functions over the rows, in their order."""
-    place = np.linspace(0.0, config.course - 1.0, len(speed))
-    hats = np.maximum(1.0 - np.abs(place[:, None] - np.arange(1, config.course)), 0.0)
+def _free_course(speed: Array) -> Array:
+    """Return columns of Coulomb and viscous friction that may change in time.
+
+    Hat functions over the rows, in their order.
+    """
+    place = np.linspace(0.0, _CONFIG.course - 1.0, len(speed))
+    hats = np.maximum(1.0 - np.abs(place[:, None] - np.arange(1, _CONFIG.course)), 0.0)
     return np.hstack([hats * np.sign(speed)[:, None], hats * speed[:, None]])
 
 
-def _least_squares(columns: Array, y: Array) -> tuple[Array, Array]:
-    """Return coefficients (columns,) and residual (rows,)."""
-    scale = np.linalg.norm(columns, axis=0)
-    scale = np.where(scale > 0.0, scale, 1.0)
-    beta = np.asarray(np.linalg.lstsq(columns / scale, y, rcond=1e-9)[0] / scale)
-    return beta, y - columns @ beta
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Least squares of y (rows,) over columns (rows, columns) of which some may be one."""
+
+    columns: Array
+    y: Array
+
+    @cached_property
+    def basis(self) -> Array:
+        """Return orthonormal columns of the same space."""
+        scale = np.linalg.norm(self.columns, axis=0)
+        unit = self.columns[:, scale > 0.0] / scale[scale > 0.0]
+        left, size, _ = np.linalg.svd(unit, full_matrices=False)
+        return np.asarray(left[:, size > _RANK * size.max(initial=0.0)])
+
+    @cached_property
+    def beta(self) -> Array:
+        """Return the coefficients (columns,)."""
+        scale = np.linalg.norm(self.columns, axis=0)
+        scale = np.where(scale > 0.0, scale, 1.0)
+        return np.asarray(np.linalg.lstsq(self.columns / scale, self.y, rcond=_RANK)[0] / scale)
+
+    @cached_property
+    def residual(self) -> Array:
+        return self.outside(self.y)
+
+    def outside(self, column: Array) -> Array:
+        """Return what of a column (rows,) lies outside."""
+        return np.asarray(column - self.basis @ (self.basis.T @ column))
 
 
-def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask, postures: int) -> float:
-    """Variance of the noise of (dq(b) - dq(a))/T over what of that column lies outside the others.
+def _attenuation(stretches: Sequence[Stretch], columns: Array, slides: Mask,
+                 postures: int) -> float:
+    """Return the noise variance of (dq(b) - dq(a))/T over that of what no other column holds.
 
     Errors in variables: least squares takes J (1 - that share) for J (Fuller 1987, Section 1.1.1).
     """
-    noise = np.concatenate([np.broadcast_to(2.0 * (stretch.speed_std / stretch.length[stretch.kept]) ** 2, stretch.rows)
+    noise = np.concatenate([2.0 * (stretch.speed_std / stretch.length[stretch.kept]) ** 2
                             for stretch in stretches])[slides]
-    width = stretches[0].rigid.shape[1]
-    shares = []
+    width, shares = stretches[0].rigid.shape[1], []
     for k in range(postures):
-        own = columns[:, width * k]
-        others = np.delete(columns, width * k, axis=1)
-        outside = _least_squares(others, own)[1]
+        own, others = columns[:, width * k], np.delete(columns, width * k, axis=1)
+        outside = _Fit(others, own).residual
         shares.append(float(noise[own != 0.0].sum()) / max(float(outside @ outside), 1e-300))
     return max(shares)
+
+
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Rows of stretches that slide, and all that is fitted with a drift."""
+
+    stretches: Sequence[Stretch]
+    speed: Array  # (rows,) [rad/s]
+    curve: Array  # (rows, columns) of a free curve of friction
+    steady: _Fit  # without a drift; the last columns are those of the curve
+    blocks: npt.NDArray[np.intp]  # (rows,) of time
+
+    def along(self, course: Course) -> Array:
+        """Return c(t) of every row (rows,)."""
+        return np.concatenate([course.at(part, stretch.middle[2] - stretch.t[0])
+                               for part, stretch in enumerate(self.stretches)])
+
+    def held_out(self, fit: _Fit) -> Array:
+        """Return Σ r² of every block as the other blocks predict it (blocks,)."""
+        rest = held_out(fit.basis, fit.residual, self.blocks)
+        return np.asarray(np.maximum(np.bincount(self.blocks, np.square(rest)), 1e-300))
+
+
+@dataclass(frozen=True, eq=False)
+class _Drift:
+    """The best course of one kind and form."""
+
+    course: Course
+    fit: _Fit  # the last column is c(t) g(v)
+    typical: float  # [N m] median of |g(v)|
+
+    @property
+    def size(self) -> float:
+        """Return by how much it changes friction [N m]."""
+        return abs(float(self.fit.beta[-1])) * self.typical
+
+
+def drift_of(stretches: Sequence[Stretch], joint: OneJoint) -> Course | None:
+    """Return the course of friction in time that rows show, or a trend not excluded.
+
+    Of those shown the first that is not measurably worse than the best: all friction by one share
+    comes before a part of it, and a trend before a step. Logs that visit every speed once, one
+    after the other, show a drift as a part of the friction curve: where rows show none, a trend of
+    all friction that they do not exclude, not named; None where they do. A course that costs a
+    number and gains nothing loses in blocks held out. A step may lie between any two rows.
+
+    Args:
+        stretches: they slide.
+    """
+    equations = LawEquations.of(stretches, joint)
+    speed = np.concatenate([stretch.middle[1] for stretch in stretches])
+    curve = _free_curve(speed)
+    rows = _Rows(stretches, speed, curve,
+                 _Fit(np.hstack([equations.fixed, curve]), equations.y),
+                 blocks_of_time(stretches, _DRIFT.block))
+    few = len(speed) < _DRIFT.rows * rows.steady.basis.shape[1]
+    if few or rows.blocks.max() + 1 < _DRIFT.fewest:
+        return None
+    drifts = [_best(kind, form, rows) for form in ("whole", "coulomb", "viscous")
+              for kind in ("trend", "step")]
+    best = min(drifts, key=lambda drift: float(drift.fit.residual @ drift.fit.residual))
+    gains = np.log(rows.held_out(rows.steady) / rows.held_out(best.fit))
+    whole = curve @ best.fit.beta[-1 - curve.shape[1]:-1]
+    least = _DRIFT.least * float(np.median(np.abs(whole)))
+    if best.size >= least and by_flips(gains) <= _DRIFT.chance:
+        return next(drift.course for drift in drifts
+                    if no_worse(drift.fit.residual, best.fit.residual))
+    trend = drifts[0]
+    most = trend.size + _DRIFT.sure * _deviation(trend, rows)
+    return replace(trend.course, named=False) if most > least else None
+
+
+def _best(kind: str, form: str, rows: _Rows) -> _Drift:
+    """Return the course of this kind and form that leaves least.
+
+    The curve that changes as a whole is itself fitted: scan, fit, scan again.
+    """
+    fit, shape = rows.steady, rows.speed if form == "viscous" else np.sign(rows.speed)
+    width, last = rows.curve.shape[1], fit.columns.shape[1]
+    for _ in range(_DRIFT.rounds if form == "whole" else 1):
+        if form == "whole":
+            shape = rows.curve @ fit.beta[last - width:last]
+        course = (_step if kind == "step" else _trend)(form, shape, rows)
+        own = rows.along(course) * shape
+        fit = _Fit(np.column_stack([rows.steady.columns, own]), fit.y)
+    return _Drift(course, fit, float(np.median(np.abs(shape))))
+
+
+def _deviation(drift: _Drift, rows: _Rows) -> float:
+    """Return the std of the size of a drift [N m], errors in a block dependent (White 1984)."""
+    outside = rows.steady.outside(drift.fit.columns[:, -1])
+    sums = np.bincount(rows.blocks, outside * drift.fit.residual)
+    return drift.typical * float(np.linalg.norm(sums)) / max(float(outside @ outside), 1e-300)
+
+
+def _trend(form: str, shape: Array, rows: _Rows) -> Course:
+    """Return the course of a trend with the time constant by which it explains most."""
+    duration = max(float(stretch.t[-1] - stretch.t[0]) for stretch in rows.stretches)
+
+    def course(logarithm: float) -> Course:
+        time = float(np.exp(logarithm)) * duration
+        return Course("trend", form, time, 0.5 * duration, duration)
+
+    def loss(logarithm: float) -> float:
+        outside = rows.steady.outside(rows.along(course(logarithm)) * shape)
+        gain = np.square(outside @ rows.steady.residual)
+        return -float(gain / max(float(outside @ outside), 1e-300))
+
+    times = np.log(_DRIFT.times)
+    k = int(np.argmin([loss(time) for time in times]))
+    low, high = float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)])
+    return course(least_between(loss, low, high, _FINE))
+
+
+def _step(form: str, shape: Array, rows: _Rows) -> Course:
+    """Return the course of a step at the instant between two rows from which it explains most."""
+    t = np.concatenate([stretch.middle[2] for stretch in rows.stretches])
+    log = np.repeat(np.arange(len(rows.stretches)), [stretch.rows for stretch in rows.stretches])
+    row = _step_row(shape, rows.steady)
+    before, here = int(log[row - 1]), int(log[row])
+    start = float(rows.stretches[here].t[0])
+    when = 0.5 * float(t[row - 1] + t[row]) - start if before == here else 0.0
+    return Course("step", form, when, 0.0, when, here)
+
+
+def _step_row(shape: Array, fit: _Fit) -> int:
+    """Return the row from which on `shape` (rows,) lowers Σ r² of `fit` most (Andrews 1993, sup F).
+
+    Its products with other columns are sums over the later rows. A step that lies within the other
+    columns, but for less than a row, is not shown by any.
+    """
+    products = shape[:, None] * np.column_stack([fit.residual, shape, fit.basis])
+    after, count = np.cumsum(products[::-1], axis=0)[::-1], len(shape)
+    outside = after[:, 1] - np.square(after[:, 2:]).sum(axis=1)
+    shown = outside > after[0, 1] / count
+    gain = np.where(shown, np.square(after[:, 0]) / np.where(shown, outside, 1.0), 0.0)
+    rows = np.arange(max(1, int(_DRIFT.ends * count)), int((1.0 - _DRIFT.ends) * count))
+    return int(rows[np.argmax(gain[rows])])

@@ -1,12 +1,17 @@
-"""Equations of one moving joint without its acceleration: what torque adds to its momentum, window by window.
+"""Equations of one moving joint without its acceleration: momentum that torque adds, by windows.
 
 Integrated over a window [a, b], eq. (11) of Kostić et al. 2004 reads
 
     J (dq(b) - dq(a)) + ∫ (c sin q + c' cos q + τ_f) dt = ∫ τ dt
 
-No acceleration has to be reconstructed, a held command is integrated exactly, and a sign change of friction, which smears
-an acceleration over the reach of every filter, is a kink of the speed at a known instant. Divided by its length, a row is a
-mean torque [N m]. The integrals are sums over nodes (nodes.py).
+No acceleration has to be reconstructed, a held command is integrated exactly, and a sign change of
+friction, which smears an acceleration over the reach of every filter, is a kink of the speed at a
+known instant. Divided by its length, a row is a mean torque [N m].
+
+The integrals are sums over nodes: one node a sample's interval; eight where speed passes zero in
+it, for friction jumps there; two for several samples whose speed keeps its sign and most of its
+size. Those two lie at the samples' mean speed ± its standard deviation, the rule of Gauss for a
+speed that runs straight, and right in the mean however it runs.
 """
 
 from __future__ import annotations
@@ -20,58 +25,85 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.friction.nodes import Nodes, lay_nodes
-from pipelines.model.friction.one_joint import gravity_acts, gravity_columns
-from pipelines.model.friction.sway import Sway, sway_columns
+from pipelines.model.friction.laws import gravity_acts, gravity_columns
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_jerk
 
-__all__ = ["Course", "Stretch", "Windows", "blocks_of_time", "moved", "stretches_of", "swaying"]
+__all__ = ["Course", "Mask", "Stretch", "Sway", "Windows", "blocks_of_time", "moved",
+           "stretches_of", "sway_columns", "swaying"]
 
-_MOTIONLESS = ("edges", "usable", "impulse", "length", "torque")
+Mask = npt.NDArray[np.bool_]
+
 _PART = 1e-3  # of a finite difference, relative
 _KINKED = 2  # order of a smoother for motion whose acceleration jumps
+_GAUSS = 0.5 / np.sqrt(3.0)  # of their time, from its middle: where two nodes lie
 
 
 @dataclass(frozen=True)
 class WeakFormConfig:
-    """Which samples and stretches make equations, and which joints move."""
+    """Limits of samples that make equations, of their nodes, and of joints that move."""
 
     vague: float = 2.0  # times the usual std of the speed: near ends and gaps; a choice
     sway: float = 10.0  # encoder steps: rounding moves a held joint by one
     fast: float = 3.0  # std of a speed: a slower one (rms) may be zero (two-sided .003)
     fewest: int = 10  # windows of a stretch that is worth using: a choice, not measured
     shortest: int = 4  # samples of a window: a choice, not measured
+    parts: int = 8  # nodes of an interval in which speed passes zero
+    near: float = 2.0  # changes of speed in a sample: nearer to zero its sign may turn over
+    little: float = 1e-4  # of the fastest speed: slower creep does not need its every sample
+    steady: float = 8.0  # times its std: a mean speed that keeps its sign and most of its size
+    coarsest: float = 1e-2  # [s] of the samples that two nodes replace
 
 
 _CONFIG = WeakFormConfig()
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
-    """Nodes, and the windows over which columns are averaged."""
+class Sway:
+    """A joint that is held and sways while another one is driven."""
 
-    nodes: Motion  # (nodes, 1)
-    share: Array  # (nodes,) time that a node stands for over the length of its window
-    first: npt.NDArray[np.intp]  # (windows,) first node of every window
-    kept: npt.NDArray[np.bool_]  # (windows,) whether it makes a row
+    lean: Array  # δ [rad] (samples,) from where it is held
+    speed: Array  # [rad/s] (samples,)
+    nearer: bool  # the base than the driven joint
 
-    def means(self, columns: Array) -> Array:
-        """Of columns (nodes, k): (rows, k)."""
-        return np.asarray(np.add.reduceat(columns * self.share[:, None], self.first, axis=0)[self.kept])
 
-    def some(self, every: int) -> Windows:
-        """Every so-manieth row, with its own nodes alone."""
-        chosen = np.flatnonzero(self.kept)[::every]
-        count = np.diff(np.append(self.first, len(self.share)))[chosen]
-        begin = np.concatenate([[0], np.cumsum(count)[:-1]])
-        index = np.repeat(self.first[chosen] - begin, count) + np.arange(count.sum())
-        motion = self.nodes
-        nodes = Motion(motion.t[index], motion.q[index], motion.dq[index], motion.ddq[index])
-        return Windows(nodes, self.share[index], begin, np.ones(len(chosen), dtype=bool))
+def sway_columns(t: Array, q: Array, dq: Array, sways: Sequence[Sway], revolute: bool) -> Array:
+    """Return what swaying joints do to the driven one, to first order in their sway δ.
+
+    A controller lets a held joint k lean by milliradians when joint j is driven. Row j of the arm's
+    equations then has, with q that of joint j and every number free,
+
+        (d0 + d1 sin q + d2 cos q) ddδ    D_jk with k nearer the base; beyond j it is d0 ddδ
+        (g1 sin q + g2 cos q) δ           weight that leans with k
+        m d/dt (δ dq)                     D_jj depends on the joints beyond j alone
+
+    Small as they are, they come with every torque of the driven joint: left out, they pass for
+    inertia. A prismatic joint has q itself in D_jk, and a weight that does not depend on q.
+
+    Args:
+        t, q, dq: (samples,) time, position and speed of the driven joint.
+
+    Returns:
+        Means over the step after each sample (samples, columns); the last row is zero.
+    """
+    if not sways:
+        return np.zeros((len(t), 0))
+    rate = 1.0 / np.diff(t)
+    middle = 0.5 * (q[1:] + q[:-1])
+    turn = [np.sin(middle), np.cos(middle)]
+    columns: list[Array] = []
+    for sway in sways:
+        push, lean = np.diff(sway.speed) * rate, 0.5 * (sway.lean[1:] + sway.lean[:-1])
+        columns.append(push)
+        if sway.nearer:
+            columns += [push * part for part in (turn if revolute else [middle])]
+        else:
+            columns.append(np.diff(sway.lean * dq) * rate)
+        columns += [lean * part for part in turn] if revolute else [lean]
+    return np.vstack([np.stack(columns, axis=1), np.zeros((1, len(columns)))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,42 +112,73 @@ class Course:
 
     kind: str  # "trend" | "step"
     form: str  # g: "whole", the curve of friction; "viscous", v; "coulomb", its sign
-    starts: tuple[float, ...]  # [s] first instant of every stretch
-    time: float  # [s] since the start: of a step when; of a trend its time constant
+    time: float  # [s] since the start of a stretch: of a step when; of a trend its time constant
     holds: float  # [s] since the start: where c is zero, of a trend
     until: float  # [s] duration of a trend's log; of a step when
     part: int = 0  # stretch of a step
     curve: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of friction
-    change: float = 0.0  # α of the fit before, of a trend: beside c g then stands α ∂c/∂(ln T) g, and T is fitted
+    change: float = 0.0  # α of a trend in the fit before: α ∂c/∂(ln T) g is a column, T fitted
     named: bool = True  # shown by the rows; else neither shown nor excluded
 
-    def at(self, part: int, t: Array) -> Array:
-        """c(t) in one of the stretches: it rises by one."""
-        since = t - self.starts[part]
-        if self.kind == "step":
-            return np.where(part > self.part, 1.0, np.where(part < self.part, 0.0, (since >= self.time) * 1.0))
-        return self._risen(since, self.time)
+    def at(self, part: int, since: Array) -> Array:
+        """Return c(t) in one of the stretches, `since` its start [s]: it rises by one."""
+        if self.kind == "trend":
+            return self._risen(since, self.time)
+        after = since >= self.time if part == self.part else np.full(len(since), part > self.part)
+        return after.astype(np.float64)
 
     def _risen(self, since: Array, time: float) -> Array:
-        """(exp(-h/T) - exp(-t/T)) / (1 - exp(-D/T))"""
-        return np.asarray((np.exp(-self.holds / time) - np.exp(-since / time)) / -np.expm1(-self.until / time))
+        """Return (exp(-h/T) - exp(-t/T)) / (1 - exp(-D/T))."""
+        rise = np.exp(-self.holds / time) - np.exp(-since / time)
+        return np.asarray(rise / -np.expm1(-self.until / time))
 
     def shape(self, v: Array) -> Array:
-        """g(v) [N m], [rad/s] or 1."""
+        """Return g(v) [N m], [rad/s] or 1."""
         if self.form == "viscous":
             return v
-        return np.sign(v) if self.form == "coulomb" or self.curve is None else np.interp(v, *self.curve)
+        if self.form == "coulomb" or self.curve is None:
+            return np.sign(v)
+        return np.interp(v, *self.curve)
 
     def columns(self, part: int, t: Array, dq: Array) -> Array:
-        """c(t) g(v), and α ∂c/∂(ln T) g, over the step after each sample (samples, 1 or 2); the last row is zero."""
-        middle = 0.5 * (t[1:] + t[:-1])
-        courses = [self.at(part, middle)]
+        """Return c(t) g(v), and α ∂c/∂(ln T) g, over the step after each sample.
+
+        (samples, 1 or 2); the last row is zero.
+        """
+        since = 0.5 * (t[1:] + t[:-1]) - t[0]
+        courses = [self.at(part, since)]
         if self.change != 0.0:
-            since = middle - self.starts[part]
             ends = [self._risen(since, self.time * (1.0 + side * _PART)) for side in (1.0, -1.0)]
             courses.append(self.change * (ends[0] - ends[1]) / (2.0 * _PART))
         value = np.stack(courses, axis=1) * self.shape(0.5 * (dq[1:] + dq[:-1]))[:, None]
         return np.vstack([value, np.zeros((1, len(courses)))])
+
+
+@dataclass(frozen=True, eq=False)
+class Windows:
+    """Nodes, and the windows over which columns are averaged."""
+
+    nodes: Motion  # (nodes, 1)
+    share: Array  # (nodes,) time of a node over the length of its window
+    first: npt.NDArray[np.intp]  # (windows,) first node of every window
+    kept: Mask  # (windows,) whether it makes a row
+
+    def means(self, columns: Array) -> Array:
+        """Return the mean of columns (nodes, k) in every row (rows, k)."""
+        sums = np.add.reduceat(columns * self.share[:, None], self.first, axis=0)
+        return np.asarray(sums[self.kept])
+
+    def thinned(self, every: int) -> Windows:
+        """Return every `every`-th row, with its own nodes alone."""
+        if every == 1:
+            return self
+        chosen = np.flatnonzero(self.kept)[::every]
+        count = np.diff(np.append(self.first, len(self.share)))[chosen]
+        begin = np.concatenate([[0], np.cumsum(count)[:-1]])
+        index = np.repeat(self.first[chosen] - begin, count) + np.arange(count.sum())
+        of = self.nodes
+        nodes = Motion(of.t[index], of.q[index], of.dq[index], of.ddq[index])
+        return Windows(nodes, self.share[index], begin, np.ones(len(chosen), dtype=bool))
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,36 +187,28 @@ class Stretch:
 
     name: str  # of the log
     t: Array  # [s] (samples,)
-    measured: Array  # [rad] (samples,) position as the encoder gave it, NaN where it is missing
-    tau: Array  # [N m] (samples,)
+    measured: Array  # [rad] (samples,) position by the encoder, NaN where it is missing
+    tau: Array  # [N m] (samples,) held until the next
     q: Array  # [rad] (samples,) reconstructed
     dq: Array  # [rad/s] (samples,)
-    spoilt: npt.NDArray[np.bool_]  # (samples,) no row may use it
-    held: bool  # the torque is a command held from sample to sample
+    spoilt: Mask  # (samples,) no row may use it
     window: int  # samples
     revolute: bool
     posture: tuple[float, ...]  # [rad] of the other joints
-    beside: tuple[Sway, ...] = ()  # joints that are held and give way
+    sways: tuple[Sway, ...] = ()
     speed_std: float = 0.0  # [rad/s] of the reconstructed speed
     weighs: bool = True  # gravity acts about the joint's axis
-    sticks: npt.NDArray[np.bool_] | None = None  # (windows,) the joint does not slide: no row of a sliding law
-
+    sticks: Mask | None = None  # (windows,) the joint does not slide: no row of a sliding law
     course: Course | None = None  # of friction that changes in time
-    lag: tuple[Array, Array] | None = None  # speeds [rad/s] and torques [N m] of the part of friction that lags behind its speed
-    untimed: bool = False  # the torque is measured: when within its step it acted is not known
-    part: int = 0  # which of its stretches this is
+    lag: tuple[Array, Array] | None = None  # speeds [rad/s], torques [N m] of friction that lags
+    untimed: bool = False  # the torque is measured: when in its step it acted is not known
+    part: int = 0  # number of the stretch
 
-    def only(self, rows: npt.NDArray[np.bool_]) -> Stretch:
-        """The same with some of its usable rows (usable rows,); itself as first made with all."""
+    def only(self, rows: Mask) -> Stretch:
+        """Return it with some of its usable rows (usable rows,), whichever it has now."""
         sticks = np.zeros(len(self.usable), dtype=bool)
         sticks[self.usable] = ~rows
         return replace(self, sticks=sticks if sticks.any() else None)
-
-    def moved(self, q: Array, dq: Array) -> Stretch:
-        """The same with a better motion; what does not depend on that is kept."""
-        other = replace(self, q=q, dq=dq)
-        other.__dict__.update({name: self.__dict__[name] for name in _MOTIONLESS if name in self.__dict__})
-        return other
 
     @property
     def rows(self) -> int:
@@ -161,43 +216,46 @@ class Stretch:
 
     @cached_property
     def edges(self) -> npt.NDArray[np.intp]:
-        """Samples at which windows begin and end."""
+        """Return the samples at which windows begin and end."""
         return np.arange(0, len(self.t), self.window)
 
     @cached_property
-    def usable(self) -> npt.NDArray[np.bool_]:
-        """(windows,) nothing in it is spoilt."""
+    def usable(self) -> Mask:
+        """Return whether nothing in a window is spoilt (windows,)."""
         bad = np.concatenate([[0], np.cumsum(self.spoilt)])
         return np.asarray(bad[self.edges[1:] + 1] == bad[self.edges[:-1]])
 
     @property
-    def kept(self) -> npt.NDArray[np.bool_]:
-        """(windows,) usable, and not left out as sticking."""
+    def kept(self) -> Mask:
+        """Return the windows that are usable, and not left out as sticking (windows,)."""
         return self.usable if self.sticks is None else self.usable & ~self.sticks
+
+    @property
+    def known_tau(self) -> Array:
+        """Return the torque (samples,) [N m], zero where it is missing."""
+        return np.where(np.isfinite(self.tau), self.tau, 0.0)
 
     @cached_property
     def impulse(self) -> Array:
-        """∫ τ dt from the first sample (samples,) [N m s]."""
-        tau = np.where(np.isfinite(self.tau), self.tau, 0.0)
-        each = tau[:-1] if self.held else 0.5 * (tau[1:] + tau[:-1])
-        return np.concatenate([[0.0], np.cumsum(each * np.diff(self.t))])
+        """Return ∫ τ dt from the first sample (samples,) [N m s]."""
+        return np.concatenate([[0.0], np.cumsum(self.known_tau[:-1] * np.diff(self.t))])
 
     @cached_property
     def length(self) -> Array:
-        """(windows,) [s]"""
+        """Return the length of the windows (windows,) [s]."""
         return np.diff(self.t[self.edges])
 
     @cached_property
     def torque(self) -> Array:
-        """Mean torque of every window that is kept (rows,) [N m]."""
+        """Return the mean torque of every window that is kept (rows,) [N m]."""
         return np.asarray((np.diff(self.impulse[self.edges]) / self.length)[self.kept])
 
     @cached_property
     def rigid(self) -> Array:
-        """Columns of J, of gravity, and of the sway of joints that are held: (rows, width)."""
+        """Return the columns of J, of gravity, and of `sway` (rows, width)."""
         mean = np.diff(self.dq[self.edges]) / self.length
-        gravity = self.windows.means(gravity_columns(self.nodes.q[:, 0], self.revolute) * float(self.weighs))
-        columns = [mean[self.kept, None], gravity]
+        gravity = gravity_columns(self.nodes.q[:, 0], self.revolute) * float(self.weighs)
+        columns = [mean[self.kept, None], self.windows.means(gravity)]
         if self.sway.shape[1]:
             sway = np.diff(self.swayed[self.edges], axis=0) / self.length[:, None]
             if self.untimed:
@@ -207,45 +265,43 @@ class Stretch:
 
     @property
     def _timing(self) -> Array:
-        """(windows,) mean change of torque in a step, from the samples next to each window: their noise is not in its own mean."""
-        known = np.where(np.isfinite(self.tau), self.tau, 0.0)
-        before = np.maximum(self.edges[:-1] - 1, 0)
-        before = np.where(np.isfinite(self.tau[before]), before, self.edges[:-1])
-        return np.asarray((known[self.edges[1:]] - known[before]) / (self.edges[1:] - before))
+        """Return the mean change of torque in a step (windows,).
+
+        It is taken from the samples next to each window: their noise is not in its own mean.
+        """
+        known, edges = self.known_tau, self.edges
+        before = np.maximum(edges[:-1] - 1, 0)
+        before = np.where(np.isfinite(self.tau[before]), before, edges[:-1])
+        return np.asarray((known[edges[1:]] - known[before]) / (edges[1:] - before))
 
     @cached_property
-    def laid(self) -> Nodes:
-        """Where the integrals are summed."""
-        return lay_nodes(self.t, self.q, self.dq, self.window)
-
-    @property
-    def ends(self) -> Array:
-        """Times between the nodes [s] (nodes + 1,)."""
-        return self.laid.ends
+    def _laid(self) -> tuple[Motion, Array, npt.NDArray[np.intp]]:
+        return _nodes(self.t, self.q, self.dq, self.window)
 
     @property
     def nodes(self) -> Motion:
-        return self.laid.motion
+        """Return where the integrals are summed."""
+        return self._laid[0]
 
     @cached_property
     def windows(self) -> Windows:
-        """Where the nodes lie in the windows that are kept."""
-        first = np.searchsorted(self.laid.sample, self.edges)
-        length = np.full(len(self.ends) - 1, np.inf)
+        """Return where the nodes lie in the windows that are kept."""
+        nodes, ends, sample = self._laid
+        first = np.searchsorted(sample, self.edges)
+        length = np.full(len(sample), np.inf)
         length[:first[-1]] = np.repeat(self.length, np.diff(first))
-        return Windows(self.nodes, np.diff(self.ends) / length, first[:-1], self.kept)
+        return Windows(nodes, np.diff(ends) / length, first[:-1], self.kept)
 
     @cached_property
     def sway(self) -> Array:
-        """Columns beside inertia and gravity over the step after each sample (samples, columns).
+        """Return more columns over the step after each sample (samples, columns).
 
-        Of a torque sample that may act a part of a step later or earlier, its change over the step; of joints that are held and
-        sway; of friction that lags behind its speed; and of friction that changes in time.
+        Of a torque sample that may act a part of a step later or earlier, its change over the step;
+        of joints that are held and sway; of friction that lags; and of friction that changes.
         """
-        parts = [sway_columns(self.t, self.q, self.dq, self.beside, self.revolute)]
+        parts = [sway_columns(self.t, self.q, self.dq, self.sways, self.revolute)]
         if self.untimed:
-            known = np.where(np.isfinite(self.tau), self.tau, 0.0)
-            parts.insert(0, np.append(np.diff(known), 0.0)[:, None])
+            parts.insert(0, np.append(np.diff(self.known_tau), 0.0)[:, None])
         if self.lag is not None:
             level = np.interp(self.dq, *self.lag)
             parts.append(np.append(np.diff(level) / np.diff(self.t), 0.0)[:, None])
@@ -255,87 +311,166 @@ class Stretch:
 
     @cached_property
     def swayed(self) -> Array:
-        """∫ sway dt from the first sample (samples, columns)."""
-        return np.vstack([np.zeros((1, self.sway.shape[1])), np.cumsum(self.sway[:-1] * np.diff(self.t)[:, None], axis=0)])
+        """Return ∫ sway dt from the first sample (samples, columns)."""
+        steps = self.sway[:-1] * np.diff(self.t)[:, None]
+        return np.vstack([np.zeros((1, self.sway.shape[1])), np.cumsum(steps, axis=0)])
 
     def accumulated(self, values: Array) -> Array:
-        """∫ values dt of values (nodes,) from the first sample, at every sample."""
-        whole = np.concatenate([[0.0], np.cumsum(values * np.diff(self.ends))])
-        return np.asarray(np.interp(self.t, self.ends, whole))
+        """Return ∫ values dt of values (nodes,) from the first sample on (samples,)."""
+        ends = self._laid[1]
+        whole = np.concatenate([[0.0], np.cumsum(values * np.diff(ends))])
+        return np.asarray(np.interp(self.t, ends, whole))
 
     @cached_property
     def middle(self) -> tuple[Array, Array, Array]:
-        """Position, speed and time of every row (rows,), as means over its window."""
-        mean = self.windows.means(np.hstack([self.nodes.q, self.nodes.dq, self.nodes.t[:, None]]))
-        return mean[:, 0], mean[:, 1], mean[:, 2]
+        """Return mean position, speed and time of every row (rows,)."""
+        of = self.nodes
+        q, dq, t = self.windows.means(np.hstack([of.q, of.dq, of.t[:, None]])).T
+        return q, dq, t
+
+
+def _nodes(t: Array, q: Array, dq: Array,
+           window: int) -> tuple[Motion, Array, npt.NDArray[np.intp]]:
+    """Place nodes along a motion; none is of samples on both sides of a multiple of `window`.
+
+    Args:
+        t, q, dq: (samples,) time, position and speed; speed runs straight from sample to sample.
+
+    Returns:
+        The nodes, the times between them (nodes + 1,) [s], and the sample before each (nodes,).
+    """
+    change, middle = np.diff(dq), 0.5 * (dq[1:] + dq[:-1])
+    most = min(window, int(_CONFIG.coarsest * (len(t) - 1) / float(t[-1] - t[0]) + 1e-9))
+    size = max(size for size in range(1, max(most, 1) + 1) if window % size == 0)
+    parts, span = np.ones(len(change), dtype=np.int8), np.ones(len(change), dtype=np.int8)
+    little = _CONFIG.little * float(np.abs(dq).max())
+    mean, spread = np.zeros(0), np.zeros(0)
+    if size > 2:
+        whole = len(change) // size * size
+        steady, mean, spread = _steady(middle[:whole].reshape(-1, size),
+                                       change[:whole].reshape(-1, size), little)
+        parts[:whole].reshape(-1, size)[steady] = 0
+        parts[:whole:size][steady], span[:whole:size][steady] = 2, size
+    alone = np.flatnonzero(parts == 1)
+    jump = np.abs(change[alone])
+    turning = (np.abs(middle[alone]) < (_CONFIG.near + 0.5) * jump) & (jump > little)
+    parts[alone[turning]] = _CONFIG.parts
+    first = np.flatnonzero(parts > 0)
+    count = parts[first].astype(np.intp)
+    at = np.repeat(first, count)
+    step = np.arange(len(at)) - np.repeat(np.cumsum(count) - count, count)
+    reach, pair = span[at], span[at] > 1
+    part = 1.0 / np.repeat(count, count)
+    share = step * part
+    # in samples after `at`
+    place = np.where(pair, 0.5 + _GAUSS * (2.0 * step - 1.0), share + 0.5 * part) * reach
+    begin, length = t[at], t[at + reach] - t[at]
+    below = place.astype(np.intp)
+    beyond, below = place - below, at + below
+    v = dq[at] + place * change[at]
+    run = np.flatnonzero(pair)
+    group = at[run] // size
+    away = np.copysign(spread[group], dq[at[run] + size] - dq[at[run]])
+    v[run] = mean[group] + np.where(step[run] == 0, -away, away)
+    ddq = (dq[at + reach] - dq[at]) / length
+    position = q[below] + beyond * (q[below + 1] - q[below])
+    motion = Motion(begin + place / reach * length, position[:, None], v[:, None], ddq[:, None])
+    return motion, np.append(begin + share * length, t[-1]), at
+
+
+def _steady(middle: Array, change: Array, little: float) -> tuple[Mask, Array, Array]:
+    """Return whether speed keeps its sign in groups of intervals, its mean and deviation (groups,).
+
+    Args:
+        middle, change: (groups, intervals) mean speed of an interval, and its change [rad/s].
+        little: a speed [rad/s] that does not count.
+    """
+    each = np.full(middle.shape[1], 1.0 / middle.shape[1])
+    mean = middle @ each
+    square = np.square(middle - mean[:, None]) @ each + np.square(change) @ each / 12.0
+    size = np.square(mean)
+    steady = (size > _CONFIG.steady**2 * square) | (size + square < little**2 / 4.0)
+    return steady, mean, np.sqrt(square)
 
 
 def blocks_of_time(stretches: Sequence[Stretch], length: float) -> npt.NDArray[np.intp]:
-    """Number of the block of `length` seconds that each row is in (rows,), from 0."""
-    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / length) for k, stretch in enumerate(stretches)]
+    """Return the number, from 0, of the block of `length` [s] that each row is in (rows,)."""
+    codes = [10**7 * k + np.floor((stretch.middle[2] - stretch.t[0]) / length)
+             for k, stretch in enumerate(stretches)]
     return np.asarray(np.unique(np.concatenate(codes), return_inverse=True)[1], dtype=np.intp)
 
 
-def swaying(found: Reconstructed, joint: int, resolution: Array) -> tuple[int, ...]:
-    """Joints, counted from 1, that are held in the log but visibly give way."""
-    q = found.motion.q[found.good.kept[found.good.fit]]
-    moved = np.ptp(q, axis=0) > _CONFIG.sway * resolution
-    return tuple(int(k) + 1 for k in np.flatnonzero(moved) if k != joint - 1)
+def _travels(motion: Reconstructed) -> Mask:
+    """Return whether a joint travels further than rounding moves one that is held (joints,)."""
+    q = motion.motion.q[motion.good.kept[motion.good.fit]]
+    return np.asarray(np.ptp(q, axis=0) > _CONFIG.sway * encoder_resolution(motion.good))
 
 
-def moved(seen: Sequence[Reconstructed]) -> npt.NDArray[np.bool_]:
-    """(joints,) whether any log moves a joint further than its encoder's steps, and faster than noise alone would have it."""
-    found = []
-    for one in seen:
-        rows = one.good.kept[one.good.fit]
-        moves = np.ptp(one.motion.q[rows], axis=0) > _CONFIG.sway * encoder_resolution(one.good)
+def swaying(motion: Reconstructed, joint: int) -> tuple[int, ...]:
+    """Return the joints, counted from 1, that are held but visibly sway with `joint`."""
+    return tuple(int(k) + 1 for k in np.flatnonzero(_travels(motion)) if k != joint - 1)
+
+
+def moved(motions: Sequence[Reconstructed]) -> Mask:
+    """Return whether any log moves a joint beyond encoder steps and noise (joints,)."""
+    moves = []
+    for one in motions:
+        far, rows = _travels(one), one.good.kept[one.good.fit]
         if one.std is not None:
             speed = np.sqrt(np.nanmean(np.square(one.motion.dq[rows]), axis=0))
-            moves &= speed > _CONFIG.fast * np.nanmedian(one.std[1][rows], axis=0)
-        found.append(moves)
-    return np.asarray(np.any(found, axis=0))
+            far &= speed > _CONFIG.fast * np.nanmedian(one.std[1][rows], axis=0)
+        moves.append(far)
+    return np.asarray(np.any(moves, axis=0))
 
 
 def stretches_of(log: ExperimentLog, joint: int, found: Reconstructed, window: float,
-                 beside: Sequence[int] = ()) -> tuple[Stretch, ...]:
-    """What of `log` can be used for its joint `joint`, counted from 1, in windows of `window` [s].
+                 swaying: Sequence[int] = ()) -> tuple[Stretch, ...]:
+    """Return what of `log` is usable for joint `joint`, in windows of `window` [s].
 
     Args:
-        beside: joints that are held and sway.
+        joint: counted from 1.
+        found: the motion of `log`.
+        swaying: joints that are held and sway.
     """
     good, j = found.good, joint - 1
     others = tuple(float(np.nanmedian(good.log.q[:, k])) for k in range(log.n_joints) if k != j)
     size = max(_CONFIG.shortest, round(window / log.sample_time))
-    motion, stretches = found.motion, []
+    stretches = []
     weighs = gravity_acts(log.robot, joint, others)
     for run in good.runs:
         rows = good.kept[run]
-        q, dq = motion.q[rows, j], motion.dq[rows, j]
-        sways = tuple(_sway(found, run, rows, k - 1, log.sample_time, k - 1 < j) for k in beside)
+        q, dq = found.motion.q[rows, j], found.motion.dq[rows, j]
         spoilt = (good.missing | good.spikes | good.saturated)[run, j] | ~np.isfinite(q + dq)
         doubt = 0.0
         if found.std is not None:
             speed = found.std[1][rows, j]
             spoilt |= speed > _CONFIG.vague * np.nanmedian(found.std[1][:, j])
             doubt = float(np.nanmedian(speed))
-        measured = np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j])
-        stretch = Stretch(log.name, good.log.t[run], measured, good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
-                          np.where(np.isfinite(dq), dq, 0.0), spoilt, True, size,
-                          log.robot.joints[j].revolute, others, sways, doubt, weighs,
-                          untimed=log.torque == "measured")
+        stretch = Stretch(
+            log.name, good.log.t[run],
+            np.where(good.position_spikes[run, j], np.nan, good.log.q[run, j]),
+            good.log.tau[run, j], np.where(np.isfinite(q), q, 0.0),
+            np.where(np.isfinite(dq), dq, 0.0), spoilt, size, log.robot.joints[j].revolute,
+            others, tuple(_sway(found, run, k - 1, log.sample_time, k < joint) for k in swaying),
+            doubt, weighs, untimed=log.torque == "measured")
         if len(stretch.edges) > _CONFIG.fewest and stretch.rows >= _CONFIG.fewest:
             stretches.append(stretch)
     return tuple(stretches)
 
 
-def _sway(found: Reconstructed, run: slice, rows: npt.NDArray[np.intp], k: int, step: float, nearer: bool) -> Sway:
-    """The sway of joint `k`, counted from 0. Torque of the driven joint comes in steps: its speed has kinks."""
+def _sway(found: Reconstructed, run: slice, k: int, step: float, nearer: bool) -> Sway:
+    """Return the sway of joint `k`, counted from 0.
+
+    Torque of the driven joint comes in steps, so that the speed of the other has kinks.
+    """
     good = found.good
-    seen = np.where(good.position_spikes[run, k], np.nan, good.log.q[run, k])
-    lean = seen - np.nanmedian(good.log.q[:, k])
+    lean = np.where(good.position_spikes[run, k], np.nan, good.log.q[run, k])
+    rest = np.nanmedian(good.log.q[:, k])
+    lean = (lean - rest)[:, None]
     try:
-        tuned = tune_jerk(lean[:, None], step, encoder_resolution(good)[[k]], _KINKED)
+        tuned = tune_jerk(lean, step, encoder_resolution(good)[[k]], _KINKED)
     except InputRejected:
-        return Sway(found.motion.q[rows, k] - np.nanmedian(good.log.q[:, k]), found.motion.dq[rows, k], nearer)
-    states = smooth(lean[:, None], design(step, tuned.jerk_std, tuned.noise_variance, _KINKED)).states
+        rows = good.kept[run]
+        return Sway(found.motion.q[rows, k] - rest, found.motion.dq[rows, k], nearer)
+    states = smooth(lean, design(step, tuned.jerk_std, tuned.noise_variance, _KINKED)).states
     return Sway(states[0, :, 0], states[1, :, 0], nearer)

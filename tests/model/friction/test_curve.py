@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.friction.equations import LawEquations
-from pipelines.model.friction.fit_law import fit_law
-from pipelines.model.friction.joint import JointLogs, fit_joint
-from pipelines.model.friction.law_fit import LawFit
-from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.methods import by_method, filtered
-from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.friction.ekf import filtered
+from pipelines.model.friction.fit import LawEquations, LawFit, fit_law
+from pipelines.model.friction.joint import JointLogs, by_method, fit_joint
+from pipelines.model.friction.laws import OneJoint, law_named
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.weak_form import Stretch, stretches_of
 from pipelines.model.motion import Reconstruction, reconstruct

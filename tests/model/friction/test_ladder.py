@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.friction.coverage import coverage, unseen
-from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.fit import LawEquations
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
-from pipelines.model.friction.ladder import Judge, climb
-from pipelines.model.friction.one_joint import OneJoint
+from pipelines.model.friction.laws import OneJoint
+from pipelines.model.friction.model_selection import climb
+from pipelines.model.friction.speed_map import coverage, unseen
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.motion import Reconstruction, reconstruct
 from tests.model.friction.one_joint import JOINT, STEP, TRUTHS, driven_speeds, recorded, relative
@@ -50,12 +50,12 @@ def plateaus(speeds: tuple[float, ...], friction: object, rest: bool, noise: flo
         spoilt[max(0, edge - 20):edge + 20] = True
     q = np.concatenate([[0.0], np.cumsum(0.5 * STEP * (dq[1:] + dq[:-1]))])
     tau = np.array([friction(v) for v in dq.tolist()]) + 1.7 * np.sin(q) + noise * rng.standard_normal(len(dq))  # type: ignore[operator]
-    return Stretch("plateaus", t, q, tau, q, dq, spoilt, True, 20, True, ())
+    return Stretch("plateaus", t, q, tau, q, dq, spoilt, 20, True, ())
 
 
 def climbed(stretch: Stretch) -> tuple[object, tuple[str, ...], tuple[str, ...]]:
     joint = OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)
-    ladder = climb(Judge(LawEquations.of((stretch,), joint), None))
+    ladder = climb(LawEquations.of((stretch,), joint), None)
     gaps = unseen(coverage((stretch,)), ladder)
     others = tuple(one.law.name for one in ladder.alternatives)
     return ladder.chosen.law.name, others, tuple(f"{gap.what} {gap.record}" for gap in gaps)

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pipelines.log.experiment import ExperimentLog
-from pipelines.model.friction.equations import LawEquations
+from pipelines.model.friction.findings import misfits
+from pipelines.model.friction.fit import LawEquations, Value
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.misfit import misfits
-from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.result import Value, joint_result
+from pipelines.model.friction.result import joint_result
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.report.friction_ripple import ripple_in_words
+from pipelines.report.friction_report import ripple_in_words
 from tests.model.friction.one_joint import ENCODER, INERTIA, JOINT, NOISE, TRUTHS, as_log, driven, recorded, torque_plan
 
 _AMPLITUDE, _ORDER = 0.12, 12  # [N m], a tenth of Coulomb friction; waves a turn
@@ -42,21 +40,10 @@ def held_back(more: Callable[[float, float], float] | None, seed: int = 1, noise
     return as_log(np.round(states[:, 0] / ENCODER) * ENCODER, torque, f"held-back-{seed}")
 
 
-@dataclass(frozen=True)
-class Truth:
-    """A torque of the angle, as a column."""
-
-    torque: Callable[[float, float], float]
-    pointwise: bool = True
-
-    def columns(self, motion: Motion, arm: OneJoint, theta: Array) -> Array:
-        return np.array([[self.torque(q, 0.0)] for q in motion.q[:, 0].tolist()])
-
-
 def outside(found: JointFit, torque: Callable[[float, float], float]) -> float:
     """What the fitted law cannot take of `torque` in the rows [N m] rms."""
     equations = LawEquations.of(found.stretches, found.fit.joint)
-    truth = equations.build(Truth(torque), equations.arms(), found.fit.theta)[:, 0]
+    truth = equations.means(lambda motion, _: np.array([[torque(q, 0.0)] for q in motion.q[:, 0].tolist()]), equations.arms())[:, 0]
     law = found.fit.found.jacobian
     law = law / np.linalg.norm(law, axis=0)
     return float(np.sqrt(np.mean(np.square(truth - law @ np.linalg.lstsq(law, truth, rcond=1e-5)[0]))))
@@ -71,7 +58,7 @@ def test_cogging_is_told_with_its_size(seed: int) -> None:
     ripple = found.ripple
     assert ripple is not None
     assert ripple.orders[0] == pytest.approx(_ORDER, abs=0.5)
-    assert abs(ripple.rms - outside(found, cogging)) < min(3.0 * ripple.std, 0.02 * ripple.rms)
+    assert abs(ripple.rms.value - outside(found, cogging)) < min(3.0 * ripple.rms.std, 0.02 * ripple.rms.value)
     q = log.q[:, JOINT - 1]
     truth = float(np.std([cogging(angle, 0.0) for angle in np.linspace(q.min(), q.max(), 2000).tolist()]))
     assert float(np.std(ripple.along.waves)) == pytest.approx(truth, rel=0.02)
@@ -94,8 +81,8 @@ def test_a_spring_is_no_more_than_what_is_left() -> None:
     found = fitted(held_back(spring))
     ripple = found.ripple
     assert ripple is not None
-    assert 3.0 * ripple.std < ripple.rms <= found.fit.found.rms
-    assert abs(ripple.rms - outside(found, spring)) < 3.0 * ripple.std
+    assert 3.0 * ripple.rms.std < ripple.rms.value <= found.fit.found.rms
+    assert abs(ripple.rms.value - outside(found, spring)) < 3.0 * ripple.rms.std
     joint = joint_result(found, "joint", "varpro")
     told, (check,) = ripple_in_words(joint), misfits((joint,), "log")
     for words in (told, check.message):
@@ -110,8 +97,8 @@ def test_a_spring_is_no_more_than_what_is_left() -> None:
 def test_a_bend_is_told_with_its_size_or_not_at_all(torque: Callable[[float, float], float], seed: int) -> None:
     found = fitted(held_back(torque, seed))
     if found.ripple is not None:
-        assert abs(found.ripple.rms - outside(found, torque)) < 3.0 * found.ripple.std
-        assert 3.0 * found.ripple.std < found.ripple.rms <= found.fit.found.rms
+        assert abs(found.ripple.rms.value - outside(found, torque)) < 3.0 * found.ripple.rms.std
+        assert 3.0 * found.ripple.rms.std < found.ripple.rms.value <= found.fit.found.rms
         assert "cog" not in ripple_in_words(joint_result(found, "joint", "varpro"))
 
 
@@ -157,9 +144,10 @@ def test_friction_by_position_of_a_joint_that_goes_one_way_is_no_ripple() -> Non
 
 def test_inertia_is_right_again_with_the_ripple_known(rippled: JointFit) -> None:
     """The ripple draws the inertia off; with the waves beside the law it is true to 1 %."""
-    assert rippled.beside_ripple is not None
-    assert rippled.beside_ripple.beta[0] == pytest.approx(INERTIA, rel=0.01)
-    assert abs(rippled.fit.inertia - INERTIA) > 2.0 * abs(rippled.beside_ripple.beta[0] - INERTIA)
+    assert rippled.ripple is not None
+    assert rippled.ripple.inertia is not None
+    assert rippled.ripple.inertia.value == pytest.approx(INERTIA, rel=0.01)
+    assert abs(rippled.fit.inertia - INERTIA) > 2.0 * abs(rippled.ripple.inertia.value - INERTIA)
 
 
 @pytest.mark.parametrize(("law", "fit"), [pytest.param(law, fit, marks=() if (law, fit) == _FAST else pytest.mark.slow)

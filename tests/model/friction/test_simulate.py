@@ -9,10 +9,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pipelines.fit.varpro import SeparableFit
-from pipelines.model.friction.law_fit import LawFit
-from pipelines.model.friction.laws import Law, law_named
-from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.simulate import simulate_joint
+from pipelines.model.friction.fit import LawFit
+from pipelines.model.friction.laws import Law, OneJoint, law_named
+from pipelines.model.friction.output_error import simulate_joint
 from pipelines.model.friction.weak_form import Stretch
 from pipelines.model.rigid.body import Array
 from tests.model.friction.one_joint import INERTIA, JOINT, recorded
@@ -33,7 +32,7 @@ def known(law: Law, amplitudes: list[float], shapes: list[float]) -> LawFit:
 
 def stretch(tau: Array = TORQUE) -> Stretch:
     nothing = np.zeros(len(tau))
-    return Stretch("given", T, nothing, tau, nothing, nothing, np.zeros(len(tau), dtype=bool), True, 20, True, (0.0, 0.0),
+    return Stretch("given", T, nothing, tau, nothing, nothing, np.zeros(len(tau), dtype=bool), 20, True, (0.0, 0.0),
                    ())
 
 

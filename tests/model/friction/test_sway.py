@@ -7,7 +7,7 @@ import pytest
 
 from pipelines.bench.machine import paper_machine
 from pipelines.bench.rigid import RigidDynamics
-from pipelines.model.friction.sway import Sway, sway_columns
+from pipelines.model.friction.weak_form import Sway, sway_columns
 
 HELD = np.array([0.4, -1.1, 0.7])  # [rad]
 

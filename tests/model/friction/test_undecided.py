@@ -8,11 +8,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.model.friction.coverage import coverage
-from pipelines.model.friction.equations import LawEquations
-from pipelines.model.friction.ladder import Judge, climb
-from pipelines.model.friction.one_joint import OneJoint
-from pipelines.model.friction.undecided import undecided
+from pipelines.model.friction.fit import LawEquations
+from pipelines.model.friction.laws import OneJoint
+from pipelines.model.friction.model_selection import climb, undecided
+from pipelines.model.friction.speed_map import coverage
 from pipelines.model.words import plain_number
 from tests.model.friction.one_joint import JOINT, recorded
 from tests.model.friction.test_ladder import plateaus
@@ -28,9 +27,9 @@ def drag(v: float) -> float:
 def told() -> list[str]:
     """Of a joint that was driven at three speeds only: drag or a hump."""
     stretch = plateaus(_SPEEDS, drag, False, 0.02)
-    ladder = climb(Judge(LawEquations.of((stretch,), OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)), None))
+    ladder = climb(LawEquations.of((stretch,), OneJoint.of(recorded("coulomb+viscous", 1).robot, JOINT)), None)
     covered = coverage((stretch,))
-    return [what for what, _ in undecided(ladder, covered.slowest, covered.fastest, alone=True)]
+    return [gap.what for gap in undecided(ladder, covered.slowest, covered.fastest, alone=True)]
 
 
 def test_the_plainer_law_is_taken_where_nothing_tells_them_apart() -> None:
