@@ -141,7 +141,8 @@ class _Parts:
         self, before: tuple[int, ...], after: list[int]
     ) -> tuple[list[Screened], float, float]:
         """Return candidates, cost a row (`State.cost`) and rows of some parts after others."""
-        info, moment = self.prior.of(before)
+        info, prior = self.prior.of(before)
+        moment = info @ prior
         gram = np.sum([self.prior.grams[k] for k in after], axis=0)
         own = np.sum([self.prior.moments[k] for k in after], axis=0)
         known = Arrow.of(info + gram, self.prior.structure)
@@ -156,7 +157,7 @@ class _Parts:
             self.moments[after].sum(axis=0) - cross.T @ mean,
         )
         cost = self.powers[after].sum() - (moment + own) @ mean
-        cost += float(np.sum(Arrow.of(info, self.prior.structure).half(moment) ** 2))
+        cost += prior @ moment
         return found, float(cost) / rows, rows
 
 

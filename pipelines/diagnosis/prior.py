@@ -1,9 +1,9 @@
 """Prior of a healthy machine: what its reference logs, or its other joints, tell of it.
 
     prior = prior_of(dataset, dictionary, config)
-    prior.start                 information and moment of the numbers before the later logs
+    prior.start                 information and mean of the numbers before the later logs
     prior.of(parts)             the same after some parts of the known logs
-    belief = Belief(info, moment, base, gram, structure, block)    the prior beside the later rows
+    belief = Belief(info, mean, base, gram, structure, block)    the prior beside the later rows
     belief.cost(theta, residual)          ‖r‖² + (θ - m)ᵀ A (θ - m)
     belief.beside(effects)                factor of the information of all numbers, with effects
     belief.losses(effects, residual)      squared error of each block, predicted from all others
@@ -42,38 +42,25 @@ class Belief:
     """θ ~ N(m, A⁻¹), and the rows y = θ B + e that will tell more of it."""
 
     info: Array  # A (k, k)
-    moment: Array  # A m (k,)
+    mean: Array  # m (k,)
     base: Table  # B
     gram: Array  # B Bᵀ
     structure: Structure
     block: tuple[Indices, ...]  # of each joint's rows
 
     @cached_property
-    def _before(self) -> Arrow:
-        return Arrow.of(self.info, self.structure)
-
-    @cached_property
     def after(self) -> Arrow:
         """The factor of P = A + B Bᵀ."""
         return Arrow.of(self.info + self.gram, self.structure)
 
-    @cached_property
-    def mean(self) -> Array:
-        """(k,) m."""
-        return self._before.solve(self.moment)
-
-    @cached_property
-    def _constant(self) -> float:
-        return float(np.sum(self._before.half(self.moment) ** 2))
-
     def cost(self, theta: Array, residual: Sequence[Array]) -> float:
         """Return ‖r‖² + (θ - m)ᵀ A (θ - m)."""
-        away = theta @ self.info @ theta - 2.0 * self.moment @ theta + self._constant
-        return float(sum(r @ r for r in residual) + away)
+        away = theta - self.mean
+        return float(sum(r @ r for r in residual) + away @ self.info @ away)
 
     def slope(self, theta: Array, residual: Sequence[Array]) -> Array:
         """Return the slope (k,) of -cost / 2 by θ."""
-        return np.asarray(self.moment - self.info @ theta + self.base.moments(residual))
+        return np.asarray(self.info @ (self.mean - theta) + self.base.moments(residual))
 
     def beside(self, effects: Table, damping: float = RIDGE) -> Arrow:
         """Return the factor of [P, B Eᵀ; E Bᵀ, E Eᵀ + damping I], E the columns of effects."""
@@ -117,15 +104,13 @@ class Belief:
         inner = inner + _FREE * np.trace(inner) * np.eye(len(inner))
         free = self.info - side @ np.linalg.solve(inner, side.T)
         free = 0.5 * (free + free.T)
-        return replace(self, info=free, moment=free @ self.mean)
+        return replace(self, info=free)
 
     def held(self, at: Indices) -> Belief:
         """Return the belief that knows some of the numbers to be what it takes for their mean."""
-        info, moment = self.info.copy(), self.moment.copy()
-        tight = np.diag(self.gram)[at] / _FREE
-        info[at, at] += tight
-        moment[at] += tight * self.mean[at]
-        return replace(self, info=info, moment=moment)
+        info = self.info.copy()
+        info[at, at] += np.diag(self.gram)[at] / _FREE
+        return replace(self, info=info)
 
 
 _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot be seen in 1e5 rows
@@ -145,7 +130,7 @@ class Prior:
     parts: tuple[tuple[np.ndarray, ...], ...]  # masks (rows,) of each joint, of parts of known logs
     grams: tuple[Array, ...]  # (k, k) of each part
     moments: tuple[Array, ...]
-    start: tuple[Array, Array]  # information A and A m before the later logs
+    start: tuple[Array, Array]  # information A and mean m before the later logs
     structure: Structure  # of the numbers
 
     @property
@@ -156,14 +141,14 @@ class Prior:
         """Return B = [N D], of the known or of the later rows."""
         return Table.stacked([nominal.scaled(1.0 / self.scale), dictionary.take(self.standing)])
 
-    def nominal(self, info: Array, moment: Array) -> Prior:
-        """Return a prior of the nominal numbers alone, by information (n, n) and A m (n,)."""
+    def nominal(self, info: Array, mean: Array) -> Prior:
+        """Return a prior of the nominal numbers alone, by information (n, n) and mean (n,)."""
         structure = Structure.all_shared(self.n_nominal, len(self.structure.own))
         none = np.zeros(0, dtype=np.intp)
-        return replace(self, standing=none, groups=(), start=(info, moment), structure=structure)
+        return replace(self, standing=none, groups=(), start=(info, mean), structure=structure)
 
     def of(self, parts: range | tuple[int, ...]) -> tuple[Array, Array]:
-        """Return information A and A m of numbers of a later session, after some parts.
+        """Return information A and mean of numbers of a later session, after some parts.
 
         (V + U Q Uᵀ)⁻¹ = A - A U (Q⁻¹ + Uᵀ A U)⁻¹ Uᵀ A (Woodbury).
         """
@@ -174,7 +159,7 @@ class Prior:
         inner = np.diag(1.0 / self.drift[free]) + side[free]
         new = info - side @ np.linalg.solve(inner, side.T)
         new = 0.5 * (new + new.T) + _ROUNDING * np.diag(np.diag(info))
-        return new, new @ Arrow.of(info, self.structure).solve(moment)
+        return new, Arrow.of(info, self.structure).solve(moment)
 
 
 def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) -> Prior:

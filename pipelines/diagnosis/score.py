@@ -72,7 +72,7 @@ class Blocks:
                 part = slice(first, first + len(at))
                 left[part, part] -= own[:, at].T @ own[:, at]
                 first += len(at)
-            inverse.append(np.linalg.inv(left).astype(np.float32))
+            inverse.append(_inverse(left).astype(np.float32))
         return cls(tuple(zip(*rows, strict=True)), tuple(inverse))
 
     def losses(self, residual: Sequence[Array], more: Sequence[Array] | None = None) -> Array:
@@ -96,6 +96,17 @@ class Blocks:
                 error = error + through @ np.linalg.solve(np.eye(len(v)) - v @ through, v @ error)
             out[b] = float(error @ error)
         return out
+
+
+def _inverse(matrix: Array) -> Array:
+    """Return the inverse of a positive definite matrix, by its Cholesky factor."""
+    from scipy.linalg.lapack import dpotrf, dpotri
+
+    lower, failed = dpotrf(matrix, lower=1)
+    if failed:
+        raise np.linalg.LinAlgError("Matrix is not positive definite")
+    inverse = np.tril(dpotri(lower, lower=1)[0])
+    return np.asarray(inverse + np.tril(inverse, -1).T)
 
 
 def log_scores(losses: Array, rows: Array) -> Array:

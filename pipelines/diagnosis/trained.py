@@ -248,7 +248,7 @@ def _chain(own: Later, causes: Sequence[Named]) -> list[State]:
     states = [own.start()]
     for one in causes:
         before = states[-1]
-        belief = own.freed(before.belief, one.effect)
+        belief = own.beside(before.belief, one.effect)
         model = replace(before.model, effects=(*before.model.effects, one))
         states.append(own.fit(model, before.theta, belief))
     return states
@@ -264,11 +264,11 @@ def _beside(later: Later, rows: Rows, standing: Standing) -> Later:
 
 def _nominal(prior: Prior) -> Prior:
     """Return the marginal prior of the nominal numbers."""
-    info, moment = prior.start
+    info, mean = prior.start
     known, n = Arrow.of(info, prior.structure), prior.n_nominal
     own = np.linalg.inv(known.solve(np.eye(len(info), n))[:n])
     own = 0.5 * (own + own.T)
-    return prior.nominal(own, own @ known.solve(moment)[:n])
+    return prior.nominal(own, mean[:n])
 
 
 def _refined(later: Later, state: State, data: Data, weight: Array) -> Refined:

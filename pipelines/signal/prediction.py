@@ -44,9 +44,10 @@ def prediction_weights(covariance: Array, ridge: float = 0.0) -> Array:
 
 def prediction_errors(weights: Array, x: Array) -> Array:
     """(channels, samples) of `x` (channels, samples)."""
-    from scipy.signal import lfilter
+    from scipy.ndimage import convolve1d
 
-    out = np.asarray(lfilter(weights[-1], [1.0], x, axis=1), dtype=np.float64)
+    middle = len(weights) // 2  # of the taps, where a filter that looks both ways has its origin
+    out = np.asarray(convolve1d(x, weights[-1], 1, np.float64, "constant", origin=-middle))
     for sample in range(min(len(weights) - 1, x.shape[1])):
         out[:, sample] = x[:, sample::-1] @ weights[sample, :sample + 1]
     return out
