@@ -145,10 +145,9 @@ def _round(
     )
     touch, moment = push_of(later.rows, later.dictionary, later.dataset.arm, state.residual, config)
     promising = _promising(later, state, significant, config)
+    refitted = _refitted(later, state, promising, responses, touch, config)
     tried = [
-        one
-        for one in _refitted(later, state, promising, responses, touch, config)
-        if not (one.event and one.gain < config.relevance * explained)
+        one for one in refitted if _relevant(later, state, one, significant, explained, config)
     ]
     others = _unnamed(later, state, significant, bool(responses))
     seen = Round(
@@ -187,8 +186,8 @@ def _significant(
     than a share of what they explain there.
     """
     rows = later.rows.count
-    known = later.shares @ (explained * later.acting(state) + later.standing)
-    inexact = dict(zip(later.dictionary.groups, config.relevance * known, strict=True))
+    known = later.shares @ _inexact(later, state, explained, config)
+    inexact = dict(zip(later.dictionary.groups, known, strict=True))
     return {
         key: one
         for key, one in best_of(later.screened(state)).items()
@@ -197,6 +196,38 @@ def _significant(
         and one.gain > baseline.threshold(one.group, one.freedom, rows)
         and not _slight(later, one, config)
     }
+
+
+def _inexact(later: Later, state: State, explained: float, config: DiagnosisConfig) -> Array:
+    """Return what a candidate may gain at each joint, for laws of causes found are not exact."""
+    return config.relevance * (explained * later.acting(state) + later.standing)
+
+
+def _relevant(
+    later: Later,
+    state: State,
+    one: Candidate,
+    significant: Mapping[Key, Screened],
+    explained: float,
+    config: DiagnosisConfig,
+) -> bool:
+    """Return whether a cause, refitted, saves more than the laws found before it are inexact.
+
+    A joint where it saves less counts for nothing, and one that it makes worse counts against it.
+    What the standing numbers have taken of it is a part of what it saves.
+    """
+    if one.event:
+        return one.gain >= config.relevance * explained
+    if one.key not in significant:  # frequency responses name it
+        return True
+    group = significant[one.key].group
+    shares = later.shares[later.dictionary.groups.index(group)]
+    saved = np.array(
+        [a @ a - b @ b for a, b in zip(state.residual, one.state.residual, strict=True)]
+    )
+    saved = saved + later.taken(state, [group])[0] * shares
+    beyond = saved - _inexact(later, state, explained, config)
+    return float(np.where(saved > 0.0, np.maximum(beyond, 0.0), saved).sum()) > 0.0
 
 
 def _slight(later: Later, one: Screened, config: DiagnosisConfig) -> bool:
