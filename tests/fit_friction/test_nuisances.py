@@ -195,7 +195,7 @@ def test_a_validation_log_at_rest_judges_nothing() -> None:
 
 def test_a_log_after_the_step_judges_the_law_with_the_step() -> None:
     """The last quarter of the log, as one of role "validate": the residual is less than a twentieth of its torque."""
-    log = logs(RARE)["step"]
+    log = logs(USUAL)["step"]
     after = {name: replace(signal, values=signal.values[-len(log.t) // 4:].copy()) for name, signal in log.signals.items()}
     judging = replace(log, name="after", role="validate", signals=after)
     (joint,) = fit_friction.compute(Inputs(tuple(Opened(Path(f"{one.name}.h5"), "", one, ()) for one in (log, judging)),
