@@ -34,7 +34,6 @@ def odrive(shared: Path, tmp_path_factory: pytest.TempPathFactory) -> Outcome[Re
     return imported("odrive", shared, tmp_path_factory.mktemp("odrive") / "out")
 
 
-@pytest.mark.slow
 def test_both_recorded_sets_pass_the_strict_checker(tx40: Outcome[Result], odrive: Outcome[Result], checker: ModuleType) -> None:
     for outcome, logs in ((tx40, 1), (odrive, 6)):
         faults = checker.check_folder(outcome.folder)

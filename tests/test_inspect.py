@@ -168,7 +168,6 @@ def _codes(log: ExperimentLog, tmp_path: Path) -> list[tuple[str, str]]:
     return [(c.code, c.message) for c in doctor(tmp_path, log).result.checks if c.level != "ok"]
 
 
-@pytest.mark.slow
 def test_a_recorded_arm_is_in_order(tx40: ExperimentLog, tmp_path: Path) -> None:
     """Six joints, wrist friction no model explains, 1.5 s of rest at the end, links described wrongly: no false alarm."""
     assert _codes(tx40, tmp_path) == []

@@ -112,7 +112,6 @@ def test_writing_by_feedback_alone_errs_by_millimetres(samples: Path, arm: Arm) 
     assert (spread[0] / spread[1] > [3.2, 6.9, 4.3]).all()
 
 
-@pytest.mark.slow
 def test_logs_pass_the_strict_checker(shared: Path, samples: Path) -> None:
     """check_log.py finds no fault."""
     done = subprocess.run([sys.executable, str(shared / "tools" / "check_log.py"), str(samples)], check=False,

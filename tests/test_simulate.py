@@ -66,7 +66,6 @@ def test_a_fault_moves_the_joint_it_is_at(tmp_path: Path) -> None:
     assert strong.position_rms[1] > 1e-4
 
 
-@pytest.mark.slow
 def test_several_faults_act_together(tmp_path: Path) -> None:
     """Equal and opposite offsets leave nothing."""
     both = Settings("rrr", ("torque_offset:1:offset=2", "torque_offset:1:offset=-2"))

@@ -64,7 +64,6 @@ def test_a_ripple_below_slow_noise_is_named(waves: float, seed: int) -> None:
     np.testing.assert_allclose(np.sqrt(taken), RIPPLE / np.sqrt(2.0), rtol=0.3)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, 2])
 def test_slow_noise_alone_is_no_fault(seed: int) -> None:
     assert diagnosed(0.0, 0.0, seed, 3.0).verdict == "no-fault-found"

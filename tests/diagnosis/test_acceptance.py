@@ -40,7 +40,6 @@ def test_a_model_that_runs_away_has_no_simulated_gain() -> None:
     assert (gain.simulated_position_rms, gain.tip_error_rms, gain.simulation) == (None, None, "none")
 
 
-@pytest.mark.slow
 def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """One window of one arm without an end: that arm has no simulated error, the other keeps its own."""
     log = replace(session()[0], controller=None)

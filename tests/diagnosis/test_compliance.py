@@ -15,7 +15,6 @@ from sample_logs.make_model import synthetic_arm
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs" / "rrr-healthy"
 
 
-@pytest.mark.slow
 def test_a_soft_base_is_named_with_its_frequency() -> None:
     """sample_logs/README.md: 28 Hz, damping ratio 0.04; joint 1 feels it in both postures."""
     found = compliance([open_log(SAMPLES / f"frf-1-{posture}.h5").log for posture in (1, 2)], synthetic_arm())

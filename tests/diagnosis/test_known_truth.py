@@ -40,7 +40,6 @@ def short(load: Load) -> list[ExperimentLog]:
     return [begun(log, 4000) for log in logs(load)[1:]]
 
 
-@pytest.mark.slow
 def test_cogging_is_found_at_its_joint_with_its_numbers() -> None:
     """And what is left is the noise of the drives, 20, 10 and 5 mN m, as far as the low-pass lets it through."""
     found = answered(Logs.by_role(short(wave)), exclude=but("cogging", "torque_offset", "quadratic_drag"))
@@ -59,7 +58,6 @@ def warming(motion: Motion) -> Array:
     return out
 
 
-@pytest.mark.slow
 def test_a_joint_that_loses_most_of_its_viscous_friction_tells_how_much_and_how_fast() -> None:
     """Both numbers and the friction itself are unknown, and their product acts."""
     found = diagnosed(*logs(warming)[1:], exclude=but("viscous_drift", "quadratic_drag", "load_friction"))
@@ -76,7 +74,6 @@ def nameless(motion: Motion) -> Array:
     return out
 
 
-@pytest.mark.slow
 def test_what_is_surely_named_is_named_beside_a_larger_torque_without_a_name() -> None:
     found = diagnosed(*logs(nameless), exclude=but("cogging"))
     assert causes(found) == [("cogging", 2)]
@@ -251,7 +248,6 @@ def test_a_ripple_that_is_there_for_half_a_log_is_none_of_the_machine() -> None:
     assert ("cogging", 1) not in causes(diagnosed(half, exclude=but("cogging"), cutoff_hz=40.0))
 
 
-@pytest.mark.slow
 def test_samples_lost_here_and_there_are_no_fault() -> None:
     fitted, judging = session()
     found = diagnosed(dropped(fitted, lambda k: k % 97 != 96), judging, exclude=but(*FEW))

@@ -50,7 +50,6 @@ def test_torque_that_friction_holds_at_rest_is_no_equation() -> None:
     assert np.sqrt(np.mean(np.square(deviations(found, arm, phi)))) < 1.6
 
 
-@pytest.mark.slow
 def test_panda_is_predicted_as_published(shared: Path) -> None:
     """1.4 to 1.6 % held out at 10 Hz; no delay is claimed; gravity and offset that the log does not separate are named."""
     found = panda(shared / "real")

@@ -77,7 +77,6 @@ def test_what_the_model_lacks_stands_as_far_above_the_floor() -> None:
     assert said[0] == said[1] != ""
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("periods", "averages"), [
     ((0.2,), (True,)), pytest.param((0.2, 0.1, 0.01, 7.3), (True, False), marks=pytest.mark.slow)])
 def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float], averages: Sequence[bool]) -> None:
@@ -91,7 +90,6 @@ def test_a_wrong_period_is_told_and_changes_no_estimate(periods: Sequence[float]
         np.testing.assert_allclose(std_of(found), std_of(none), rtol=1e-9)
 
 
-@pytest.mark.slow
 def test_a_touch_that_is_kept_is_named() -> None:
     """Nobody asked for its period to be left out, and the elbow was held there: it is in the fit, and said to be."""
     def touched(q: Array, tau: Array) -> None:

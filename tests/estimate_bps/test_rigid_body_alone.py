@@ -13,7 +13,6 @@ from pipelines.model.simulation import example
 from pipelines.stage import Request, read_logs
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "least", "most"), [((), 0.9, 1.3), (("coulomb:1:level=3",), 100.0, 1e4)])
 def test_friction_that_is_there_is_missed(friction: tuple[str, ...], least: float, most: float, tmp_path: Path,
                                           monkeypatch: pytest.MonkeyPatch) -> None:

@@ -102,7 +102,6 @@ def test_the_model_is_refitted_and_simulates(rippled: tuple[Path, Outcome[extend
     assert off[0] < 0.5 * off[1]
 
 
-@pytest.mark.slow
 def test_a_model_keeps_its_effects(rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path) -> None:
     """Extended by something that is not there, a model with cogging still has it, fitted anew."""
     folder, outcome = rippled
@@ -110,7 +109,6 @@ def test_a_model_keeps_its_effects(rippled: tuple[Path, Outcome[extend.Extension
     assert [(one.cause, one.joint) for one in again.findings] == [("cogging", 2)]
 
 
-@pytest.mark.slow
 def test_a_refused_extension_keeps_the_accepted_model(rippled: tuple[Path, Outcome[extend.Extension]], tmp_path: Path,
                                                       monkeypatch: pytest.MonkeyPatch) -> None:
     """In the default folder: the newest outcome lies there and has no model; the earlier one lies beside it as it was, its report

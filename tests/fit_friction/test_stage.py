@@ -119,7 +119,6 @@ def test_the_derived_log_holds_the_friction(outcome: Outcome[Result]) -> None:
     assert relative(friction[:, 2], TRUTHS["three_sigmoid"].curve(log["dq_hat"][:, 2])) < 0.01
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("method", ["ekf", "output-error"])
 def test_other_methods(method: str) -> None:
     """Beside variable projection, that of `outcome`, each gives inertia to 1 % and the curve to 1.2 % on a log of its own."""

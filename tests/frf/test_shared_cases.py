@@ -72,7 +72,6 @@ def test_a_firm_arm_under_pd_is_rigid(shared: Path, arm: str) -> None:
     assert {one.kind for one in found.classification} <= {"rigid"}
 
 
-@pytest.mark.slow
 def test_a_soft_base_under_pd(shared: Path) -> None:
     """Its frequency within 3 %, its inertia within 15 %, and no other finding."""
     truth = json.loads((shared / "plant-b" / "answers.json").read_text())["arm-06"]["truth"][0]["parameters"]
@@ -82,7 +81,6 @@ def test_a_soft_base_under_pd(shared: Path) -> None:
     assert base.parameters["inertia"].value == pytest.approx(truth["inertia"], rel=0.15)
 
 
-@pytest.mark.slow
 def test_a_spring_in_a_joint_under_pd(shared: Path) -> None:
     """Joint 2: stiffness within 5 %, motor within 3 %."""
     truth = json.loads((shared / "plant-b" / "answers.json").read_text())["arm-07"]["truth"][0]["parameters"]
@@ -92,7 +90,6 @@ def test_a_spring_in_a_joint_under_pd(shared: Path) -> None:
     assert one.parameters["motor_inertia"].value == pytest.approx(truth["drive_inertia"], rel=0.03)
 
 
-@pytest.mark.slow
 def test_a_gap_is_no_spring(shared: Path) -> None:
     """Joint 2 with a gap of 2.2 mrad: left open, with gap and spring among the candidates."""
     found = _found(shared, "04", (2,))

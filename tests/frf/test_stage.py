@@ -121,7 +121,6 @@ def test_a_given_model_sets_what_is_expected(samples: Path) -> None:
     assert posture.level.value == pytest.approx(posture.expected_level, rel=0.01)
 
 
-@pytest.mark.slow
 def test_a_model_of_friction_alone_expects_nothing(outcome: Outcome[frf.Result], samples: Path) -> None:
     """Within `run`, where base parameters were refused, what is handed on has friction and no inertia: the controller's holds."""
     opened = open_log(samples / "rrr-healthy/frf-1-1.h5")

@@ -83,7 +83,6 @@ def in_base_parameters(estimate: Estimate, beta: Array, shared: Path) -> Array:
     return np.concatenate([rigid, friction])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("weighted", [False, True])
 def test_least_squares_are_those_of_pinocchio(weighted: bool, tx40: ExperimentLog, published: Fitted, independent: Independent,
                                               shared: Path) -> None:

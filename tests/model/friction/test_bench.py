@@ -67,7 +67,6 @@ def check(seed: int, joint: int, duration: float = 20.0) -> float:
     return found.curve_error
 
 
-@pytest.mark.slow
 def test_one_joint_of_one_machine() -> None:
     """Curve below 1.2 %, inertia and gravity to 1 % and 3 standard deviations, simulated speed 20 times closer with friction."""
     assert check(0, 3, 10.0) <= 0.012
