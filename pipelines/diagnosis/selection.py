@@ -194,7 +194,7 @@ def _significant(
         if (key not in taken or later.again(key))
         and one.gain > inexact[one.group]
         and one.gain > baseline.threshold(one.group, one.freedom, rows)
-        and not _slight(later, one, config)
+        and (one.group.kind == "named" or not _slight(later, _torque(later, one), config))
     }
 
 
@@ -213,13 +213,18 @@ def _relevant(
 ) -> bool:
     """Return whether a cause, refitted, saves more than the laws found before it are inexact.
 
-    A joint where it saves less counts for nothing, and one that it makes worse counts against it.
-    What the standing numbers have taken of it is a part of what it saves.
+    What is as small as healthy machines have some is no cause. A joint where it saves less counts
+    for nothing, and one that it makes worse counts against it. What the standing numbers have taken
+    of it is a part of what it saves.
     """
     if one.event:
         return one.gain >= config.relevance * explained
     if one.key not in significant:  # frequency responses name it
         return True
+    model = one.state.model
+    both = (later.rows.torque(x) for x in (model, model.without(len(model.effects) - 1)))
+    if _slight(later, [a - b for a, b in zip(*both, strict=True)], config):
+        return False
     group = significant[one.key].group
     shares = later.shares[later.dictionary.groups.index(group)]
     saved = np.array(
@@ -230,11 +235,15 @@ def _relevant(
     return float(np.where(saved > 0.0, np.maximum(beyond, 0.0), saved).sum()) > 0.0
 
 
-def _slight(later: Later, one: Screened, config: DiagnosisConfig) -> bool:
-    """Return whether its torque is as small as healthy machines have some, at every joint."""
-    torque = later.candidates.take(one.group.columns).times(one.amplitudes)
+def _slight(later: Later, torque: Sequence[Array], config: DiagnosisConfig) -> bool:
+    """Return whether torque is as small as healthy machines have some, at every joint."""
     least = later.usual(config)
     return all(float(np.linalg.norm(x)) <= own for x, own in zip(torque, least, strict=True))
+
+
+def _torque(later: Later, one: Screened) -> tuple[Array, ...]:
+    """Return the torque of a screened candidate, joint by joint, in units of the noise."""
+    return later.candidates.take(one.group.columns).times(one.amplitudes)
 
 
 def _contest(
