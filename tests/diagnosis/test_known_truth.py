@@ -67,6 +67,21 @@ def test_a_joint_that_loses_most_of_its_viscous_friction_tells_how_much_and_how_
     assert drift.values["time_constant"] == pytest.approx(2.0, rel=0.05)
 
 
+def humps(motion: Motion) -> Array:
+    """Every joint has a hump of friction below .1 rad/s (Stribeck), of another size each."""
+    v = motion.dq
+    return np.array([2.0, 1.5, 0.7]) * np.exp(-(v / 0.1) ** 2) * np.tanh(SHARP * v)
+
+
+def test_a_law_that_all_joints_have_is_named_at_each_with_its_numbers() -> None:
+    """No form of friction without a name, and no other law, takes its place."""
+    found = diagnosed(*logs(humps), exclude=but("stribeck", "concave_friction", "quadratic_drag"))
+    assert sorted(causes(found)) == [("stribeck", 1), ("stribeck", 2), ("stribeck", 3)]
+    sizes = {one.effect.joint: one.values for one in effects(found)}
+    assert [sizes[joint]["amplitude"] for joint in (1, 2, 3)] == pytest.approx([2.0, 1.5, 0.7], rel=0.02)
+    assert [sizes[joint]["speed"] for joint in (1, 2, 3)] == pytest.approx([0.1] * 3, rel=0.02)
+
+
 def nameless(motion: Motion) -> Array:
     """Weak cogging at joint 2, and at joint 1 a torque that no cause of the library has: it rises and falls with the speed."""
     out = 0.25 * wave(motion)
