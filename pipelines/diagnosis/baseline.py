@@ -141,8 +141,8 @@ class _Parts:
         self, before: tuple[int, ...], after: list[int]
     ) -> tuple[list[Screened], float, float]:
         """Return candidates, cost a row (`State.cost`) and rows of some parts after others."""
-        info, prior = self.prior.of(before)
-        moment = info @ prior
+        info, expected = self.prior.of(before)
+        moment = info @ expected
         gram = np.sum([self.prior.grams[k] for k in after], axis=0)
         own = np.sum([self.prior.moments[k] for k in after], axis=0)
         known = Arrow.of(info + gram, self.prior.structure)
@@ -157,7 +157,7 @@ class _Parts:
             self.moments[after].sum(axis=0) - cross.T @ mean,
         )
         cost = self.powers[after].sum() - (moment + own) @ mean
-        cost += prior @ moment
+        cost += expected @ moment
         return found, float(cost) / rows, rows
 
 

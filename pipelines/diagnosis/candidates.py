@@ -12,7 +12,7 @@ every cause, the cause is not known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -31,6 +31,7 @@ from pipelines.model.rows.families import Family, families, lay_family, whole_mo
 __all__ = ["FORM", "Dictionary", "Group", "Key", "Kind"]
 
 FORM = "friction form"
+_ROUNDED = 1e-9  # numerics: difference of orders that is rounding
 
 Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
@@ -81,6 +82,7 @@ class Dictionary:
     ) -> Dictionary:
         """Return every candidate, with its columns over the reference and the later rows."""
         found = _families(dataset, exclude)
+        standing = {key: _standing(family, dataset) for key, family in found.items()}
         plain = _unnamed(dataset, config)
         tables: list[Table | None] = []
         for rows in (dataset.later, dataset.reference):
@@ -91,7 +93,7 @@ class Dictionary:
             parts: list[Table] = []
             for family in found.values():
                 if not family.event:
-                    _lay(rows, family, dataset.arm, groups, parts)
+                    _lay(rows, family, standing, dataset.arm, groups, parts)
             for key, make in plain.items():
                 _lay_unnamed(rows, key, make, groups, parts)
             tables.append(Table.stacked(parts))
@@ -125,7 +127,14 @@ def _families(dataset: Dataset, exclude: Sequence[str]) -> dict[Key, Family]:
     return found
 
 
-def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[Table]) -> None:
+def _lay(
+    rows: Rows,
+    family: Family,
+    standing: Mapping[Key, Collection[int]],
+    arm: Arm,
+    groups: list[Group],
+    parts: list[Table],
+) -> None:
     seen = sum(part.width for part in parts)
     compliant = family.shapes[0].evidence == "frequency responses"
     kind: Kind = "compliance" if compliant else "named"
@@ -140,7 +149,7 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
                     number,
                     seen,
                     width,
-                    _standing(family, number),
+                    number in standing[family.cause, family.joint],
                     kind,
                     family.shapes[0].parameters.reads_torque
                     and rows.data.logs[0].motion.tau is not None,
@@ -149,16 +158,28 @@ def _lay(rows: Rows, family: Family, arm: Arm, groups: list[Group], parts: list[
             seen += width
 
 
-def _standing(family: Family, number: int) -> bool:
-    """Return whether healthy machines have shape `number` of a family in small.
+def _standing(family: Family, dataset: Dataset) -> set[int]:
+    """Return the shapes of a family, by number, that healthy machines have in small.
 
-    Of waves that differ in order they have all that the travel tells apart: those of whole orders,
-    and every second one of a grid in steps of half of that.
+    Of waves that differ in order they have all that the travel tells apart, 2π / travel from one to
+    the next, and all of whole orders.
     """
-    parameters = family.shapes[0].parameters
-    if any(q.several for q in parameters):
-        return not family.shapes[number].free or number % 2 == 0
-    return parameters.healthy != 0.0 and number == 0
+    shapes, parameters = family.shapes, family.shapes[0].parameters
+    order = next((q.name for q in parameters if q.several), None)
+    if order is None or family.joint is None:
+        return {0} if parameters.healthy != 0.0 else set()
+    q = np.concatenate([one.motion.q[:, family.joint - 1] for one in dataset.later.data.logs])
+    apart, last, kept = (
+        (1.0 + _ROUNDED) * 2.0 * np.pi / max(float(np.ptp(q)), 1e-9),
+        -np.inf,
+        set[int](),
+    )
+    for number, shape in enumerate(shapes):
+        following = getattr(shapes[min(number + 1, len(shapes) - 1)], order)
+        if not shape.free or following - last > apart:
+            kept.add(number)
+            last = getattr(shape, order)
+    return kept
 
 
 Make = Callable[[Motion], Array]  # (samples, k) on one joint

@@ -29,7 +29,10 @@ class DiagnosisConfig:
     relevance: float = 0.02  # share of a cause's effect to which no law is exact
     variance_prior: float = 2.0  # pseudo-observations by which a variance is shrunk to its family's
     refits: int = 4  # candidates that are refitted exactly in a round
-    promising: float = 0.3  # of the best screening gain, from which a candidate is refitted
+    promising: float = (
+        0.3  # of the best gain, without or with what standing numbers have taken of it, from which
+        # a candidate is refitted
+    )
     causes: int = 4  # most causes in one session
     ripple_orders: int = 24  # [1/rev] of torque-proportional ripple in the standing dictionary
     form_widths: int = 7  # sigmoids that make the form of a friction law

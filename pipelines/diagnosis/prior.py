@@ -107,14 +107,14 @@ class Belief:
         return replace(self, info=free)
 
     def held(self, at: Indices) -> Belief:
-        """Return the belief that knows some of the numbers to be what it takes for their mean."""
+        """Return the belief with some of the numbers fixed at their mean."""
         info = self.info.copy()
         info[at, at] += np.diag(self.gram)[at] / _FREE
         return replace(self, info=info)
 
 
 _LEAST_VARIANCE = 2e-5  # numerics: of a row, in units of its noise; less cannot be seen in 1e5 rows
-_ROUNDING = 1e-13  # numerics: of each number's information, lost where columns are nearly alike
+_ROUNDING = 1e-13  # numerics: of each number's information: more than the differences round off
 _PARTS = 8  # numerics: of the known logs at most, of which splits are made
 
 
@@ -264,7 +264,7 @@ def _drift(
 
 
 def rubs(group: Group) -> bool:
-    """Return whether it is a form of friction, a law, or changes sign with the one at its joint."""
+    """Return whether a group is a form or law of friction, or changes sign with that."""
     if group.kind != "named":
         return group.key[0] == FORM
     effect = find_effect(group.key[0])

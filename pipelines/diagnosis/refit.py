@@ -148,7 +148,7 @@ class Later:
         return self.fit(model, theta, self.belief_of(model))
 
     def belief_of(self, model: Exact) -> Belief:
-        """Return what is known before the rows beside the effects of a model."""
+        """Return the belief for a model with its effects."""
         belief = self.belief
         for one in model.effects:
             belief = self.beside(belief, one.effect)
@@ -356,17 +356,17 @@ class Later:
         return out
 
     def taken(self, state: State, groups: Sequence[Group]) -> list[float]:
-        """Return what the standing numbers of candidates, those of the next shapes, save.
+        """Return what the standing numbers of candidates save.
 
-        Of each s ((P⁻¹)_ss)⁻¹ s, by which the cost would rise without them.
+        Of each s ((P⁻¹)_ss)⁻¹ s, by which the cost would rise without them. They are those of the
+        candidate's shape or the next ones; of a cause that stands by its first shape alone, that.
         """
         factor, first, out = state.factor, self.prior.n_nominal, []
         for group in groups:
-            away = [
-                abs(g.shape - group.shape) if g.key == group.key else np.inf
-                for g in self.prior.groups
-            ]
-            own = np.isfinite(away) & (away == np.min(away, initial=np.inf))
+            shapes = {g.shape for g in self.prior.groups if g.key == group.key}
+            away = 0 if group.shape in shapes else 1
+            near = {s for s in shapes if len(shapes) == 1 or abs(s - group.shape) == away}
+            own = [g.key == group.key and g.shape in near for g in self.prior.groups]
             at = first + np.flatnonzero(own)
             unit = np.zeros((len(state.theta) + state.effects.width, len(at)))
             unit[at, np.arange(len(at))] = 1.0
@@ -416,11 +416,10 @@ class Later:
         return self.fit(state.model, state.theta, state.belief.held(at))
 
     def beside(self, belief: Belief, effect: Effect) -> Belief:
-        """Return the belief beside an effect.
+        """Return the belief for a model that contains an effect.
 
-        Without reference logs friction is what the laws say at a joint where one of them, or a
-        drift of friction, is a cause: beside any form a further law, or a share of it, says
-        nothing.
+        Without reference logs a friction law, or a drift of friction, cannot be told from the form
+        of friction at its joint, which is free: that and the other laws are held at their mean.
         """
         law = isinstance(effect, FrictionLaw) or effect.clock == "session"
         if law and self.dataset.reference is None:

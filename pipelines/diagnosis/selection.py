@@ -122,6 +122,7 @@ def select(
         taken = [cause.key for cause in causes]
         more = _significant(later, state, taken, explained, baseline, config).values()
         ranked = sorted(more, key=lambda one: -one.gain)
+        ranked = [one for one in ranked if not _slight(later, _torque(later, one), config)]
         cut = tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
     causes, state = _backward(later, causes, state, config)
     moment = rounds[-1].moment if rounds else ""
@@ -199,7 +200,7 @@ def _significant(
 
 
 def _inexact(later: Later, state: State, explained: float, config: DiagnosisConfig) -> Array:
-    """Return what a candidate may gain at each joint, for laws of causes found are not exact."""
+    """Return the gain (joints,) that the causes found account for, because no law is exact."""
     return config.relevance * (explained * later.acting(state) + later.standing)
 
 
@@ -213,9 +214,9 @@ def _relevant(
 ) -> bool:
     """Return whether a cause, refitted, saves more than the laws found before it are inexact.
 
-    What is as small as healthy machines have some is no cause. A joint where it saves less counts
-    for nothing, and one that it makes worse counts against it. What the standing numbers have taken
-    of it is a part of what it saves.
+    A cause whose torque is within that of healthy machines is rejected. A joint where it saves less
+    counts for nothing, and one that it makes worse counts against it. What the standing numbers
+    have taken of it is a part of what it saves.
     """
     if one.event:
         return one.gain >= config.relevance * explained
@@ -230,7 +231,10 @@ def _relevant(
     saved = np.array(
         [a @ a - b @ b for a, b in zip(state.residual, one.state.residual, strict=True)]
     )
-    saved = saved + later.taken(state, [group])[0] * shares
+    more = later.taken(state, [group])[0]
+    if one.key[1] is not None:  # of the whole arm base parameters are freed, which saves nothing
+        more += state.cost - state.rss - one.state.cost + one.state.rss
+    saved = saved + more * shares
     beyond = saved - _inexact(later, state, explained, config)
     return float(np.where(saved > 0.0, np.maximum(beyond, 0.0), saved).sum()) > 0.0
 
@@ -359,8 +363,8 @@ def _promising(
 ) -> list[Screened]:
     """Return the significant causes that are the most promising ones, the best first.
 
-    They are so by what they gain, or compared with a machine without them: what the standing
-    numbers have taken of a cause that healthy machines have in small is a part of what it explains.
+    A cause is promising by its gain, or by its gain and what the standing numbers have taken of it,
+    for healthy machines have it in small. The one of the largest gain is always among them.
     """
     named = {key: one for key, one in significant.items() if one.group.kind == "named"}
     taken = later.taken(state, [one.group for one in named.values()])
@@ -370,7 +374,8 @@ def _promising(
         {k for k, x in by.items() if x > config.promising * max(by.values())}
         for by in (gain, worth)
     ]
-    order = sorted(best[0] | best[1], key=lambda key: -worth[key]) if named else []
+    most = max(gain.values(), default=0.0)
+    order = sorted(best[0] | best[1], key=lambda key: (gain[key] < most, -worth[key]))
     return [named[key] for key in order[: config.refits]]
 
 
