@@ -31,7 +31,7 @@ from pipelines.model.rows.families import Family, families, lay_family, whole_mo
 __all__ = ["FORM", "Dictionary", "Group", "Key", "Kind"]
 
 FORM = "friction form"
-_ROUNDED = 1e-9  # numerics: difference of orders that is rounding
+_ROUNDED = 1e-9  # numerics: of travel [rad or m], or share of an order, that is rounding
 
 Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
@@ -169,11 +169,8 @@ def _standing(family: Family, dataset: Dataset) -> set[int]:
     if order is None or family.joint is None:
         return {0} if parameters.healthy != 0.0 else set()
     q = np.concatenate([one.motion.q[:, family.joint - 1] for one in dataset.later.data.logs])
-    apart, last, kept = (
-        (1.0 + _ROUNDED) * 2.0 * np.pi / max(float(np.ptp(q)), 1e-9),
-        -np.inf,
-        set[int](),
-    )
+    apart = (1.0 + _ROUNDED) * 2.0 * np.pi / max(float(np.ptp(q)), _ROUNDED)
+    last, kept = -np.inf, set[int]()
     for number, shape in enumerate(shapes):
         following = getattr(shapes[min(number + 1, len(shapes) - 1)], order)
         if not shape.free or following - last > apart:

@@ -99,12 +99,15 @@ class Blocks:
 
 
 def _inverse(matrix: Array) -> Array:
-    """Return the inverse of a positive definite matrix, by its Cholesky factor."""
+    """Return the inverse of a positive definite matrix, by its Cholesky factor.
+
+    A matrix that is so but for rounding has none; it is inverted as any other.
+    """
     from scipy.linalg.lapack import dpotrf, dpotri
 
     lower, failed = dpotrf(matrix, lower=1)
     if failed:
-        raise np.linalg.LinAlgError("Matrix is not positive definite")
+        return np.asarray(np.linalg.inv(matrix), dtype=np.float64)
     inverse = np.tril(dpotri(lower, lower=1)[0])
     return np.asarray(inverse + np.tril(inverse, -1).T)
 
