@@ -71,8 +71,10 @@ def demo(
     given = {"fault": tuple(fault or ()) or None, "seed": seed}
     request, settings, teller = asked(recording.STAGE, (), replace(common, out=out / "recording", no_report=True), given)
     teller("simulating the arm")
-    recorded = run_stage(recording.STAGE, request, settings)
-    teller.done()
+    try:
+        recorded = run_stage(recording.STAGE, request, settings)
+    finally:
+        teller.done()
     if not common.quiet:
         print(f"Simulated {len(recorded.result.logs)} logs into {out / 'recording/logs'}; now: rrrid run {out / 'recording'}",
               file=sys.stderr)

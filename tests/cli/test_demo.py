@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -137,3 +138,11 @@ def test_a_place_that_is_taken_is_refused_before_the_arm_is_simulated(tmp_path: 
     done = rrrid("demo", *QUICK, cwd=tmp_path)
     assert (done.returncode, "RRID-C05 demo/run: " in done.stderr) == (2, True)
     assert [p.name for p in (tmp_path / "demo").iterdir()] == ["run"]
+
+
+def test_nothing_is_told_after_a_simulation_that_failed(tmp_path: Path) -> None:
+    """The clock that tells of a long step ends with the command."""
+    before = set(threading.enumerate())
+    done = rrrid("demo", *QUICK, "--fault", "joint_elasticity:2:stiffness=2000", cwd=tmp_path)
+    assert done.returncode != 0
+    assert set(threading.enumerate()) <= before
