@@ -279,31 +279,23 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
     """
     further, names = further_slopes(model, data, range(1, data.n_joints + 1), laid)
     by_nominal = nominal_slopes(model)
-    if by_nominal is not None and not _through(model):
+    if by_nominal is not None:
         return np.concatenate([data.lay(by_nominal), further]), names
-    if not _through(model):
-        laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
-        return np.concatenate([rigid, *laws, further]), names
-    columns, arm, kept = model.columns, model.arm, list(model.columns.kept)
-
-    def linear(motion: Motion) -> Array:
-        own = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
-        return recorded(arm, np.concatenate([own, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2), motion)
-
-    return np.concatenate([data.lay(linear), further]), names
+    laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
+    return np.concatenate([rigid, *laws, further]), names
 
 
 def nominal_slopes(model: Exact) -> Callable[[Motion], Array] | None:
     """Return what gives the slopes (samples, joints, k) by base parameters and friction; None: no effect changes them.
 
-    A drive may mix or scale what it passes on, and an effect by the session's clock is a share of the friction at its joint. What
-    delays, clips or misreads changes slopes by the share that it adds, which is neglected.
+    A drive may mix or scale what it passes on, a record may lag, and an effect by the session's clock is a share of the friction at
+    its joint. What delays a drive, clips or misreads changes slopes by the share that it adds, which is neglected.
     """
     columns, kept = model.columns, list(model.columns.kept)
     n = columns.body.robot.n_joints
     mixed = [m for m in (mixing(one.effect, one.values, n) for one in model.effects) if m is not None]
     shares = [one for one in model.effects if one.effect.clock == "session"]
-    if not mixed and not shares:
+    if not mixed and not shares and not _through(model):
         return None
     matrix = reduce(np.matmul, reversed(mixed), np.eye(n))
 
@@ -313,7 +305,7 @@ def nominal_slopes(model: Exact) -> Callable[[Motion], Array] | None:
         for one in shares:
             for number in model.friction_numbers(one.effect.joint):
                 table[:, :, number] += model.slope_of(one, number, motion)
-        return np.asarray(matrix @ table)
+        return recorded(model.arm, np.asarray(matrix @ table), motion)
 
     return slopes
 

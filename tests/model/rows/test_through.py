@@ -18,7 +18,7 @@ from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
-from pipelines.model.rows.exact import Exact, slopes_of
+from pipelines.model.rows.exact import Exact, nominal_slopes, slopes_of
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal, rigid_rows
 from pipelines.model.rows.prepare import Logs, prepare
@@ -55,6 +55,9 @@ def test_slopes_of_a_model_behind_a_lag_are_those_of_its_torque() -> None:
         shift[k] = step = 1e-3 * (abs(model.beta[k]) or 1.0)
         moved = (model.moved(shift, list(done.names)).torque(data) - model.torque(data)) / step
         assert np.linalg.norm(moved - done.slopes[k]) < 1e-6 * np.linalg.norm(moved)
+    by_nominal = nominal_slopes(model)  # what a diagnosis steps along
+    assert by_nominal is not None
+    assert np.allclose(data.lay(by_nominal), done.slopes[:len(model.beta)], rtol=0.0, atol=1e-12)
 
 
 def test_sharpness_of_each_joint_is_found_behind_a_lag() -> None:
