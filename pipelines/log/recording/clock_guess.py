@@ -25,7 +25,15 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.stated import Statement, stated_scale, stated_unit
 from pipelines.log.units import UNITS
 
-__all__ = ["SECONDS", "Clock", "clock_as_stated", "find_clock", "rate_as_stated", "round_rate", "unit_of_clock"]
+__all__ = [
+    "SECONDS",
+    "Clock",
+    "clock_as_stated",
+    "find_clock",
+    "rate_as_stated",
+    "round_rate",
+    "unit_of_clock",
+]
 
 _COMMON = ("s", "ms", "us", "ns")
 SECONDS = {unit: UNITS[unit].factor for unit in (*_COMMON, "100 ns", "min", "d")}
@@ -36,8 +44,14 @@ _PACE = (
 )  # [1/s] fastest speed over range of motion; the unit of length or angle cancels
 _THIS_CENTURY = (1e9, 4e9)  # [s] since 1970: the years 2001 to 2096
 # (unit, year in which it begins to count, [s] from there to 1970): Unix, LabVIEW, .NET, Windows files, spreadsheets, MATLAB
-_EPOCHS = (*((unit, "1970", 0.0) for unit in _COMMON), ("s", "1904", 2082844800.0), ("100 ns", "1", 62135596800.0),
-           ("100 ns", "1601", 11644473600.0), ("d", "1900", 25569 * 86400.0), ("d", "0", 719529 * 86400.0))
+_EPOCHS = (
+    *((unit, "1970", 0.0) for unit in _COMMON),
+    ("s", "1904", 2082844800.0),
+    ("100 ns", "1", 62135596800.0),
+    ("100 ns", "1601", 11644473600.0),
+    ("d", "1900", 25569 * 86400.0),
+    ("d", "0", 719529 * 86400.0),
+)
 _RISING = 0.9  # of all steps of a clock; some stamps come twice, some clocks are set back
 _EVEN = 0.3  # standard deviation over mean of the steps of a clock without a name
 _RATIO_TOLERANCE = 0.02
@@ -72,8 +86,9 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     found += [_single(table, c) for c in times if _rises(table.columns[c])]
     if not found and (backwards := [c for c in times if _rises(-table.columns[c])]):
         where = f"{table.source}, column '{backwards[0]}'"
-        raise InputRejected("T01", "falls from row to row: the newest row is first", where=where,
-                            remedy="sort the rows by it, the oldest first")
+        message = "falls from row to row: the newest row is first"
+        remedy = "sort the rows by it, the oldest first"
+        raise InputRejected("T01", message, where=where, remedy=remedy)
     if found:
         uneven = [_unevenness(clock.values) for clock in found]
         best = min(uneven)
@@ -180,7 +195,9 @@ def unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[s
         if problem := _contradicts(named, rates, by_velocity, clock.values, q):
             return "", Guess("", "unsure", f"its name or header says '{named}', but {problem}")
         return named, Guess(
-            named, "sure", f"named so, and a median step of {median:.4g} makes {rates[named]:.4g} Hz"
+            named,
+            "sure",
+            f"named so, and a median step of {median:.4g} makes {rates[named]:.4g} Hz",
         )
     plausible = [unit for unit, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
     if since := _since(clock.values[0], plausible):
@@ -221,7 +238,11 @@ def rate_as_stated(stated: Statement | None, slope: Slope | None) -> tuple[float
 
 
 def clock_as_stated(
-    clock: Clock, q: Array | None, slope: Slope | None, notes: Sequence[str], stated: Statement | None
+    clock: Clock,
+    q: Array | None,
+    slope: Slope | None,
+    notes: Sequence[str],
+    stated: Statement | None,
 ) -> tuple[str, Guess]:
     """Return the unit of a clock as `unit_of_clock` does, with what the file states of it and of the rate."""
     said = stated_unit(notes, "time") if not clock.paired and not clock.units[0] else None
@@ -229,7 +250,11 @@ def clock_as_stated(
         clock = replace(clock, units=(said.value,))
     unit, guess = unit_of_clock(clock, q, slope)
     if said is not None and said.value and guess.confidence == "sure":
-        guess = replace(guess, confidence="likely", why=guess.why.replace("named so", f"the file states {said.words}"))
+        guess = replace(
+            guess,
+            confidence="likely",
+            why=guess.why.replace("named so", f"the file states {said.words}"),
+        )
     if not clock.units[0] and (ticks := stated_scale(notes, "time")):
         return "", Guess("", "unsure", f"the file states '{ticks[0].words}'")
     if stated is None or clock.paired or guess.confidence == "sure" or unit == "sample":
@@ -237,7 +262,11 @@ def clock_as_stated(
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0]))
     words = f"a median step of {step:.4g}, and the file states {stated.words}"
-    fits = [other for other, size in SECONDS.items() if abs(step * size * stated.number - 1.0) < _RATIO_TOLERANCE]
+    fits = [
+        other
+        for other, size in SECONDS.items()
+        if abs(step * size * stated.number - 1.0) < _RATIO_TOLERANCE
+    ]
     if len(fits) == 1 and unit in ("", fits[0]):
         return fits[0], Guess(fits[0], "likely", words)
     if step == 1.0 and not unit and math.isfinite(stated.number):

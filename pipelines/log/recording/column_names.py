@@ -22,13 +22,23 @@ __all__ = ["ColumnName", "read_name", "signal_of", "words_of"]
 Origin = Literal["measured", "plain", "commanded"]
 
 
-_COMMANDED, _MEASURED, _MOTOR, _JOINT = (WORDS[k] for k in ("commanded", "measured", "motor", "joint"))
-_PARTIAL = WORDS["partial"]  # of a torque, or what a controller computed: not the torque that moved the joint
-_ESTIMATED = WORDS["estimated"]  # a computed torque; of a motion, what the drive makes of its encoder: the measurement
+_COMMANDED, _MEASURED, _MOTOR, _JOINT = (
+    WORDS[k] for k in ("commanded", "measured", "motor", "joint")
+)
+_PARTIAL = WORDS[
+    "partial"
+]  # of a torque, or what a controller computed: not the torque that moved the joint
+_ESTIMATED = WORDS[
+    "estimated"
+]  # a computed torque; of a motion, what the drive makes of its encoder: the measurement
 _VARIANT = WORDS["variant"]
 _NOUNS = {quantity: WORDS[quantity] for quantity in QUANTITIES}
-_LEAST_OF_COMPOUND = 3  # Latin letters of a word that others are written to without a space, but for these
-_SHORT = frozenset({"q", "qd", "dq", "iq", "fb", "ff", "sp", "tq", "ee", "ft", "io", "est", "soll", "ist"})
+_LEAST_OF_COMPOUND = (
+    3  # Latin letters of a word that others are written to without a space, but for these
+)
+_SHORT = frozenset(
+    {"q", "qd", "dq", "iq", "fb", "ff", "sp", "tq", "ee", "ft", "io", "est", "soll", "ist"}
+)
 
 
 def _compounding(word: str) -> bool:
@@ -63,7 +73,9 @@ _UNIT_WORDS = {
     "‰": "permille promille",
     "LSB": "lsb",
 }
-_NOT_IN_NAMES = frozenset({"m", "d", "n", "k", "min", "mn", "kn", "turn", "100ns"})  # words and indices rather than units
+_NOT_IN_NAMES = frozenset(
+    {"m", "d", "n", "k", "min", "mn", "kn", "turn", "100ns"}
+)  # words and indices rather than units
 _SUFFIX_UNITS = {
     word: unit
     for join in ("", "p")
@@ -73,7 +85,9 @@ _SUFFIX_UNITS = {
 _SUFFIX_UNITS |= {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
 
 
-_ROLE_WORDS = frozenset[str]().union(*(words for meaning, words in WORDS.items() if meaning not in QUANTITIES), {"d"})
+_ROLE_WORDS = frozenset[str]().union(
+    *(words for meaning, words in WORDS.items() if meaning not in QUANTITIES), {"d"}
+)
 
 
 @dataclass(frozen=True)
@@ -179,7 +193,11 @@ def read_name(column: str, unit: str = "") -> ColumnName:
     named, unit_words = _unit_in_name(column, quantity)
     # A unit in the header is stronger than a word: "temps (s)" is a time, in French.
     by_unit = quantity if quantity == "other" else _quantity_of(unit) or quantity
-    misused = {words[at]} if at is not None and quantity not in (by_unit, "time") and len(words[at]) > 1 else set()
+    misused = (
+        {words[at]}
+        if at is not None and quantity not in (by_unit, "time") and len(words[at]) > 1
+        else set()
+    )
     quantity = by_unit
     unit = unit or named
     quantity = quantity or _quantity_of(unit)

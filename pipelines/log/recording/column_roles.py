@@ -20,7 +20,17 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
 from pipelines.log.units import canonical_unit
 
-__all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of", "texts_of", "unit_of_group"]
+__all__ = [
+    "Choice",
+    "Group",
+    "by_texts",
+    "choose",
+    "companion_of",
+    "file_quantity",
+    "groups_of",
+    "texts_of",
+    "unit_of_group",
+]
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
@@ -40,12 +50,16 @@ class Group:
     columns: tuple[str, ...]
     order: Order  # text: as columns of text name them, and no robot has these names
     words: str  # the group in words, for comments
-    unknown: frozenset[str] = frozenset()  # words of all its names that say neither what it is nor which joint
+    unknown: frozenset[str] = (
+        frozenset()
+    )  # words of all its names that say neither what it is nor which joint
 
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:
         """Return the side of the gear that the names state: q is a joint's by convention; learning may scale its data."""
-        if {"observation", "action", "norm", "normalized", "normalised", "scaled"} & set(self.words.split()):
+        if {"observation", "action", "norm", "normalized", "normalised", "scaled"} & set(
+            self.words.split()
+        ):
             return "scaled"
         return "motor" if self.motor else "joint" if self.names_joints else ""
 
@@ -78,7 +92,11 @@ def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False)
     shared, port = _shared_path(table), _shared_port(table)
     for column in table.columns:
         rest, place = _without_joint(column.removeprefix(shared).removesuffix(port), patterns)
-        rest = re.sub("(?i)force|kraft|fuerza|forza", "torque", rest) if slides and _number(words_of(rest)) is not None else rest
+        rest = (
+            re.sub("(?i)force|kraft|fuerza|forza", "torque", rest)
+            if slides and _number(words_of(rest)) is not None
+            else rest
+        )
         name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
         if place is None:
             place = _place_by_words(name.label, joints)
@@ -88,7 +106,9 @@ def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False)
     for members in found.values():
         for part in _split(members):
             if {"x", "y", "z"} <= {name.column.removeprefix(shared).lower() for name, _ in part}:
-                part = [(replace(name, quantity="other"), place) for name, place in part]  # the tool's pose
+                part = [
+                    (replace(name, quantity="other"), place) for name, place in part
+                ]  # the tool's pose
             groups.append(_ordered(part, joints, texts))
     return groups
 
@@ -98,9 +118,13 @@ def _shared_path(table: RawTable) -> str:
 
     It says nothing of a column, unless that all are commanded, or apart from the clock computed: "cmd.".
     """
-    signals = [column for column in table.columns if read_name(column).quantity not in ("time", "index")]
+    signals = [
+        column for column in table.columns if read_name(column).quantity not in ("time", "index")
+    ]
     every, path = (_common_path(names) for names in (list(table.columns), signals))
-    said = read_name(path.removeprefix(every).replace("Model Root", ""))  # that of every signal of Simulink's models
+    said = read_name(
+        path.removeprefix(every).replace("Model Root", "")
+    )  # that of every signal of Simulink's models
     path = every if said.partial and said.origin != "measured" else path or every
     return "" if read_name(path).origin == "commanded" else path
 
@@ -113,7 +137,9 @@ def _shared_port(table: RawTable) -> str:
 
 def _common_path(names: Sequence[str]) -> str:
     folders = zip(*(re.split(r"(?<=[./])", name)[:-1] for name in names), strict=False)
-    return "".join(same[0] for same in takewhile(lambda parts: len(set(parts)) == 1 < len(parts), folders))
+    return "".join(
+        same[0] for same in takewhile(lambda parts: len(set(parts)) == 1 < len(parts), folders)
+    )
 
 
 def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
@@ -122,11 +148,21 @@ def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
     All of the robot's names, or none: columns joint_0, joint_1, … do not name the robot's joint_1, joint_2, …
     """
     for generic in (frozenset[str](), _GENERIC):
-        names = [[w for w in re.findall(r"\d+|[A-Z]?[a-z]+|[A-Z]+", name) if w.lower() not in generic] for name in joints]
+        names = [
+            [w for w in re.findall(r"\d+|[A-Z]?[a-z]+|[A-Z]+", name) if w.lower() not in generic]
+            for name in joints
+        ]
         if any(sum(map(len, words)) < 3 or not any(map(str.isalpha, words)) for words in names):
             continue
-        found = [re.compile(rf"(?<![A-Za-z0-9]){'[^A-Za-z0-9]?'.join(words)}(?![A-Za-z0-9])", re.IGNORECASE) for words in names]
-        if found and all(any(pattern.search(column) for column in table.columns) for pattern in found):
+        found = [
+            re.compile(
+                rf"(?<![A-Za-z0-9]){'[^A-Za-z0-9]?'.join(words)}(?![A-Za-z0-9])", re.IGNORECASE
+            )
+            for words in names
+        ]
+        if found and all(
+            any(pattern.search(column) for column in table.columns) for pattern in found
+        ):
             return found
     return []
 
@@ -135,7 +171,7 @@ def _without_joint(column: str, names: Sequence[re.Pattern[str]]) -> tuple[str, 
     """Return the column's name without the name of a joint in it, and the place of that joint (from 0)."""
     for place in sorted(range(len(names)), key=lambda k: -len(names[k].pattern)):
         if found := names[place].search(column):
-            return column[: found.start()] + " " + column[found.end():], place
+            return column[: found.start()] + " " + column[found.end() :], place
     return column, None
 
 
@@ -145,8 +181,11 @@ def _place_by_words(label: Sequence[str], joints: Sequence[str]) -> int | None:
         return None
     bare = [[word for word in words_of(name) if word not in _GENERIC] for name in joints]
     common = set(bare[0]).intersection(*bare[1:]) if len(bare) > 1 else set()
-    matches = [k for k, words in enumerate(bare) if [w for w in words if w not in common] == [
-        w for w in label if w not in common] and words]
+    matches = [
+        k
+        for k, words in enumerate(bare)
+        if [w for w in words if w not in common] == [w for w in label if w not in common] and words
+    ]
     return matches[0] if len(matches) == 1 else None
 
 
@@ -156,20 +195,30 @@ def texts_of(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
         if set(joints) <= set(words):
             return tuple(word for word in words if word in joints)
     texts = list(table.labels.values())
-    for words in (re.findall(r"[\w./:-]+", text) for text in texts if text.strip()[:1] in ("[", "(")):
-        if len(words) > 1 and (set(joints) <= set(words) or not joints) and not any(word[0].isdecimal() for word in words):
+    for words in (
+        re.findall(r"[\w./:-]+", text) for text in texts if text.strip()[:1] in ("[", "(")
+    ):
+        if (
+            len(words) > 1
+            and (set(joints) <= set(words) or not joints)
+            and not any(word[0].isdecimal() for word in words)
+        ):
             return tuple(words)
     known = [k for k, text in enumerate(texts) if text in joints]
     if known:
-        return tuple(texts[known[0]: known[-1] + 1])
+        return tuple(texts[known[0] : known[-1] + 1])
     families: dict[tuple[str, ...], list[str]] = {}
     for column, text in table.labels.items():
-        families.setdefault(tuple(word for word in words_of(column) if not word.isdecimal()), []).append(text)
+        families.setdefault(
+            tuple(word for word in words_of(column) if not word.isdecimal()), []
+        ).append(text)
     found = max(families.values(), key=len, default=[])
     return tuple(found) if len(set(found)) == len(found) > 1 else ()
 
 
-def by_texts(columns: Sequence[str], texts: Sequence[str], joints: Sequence[str]) -> tuple[list[str], Order | None]:
+def by_texts(
+    columns: Sequence[str], texts: Sequence[str], joints: Sequence[str]
+) -> tuple[list[str], Order | None]:
     """Return the columns in the robot's order by the `texts` that name them; None where the texts say nothing of them."""
     if len(texts) != len(columns) or len(texts) < 2:
         return list(columns), None
@@ -180,7 +229,9 @@ def by_texts(columns: Sequence[str], texts: Sequence[str], joints: Sequence[str]
     return list(columns), None if rising else "text"
 
 
-def _split(members: list[tuple[ColumnName, int | None]]) -> list[list[tuple[ColumnName, int | None]]]:
+def _split(
+    members: list[tuple[ColumnName, int | None]],
+) -> list[list[tuple[ColumnName, int | None]]]:
     """Split columns of one kind by the words beside their numbers: arm_q_1 … and leg_q_1 … are two groups.
 
     Where a word comes once only, the words name the joints: wrist_1, wrist_2, elbow.
@@ -196,26 +247,48 @@ def _split(members: list[tuple[ColumnName, int | None]]) -> list[list[tuple[Colu
     return list(parts.values()) if len(several) == len(parts) else [members]
 
 
-def _ordered(members: list[tuple[ColumnName, int | None]], joints: Sequence[str], texts: Sequence[str]) -> Group:
+def _ordered(
+    members: list[tuple[ColumnName, int | None]], joints: Sequence[str], texts: Sequence[str]
+) -> Group:
     """Return the group with its columns from the base to the tip, as far as that can be known."""
     names = [name for name, _ in members]
     places = [place for _, place in members]
     numbers = [_number(name.label) for name in names]
     order: Order = "file"
-    if joints and sorted(place for place in places if place is not None) == list(range(len(joints))):
+    if joints and sorted(place for place in places if place is not None) == list(
+        range(len(joints))
+    ):
         names, order = [names[places.index(place)] for place in range(len(joints))], "robot"
-    elif None not in numbers and len(set(numbers)) == len(numbers) and all(place is None for place in places):
-        names, order = [names[k] for k in sorted(range(len(names)), key=lambda k: numbers[k] or 0)], "numbers"
+    elif (
+        None not in numbers
+        and len(set(numbers)) == len(numbers)
+        and all(place is None for place in places)
+    ):
+        names, order = (
+            [names[k] for k in sorted(range(len(names)), key=lambda k: numbers[k] or 0)],
+            "numbers",
+        )
     columns = [name.column for name in names]
     if order != "robot":
         columns, by_text = by_texts(columns, texts, joints)
         order = by_text or order
     first = names[0]
-    said = [{w for w in name.label if w.isalpha() and (len(w) > 1 or not w.isascii())} for name in names]
+    said = [
+        {w for w in name.label if w.isalpha() and (len(w) > 1 or not w.isascii())} for name in names
+    ]
     unknown = frozenset(said[0].intersection(*said[1:]))
     words = " ".join(first.role) or " ".join(first.label)
-    return Group(first.quantity, first.origin, first.motor, first.partial, first.filtered,
-                 tuple(columns), order, words, unknown if len(names) > 1 else frozenset())
+    return Group(
+        first.quantity,
+        first.origin,
+        first.motor,
+        first.partial,
+        first.filtered,
+        tuple(columns),
+        order,
+        words,
+        unknown if len(names) > 1 else frozenset(),
+    )
 
 
 def _number(label: Sequence[str]) -> int | None:
@@ -223,26 +296,40 @@ def _number(label: Sequence[str]) -> int | None:
     return int(numbers[-1][:9]) if numbers else None
 
 
-def choose(groups: Sequence[Group], quantities: Sequence[str], n: int | None, commanded: bool) -> Choice:
+def choose(
+    groups: Sequence[Group], quantities: Sequence[str], n: int | None, commanded: bool
+) -> Choice:
     """Return the group that holds a signal of one of `quantities`, the earlier ones preferred.
 
     Args:
         n: number of joints; None where it is not known.
         commanded: whether a commanded one will do where no other is there.
     """
-    fitting = [g for g in groups if g.quantity in quantities and not g.partial and (commanded or g.origin != "commanded")]
+    fitting = [
+        g
+        for g in groups
+        if g.quantity in quantities and not g.partial and (commanded or g.origin != "commanded")
+    ]
     others = [g for g in groups if g.quantity in quantities and g not in fitting]
     sized = [g for g in fitting if n is None or len(g.columns) == n]
 
     def key(group: Group) -> tuple[object, ...]:
-        return (group.origin == "commanded", group.order != "robot", quantities.index(group.quantity), group.rank)
+        return (
+            group.origin == "commanded",
+            group.order != "robot",
+            quantities.index(group.quantity),
+            group.rank,
+        )
 
     sized.sort(key=key)
     rest = tuple(g for g in (*fitting, *others) if not sized or g is not sized[0])
     if not sized:
         return Choice(None, rest)
     best = [g for g in sized if key(g) == key(sized[0])]
-    return Choice(sized[0] if len(best) == 1 else None, rest if len(best) == 1 else (*best, *(g for g in rest if g not in best)))
+    return Choice(
+        sized[0] if len(best) == 1 else None,
+        rest if len(best) == 1 else (*best, *(g for g in rest if g not in best)),
+    )
 
 
 def unit_of_group(group: Sequence[str], table: RawTable) -> tuple[str | None, ...]:
@@ -251,8 +338,10 @@ def unit_of_group(group: Sequence[str], table: RawTable) -> tuple[str | None, ..
     It may be one that `UNITS` does not have, such as "%".
     """
     headers = [canonical_unit(table.units.get(column, "")).strip() for column in group]
-    return tuple(header if header not in ("", "-", "1") else read_name(column).unit or None
-                 for header, column in zip(headers, group, strict=True))
+    return tuple(
+        header if header not in ("", "-", "1") else read_name(column).unit or None
+        for header, column in zip(headers, group, strict=True)
+    )
 
 
 def file_quantity(path: Path) -> str:
@@ -264,14 +353,24 @@ def file_quantity(path: Path) -> str:
 def companion_of(path: Path, table: RawTable) -> RawTable | None:
     """Return a file in the same folder with the same columns and as many rows: positions here, torques there."""
     for other in sorted(path.parent.iterdir())[:200]:
-        if other == path or other.suffix.lower() != path.suffix.lower() or not other.is_file() or other.stat().st_size > 1 << 30:
+        if (
+            other == path
+            or other.suffix.lower() != path.suffix.lower()
+            or not other.is_file()
+            or other.stat().st_size > 1 << 30
+        ):
             continue
-        if (file_quantity(other) in ("torque", "current")) == (file_quantity(path) in ("torque", "current")):
+        if (file_quantity(other) in ("torque", "current")) == (
+            file_quantity(path) in ("torque", "current")
+        ):
             continue
         try:
             candidate = read_table(other)
         except InputRejected:
             continue  # another file of the folder
-        if list(candidate.columns) == list(table.columns) and candidate.rows.size == table.rows.size:
+        if (
+            list(candidate.columns) == list(table.columns)
+            and candidate.rows.size == table.rows.size
+        ):
             return candidate
     return None

@@ -37,8 +37,13 @@ class ControllerTable:
     rate: float  # [Hz]
 
 
-def controller_table(recipe: Recipe | None, robot: RobotDescription, motion: Callable[[Array], Array], duration: float,
-                     sample_time: float) -> ControllerTable:
+def controller_table(
+    recipe: Recipe | None,
+    robot: RobotDescription,
+    motion: Callable[[Array], Array],
+    duration: float,
+    sample_time: float,
+) -> ControllerTable:
     """Positions at the controller's rate, in its units and on its side of the drive.
 
     Args:
@@ -56,34 +61,48 @@ def controller_table(recipe: Recipe | None, robot: RobotDescription, motion: Cal
         return _with_time(t, tuple(f"q_{j + 1}" for j in range(n)), units, q, rate)
     spec = recipe.signals.get("q")
     if spec is None:
-        raise UsageError("C02", "the recipe has no signal q", where=recipe.where, remedy="give a recipe that imports positions")
-    units = units_of_joints("q", spec, robot, recipe.where, []) if spec.unit else tuple(
-        schema.joint_unit("q", revolute) for revolute in robot.revolute)
+        remedy = "give a recipe that imports positions"
+        raise UsageError("C02", "the recipe has no signal q", where=recipe.where, remedy=remedy)
+    units = (
+        units_of_joints("q", spec, robot, recipe.where, [])
+        if spec.unit
+        else tuple(schema.joint_unit("q", revolute) for revolute in robot.revolute)
+    )
     values = (q - _each(spec.offset, n, recipe)) if np.any(spec.offset) else q
     drive = drive_of(recipe.drive, robot, recipe.where)
     if spec.side == "motor" or (spec.side is None and recipe.drive.transmission is not None):
         if drive is None or drive.transmission is None:
-            raise UsageError("C02", "signals.q is on the motor side, but there is no drive.transmission", where=recipe.where,
-                             remedy="add [drive] transmission = the gear ratios")
+            message = "signals.q is on the motor side, but there is no drive.transmission"
+            remedy = "add [drive] transmission = the gear ratios"
+            raise UsageError("C02", message, where=recipe.where, remedy=remedy)
         values = values @ np.array(drive.transmission).T
-    values = values / _factor(units, spec, n, recipe) / _each(spec.sign, n, recipe) / _each(spec.scale, n, recipe)
+    values = (
+        values
+        / _factor(units, spec, n, recipe)
+        / _each(spec.sign, n, recipe)
+        / _each(spec.scale, n, recipe)
+    )
     return _with_time(t, _names(spec, n), units, values, rate)
 
 
 def _rate(recipe: Recipe | None, sample_time: float) -> float:
     if recipe is not None and recipe.time.rate:
         return recipe.time.rate
-    return 1.0 / (recipe.time.sample_time if recipe is not None and recipe.time.sample_time else sample_time)
+    return 1.0 / (
+        recipe.time.sample_time if recipe is not None and recipe.time.sample_time else sample_time
+    )
 
 
-def _with_time(t: Array, names: tuple[str, ...], units: tuple[str, ...], values: Array, rate: float) -> ControllerTable:
+def _with_time(
+    t: Array, names: tuple[str, ...], units: tuple[str, ...], values: Array, rate: float
+) -> ControllerTable:
     return ControllerTable(("t", *names), ("s", *units), np.column_stack([t, values]), rate)
 
 
 def _each(value: Numbers, n: int, recipe: Recipe) -> Array:
     if isinstance(value, tuple) and len(value) != n:
-        raise UsageError("C02", f"signals.q holds {len(value)} numbers, the robot has {n} joints", where=recipe.where,
-                         remedy="one number, or one a joint")
+        message = f"signals.q holds {len(value)} numbers, the robot has {n} joints"
+        raise UsageError("C02", message, where=recipe.where, remedy="one number, or one a joint")
     return np.broadcast_to(np.asarray(value, dtype=np.float64), (n,))
 
 
@@ -91,17 +110,26 @@ def _factor(units: tuple[str, ...], spec: SignalSpec, n: int, recipe: Recipe) ->
     """SI per recorded number of each joint."""
     if "counts" in units:
         if spec.counts_per_rev is None:
-            raise UsageError("C02", "counts without counts_per_rev", where=recipe.where, remedy="add it to signals.q")
+            message = "counts without counts_per_rev"
+            raise UsageError("C02", message, where=recipe.where, remedy="add it to signals.q")
         turn = 2.0 * math.pi / _each(spec.counts_per_rev, n, recipe)
-        return np.array([turn[j] if unit == "counts" else to_si(unit, "position", where=recipe.where).factor
-                         for j, unit in enumerate(units)])
+        return np.array(
+            [
+                turn[j] if unit == "counts" else to_si(unit, "position", where=recipe.where).factor
+                for j, unit in enumerate(units)
+            ]
+        )
     return np.array([to_si(unit, "position", where=recipe.where).factor for unit in units])
 
 
 def _names(spec: SignalSpec, n: int) -> tuple[str, ...]:
     """Columns as the recipe calls them; numbered where it gives none by name."""
     where = spec.where
-    if isinstance(where, tuple) and len(where) == n and all(isinstance(name, str) for name in where):
+    if (
+        isinstance(where, tuple)
+        and len(where) == n
+        and all(isinstance(name, str) for name in where)
+    ):
         return tuple(map(str, where))
     if isinstance(where, str) and "{j}" in where:
         return tuple(where.replace("{j}", str(j + 1)) for j in range(n))
@@ -110,10 +138,14 @@ def _names(spec: SignalSpec, n: int) -> tuple[str, ...]:
 
 def write_controller_table(path: Path, table: ControllerTable) -> None:
     """As CSV: one header line of names, each number with all its digits."""
+
     def fill(draft: Path) -> None:
         with draft.open("w", encoding="utf-8", newline="\n") as file:
             file.write(",".join(map(csv_cell, table.names)) + "\n")
             for start in range(0, len(table.values), 8192):
-                file.writelines(",".join(map(repr, row)) + "\n" for row in table.values[start:start + 8192].tolist())
+                file.writelines(
+                    ",".join(map(repr, row)) + "\n"
+                    for row in table.values[start : start + 8192].tolist()
+                )
 
     write_file(path, fill)

@@ -12,15 +12,53 @@ from pipelines.log.recording.column_names import words_of
 from pipelines.log.recording.vocabulary import ALL_WORDS
 from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["MISSING", "WITH_UNIT", "Dialect", "TextFormat", "cells_of", "decode", "find_dialect", "holds_number", "is_number",
-           "lines_of"]
+__all__ = [
+    "MISSING",
+    "WITH_UNIT",
+    "Dialect",
+    "TextFormat",
+    "cells_of",
+    "decode",
+    "find_dialect",
+    "holds_number",
+    "is_number",
+    "lines_of",
+]
 
-MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "missing", "-nan", "-NaN", "-",
-                     "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"})
-_NUMBER = re.compile(r"[+-]?(\d++\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|Inf|INF|infinity|Infinity)")
+MISSING = frozenset(
+    {
+        "",
+        "nan",
+        "NaN",
+        "NAN",
+        "NA",
+        "N/A",
+        "null",
+        "NULL",
+        "None",
+        "missing",
+        "-nan",
+        "-NaN",
+        "-",
+        "1.#IND",
+        "-1.#IND",
+        "1.#QNAN",
+        "-1.#QNAN",
+    }
+)
+_NUMBER = re.compile(
+    r"[+-]?(\d++\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(inf|Inf|INF|infinity|Infinity)"
+)
 WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d+")  # as spreadsheets show numbers, in quotes
-_ENCODINGS = ("latin-1", "cp932", "gb18030", "cp949", "cp1250", "cp1251")  # without a mark; the first where none fits better
+_ENCODINGS = (
+    "latin-1",
+    "cp932",
+    "gb18030",
+    "cp949",
+    "cp1250",
+    "cp1251",
+)  # without a mark; the first where none fits better
 _HEAD = 8192  # [bytes] in which the names of the columns are
 _COMMENTS = ("#", "%", "//")
 _DELIMITERS = (",", ";", "\t", "|", " ")
@@ -61,27 +99,35 @@ def decode(data: bytes, source: str, encoding: str | None = None) -> tuple[str, 
     if encoding is None:
         encoding = _encoding_of(data)
         if encoding != "utf-8":
-            mark = " (byte order mark)" if data.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else ""
-            checks.append(Check.of("F16", "warn", f"read as {encoding}{mark}", where=source,
-                                   remedy="give encoding under [format] if that is wrong"))
+            mark = (
+                " (byte order mark)"
+                if data.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
+                else ""
+            )
+            message = f"read as {encoding}{mark}"
+            remedy = "give encoding under [format] if that is wrong"
+            checks.append(Check.of("F16", "warn", message, where=source, remedy=remedy))
     if not encoding.lower().replace("_", "-").startswith("utf-16"):
         whole = len(data)
         data = data.rstrip(b"\0")
         if len(data) < whole:
-            checks.append(Check.of("F09", "repair",
-                                   f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its power", where=source,
-                                   remedy="let the recorder close its file"))
+            message = (
+                f"{whole - len(data)} NUL bytes at the end left out: the recorder lost its power"
+            )
+            remedy = "let the recorder close its file"
+            checks.append(Check.of("F09", "repair", message, where=source, remedy=remedy))
         if (at := data.find(b"\0")) >= 0:
             line = data[:at].count(b"\n") + 1
-            raise InputRejected("F16", f"a NUL byte in line {line}", where=source,
-                                remedy="the file is damaged or not text; export it again")
+            remedy = "the file is damaged or not text; export it again"
+            raise InputRejected("F16", f"a NUL byte in line {line}", where=source, remedy=remedy)
     elif len(data) % 2:
         data = data[:-1]
     try:
         text = data.decode(encoding)
     except (UnicodeDecodeError, LookupError) as problem:
-        raise InputRejected("F16", f"not text in {encoding}: {problem}", where=source,
-                            remedy="give its encoding under [format]") from None
+        message = f"not text in {encoding}: {problem}"
+        remedy = "give its encoding under [format]"
+        raise InputRejected("F16", message, where=source, remedy=remedy) from None
     return text.replace("\r\n", "\n").replace("\r", "\n"), checks
 
 
@@ -112,9 +158,15 @@ def lines_of(text: str, comment: str | None) -> list[tuple[int, str]]:
     """(line number, line) of all lines that are neither empty nor a comment."""
     marks = (comment,) if comment else _COMMENTS
     # A cell such as "#REF!" at the start of a line is damage, not a comment; a comment is followed by a blank or letters.
-    return [(number, line) for number, line in enumerate(text.split("\n"), start=1)
-            if line.strip()
-            and not (line.lstrip().startswith(marks) and not re.match(r"\s*#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)\b", line))]
+    return [
+        (number, line)
+        for number, line in enumerate(text.split("\n"), start=1)
+        if line.strip()
+        and not (
+            line.lstrip().startswith(marks)
+            and not re.match(r"\s*#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)\b", line)
+        )
+    ]
 
 
 def cells_of(line: str, delimiter: str) -> list[str]:
@@ -122,7 +174,11 @@ def cells_of(line: str, delimiter: str) -> list[str]:
     if delimiter == "":
         return [line.strip().strip('"')]
     if delimiter == " ":
-        return [cell.strip('"') for cell in re.findall(r'"[^"]*"|[^\s"]+', line)] if '"' in line else line.split()
+        return (
+            [cell.strip('"') for cell in re.findall(r'"[^"]*"|[^\s"]+', line)]
+            if '"' in line
+            else line.split()
+        )
     if '"' in line:
         import csv
 
@@ -135,7 +191,10 @@ def cells_of(line: str, delimiter: str) -> list[str]:
 
 
 def is_number(cell: str, decimal: str = ".") -> bool:
-    return _NUMBER.fullmatch(cell.replace(",", ".") if decimal == "," and "." not in cell else cell) is not None
+    return (
+        _NUMBER.fullmatch(cell.replace(",", ".") if decimal == "," and "." not in cell else cell)
+        is not None
+    )
 
 
 def holds_number(cell: str, decimal: str = ".") -> bool:
@@ -157,35 +216,52 @@ def find_dialect(lines: list[tuple[int, str]], source: str, given: TextFormat) -
     best: tuple[tuple[float, ...], Dialect] | None = None
     for delimiter in (given.delimiter,) if given.delimiter is not None else (*_DELIMITERS, ""):
         for decimal in (given.decimal,) if given.decimal else (".", ","):
-            if decimal == delimiter or (decimal == "," and given.decimal is None and not any("," in line for line in sample)):
+            if decimal == delimiter or (
+                decimal == "," and given.decimal is None and not any("," in line for line in sample)
+            ):
                 continue
             dialect, score = _score(sample, delimiter, decimal, lines[0][1])
             if best is None or score > best[0]:
                 best = (score, dialect)
     if best is None:
-        raise InputRejected("F16", "no delimiter fits", where=source, remedy="give delimiter and decimal under [format]")
+        remedy = "give delimiter and decimal under [format]"
+        raise InputRejected("F16", "no delimiter fits", where=source, remedy=remedy)
     if best[0][1] == 0.0 and given.delimiter is None:
         _refuse_two_commas(lines, best[1], source)
     return best[1]
 
 
-def _score(sample: list[str], delimiter: str, decimal: str, first: str) -> tuple[Dialect, tuple[float, ...]]:
+def _score(
+    sample: list[str], delimiter: str, decimal: str, first: str
+) -> tuple[Dialect, tuple[float, ...]]:
     split = [cells_of(line, delimiter) for line in sample]
     width = Counter(map(len, split)).most_common(1)[0][0]
     same = [cells for cells in split if len(cells) == width]
-    numeric = sum(holds_number(cell, decimal) or cell in MISSING for cells in same for cell in cells) / (width * len(same))
+    numeric = sum(
+        holds_number(cell, decimal) or cell in MISSING for cells in same for cell in cells
+    ) / (width * len(same))
     head = cells_of(first, delimiter)
     fits = float(len(head) == width or all(is_number(cell, decimal) for cell in head))
     # Rounded, so that one torn line does not outweigh a header that fits.
-    return Dialect(delimiter, decimal, width), (round(numeric * len(same) / len(split), 1), fits, width, float(decimal == "."))
+    return Dialect(delimiter, decimal, width), (
+        round(numeric * len(same) / len(split), 1),
+        fits,
+        width,
+        float(decimal == "."),
+    )
 
 
 def _refuse_two_commas(lines: list[tuple[int, str]], dialect: Dialect, source: str) -> None:
     names = len(cells_of(lines[0][1], ","))
     if dialect.delimiter != "," or names < 2 or dialect.width != 2 * names:
         return
-    number, row = next((k, cells) for k, line in lines if len(cells := cells_of(line, ",")) == dialect.width)
+    number, row = next(
+        (k, cells) for k, line in lines if len(cells := cells_of(line, ",")) == dialect.width
+    )
     if all(map(is_number, row)):  # no names of that many columns above them
-        raise InputRejected("F16", f"line {number} has {dialect.width} cells under {names} names: "
-                            "comma is both delimiter and decimal sign",
-                            where=source, remedy="export with a semicolon or tab between the columns, or with decimal points")
+        message = (
+            f"line {number} has {dialect.width} cells under {names} names: "
+            "comma is both delimiter and decimal sign"
+        )
+        remedy = "export with a semicolon or tab between the columns, or with decimal points"
+        raise InputRejected("F16", message, where=source, remedy=remedy)

@@ -16,10 +16,15 @@ __all__ = ["examine"]
 
 # A glitch was recorded as it stands there: what to make of it is for whoever uses the log to decide.
 _KEPT = "RRID-D06"
-_TIME = "RRID-S08"  # what a recipe declares of time can be wrong by a thousand, and contradict nothing
+_TIME = (
+    "RRID-S08"  # what a recipe declares of time can be wrong by a thousand, and contradict nothing
+)
 
 # What to do about it stands in the recipe, and not in a file that is not written yet.
-_IN_RECIPE = {"RRID-S05": torque_in_recipe(), "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf))}
+_IN_RECIPE = {
+    "RRID-S05": torque_in_recipe(),
+    "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf)),
+}
 
 
 def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Check, ...]:

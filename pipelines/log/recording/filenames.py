@@ -27,7 +27,8 @@ _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^{}]+(?:\{\d+(?:,\d*)?\}[^{}]*)*))?\
 def _compiled(pattern: str) -> re.Pattern[str]:
     """The regular expression of a pattern: {name} any text without a slash, {name:regex} that, *, ** and ? as in a shell."""
     if len(pattern) > _LONGEST:
-        raise UsageError("C02", f"a pattern of {len(pattern)} characters", where="match", remedy=f"write at most {_LONGEST}")
+        message = f"a pattern of {len(pattern)} characters"
+        raise UsageError("C02", message, where="match", remedy=f"write at most {_LONGEST}")
     parts, at = [], 0
     seen: set[str] = set()
     for found in _FIELD.finditer(pattern):
@@ -40,8 +41,9 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     try:
         return re.compile("".join(parts))
     except re.error as problem:
-        raise UsageError("C02", f"pattern '{pattern}': {problem}", where="match",
-                         remedy="write {name}, or {name:regular expression}") from None
+        message = f"pattern '{pattern}': {problem}"
+        remedy = "write {name}, or {name:regular expression}"
+        raise UsageError("C02", message, where="match", remedy=remedy) from None
 
 
 def _shell(text: str) -> str:
@@ -49,7 +51,9 @@ def _shell(text: str) -> str:
     return text.replace(r"\*\*", ".*").replace(r"\*", "[^/]*").replace(r"\?", "[^/]")
 
 
-def matches(every: Sequence[str | tuple[str, ...]], names: Sequence[str], where: Path) -> list[dict[str, dict[str, str]]]:
+def matches(
+    every: Sequence[str | tuple[str, ...]], names: Sequence[str], where: Path
+) -> list[dict[str, dict[str, str]]]:
     """Of each of `every` patterns: the names that fit, each with its groups; in a time that no pattern exceeds.
 
     A regular expression can take longer than the world has lasted; what could is matched in a child process.
@@ -57,20 +61,32 @@ def matches(every: Sequence[str | tuple[str, ...]], names: Sequence[str], where:
     Raises:
         UsageError: C02, a pattern is none, or takes too long.
     """
-    flat = [pattern for patterns in every for pattern in ((patterns,) if isinstance(patterns, str) else patterns)]
+    flat = [
+        pattern
+        for patterns in every
+        for pattern in ((patterns,) if isinstance(patterns, str) else patterns)
+    ]
     for pattern in flat:
         _compiled(pattern)
 
     def work() -> list[dict[str, dict[str, str]]]:
-        return [{name: groups for name in names if (groups := match(patterns, name)) is not None} for patterns in every]
+        return [
+            {name: groups for name in names if (groups := match(patterns, name)) is not None}
+            for patterns in every
+        ]
 
-    if all(":" not in pattern and len(re.findall(r"\{|\*+", pattern)) <= _SIMPLE for pattern in flat):
+    if all(
+        ":" not in pattern and len(re.findall(r"\{|\*+", pattern)) <= _SIMPLE for pattern in flat
+    ):
         return work()
     try:
-        answer = Child(lambda _: Answer({"found": work()}, {})).ask(None, where, _SECONDS, _MEMORY, _MEMORY, last=True)
+        answer = Child(lambda _: Answer({"found": work()}, {})).ask(
+            None, where, _SECONDS, _MEMORY, _MEMORY, last=True
+        )
     except Lost:
-        raise UsageError("C02", f"a pattern takes more than {_SECONDS:.0f} s: {', '.join(flat)}", where=where,
-                         remedy="write fewer wildcards, and no repetition inside another, such as (a+)+") from None
+        message = f"a pattern takes more than {_SECONDS:.0f} s: {', '.join(flat)}"
+        remedy = "write fewer wildcards, and no repetition inside another, such as (a+)+"
+        raise UsageError("C02", message, where=where, remedy=remedy) from None
     found: list[dict[str, dict[str, str]]] = answer.about["found"]
     return found
 
@@ -98,10 +114,14 @@ def fill(template: str, groups: Mapping[str, str], where: object) -> str:
     Raises:
         UsageError: C02, it names a group that the pattern does not have.
     """
+
     def value(found: re.Match[str]) -> str:
         if found.group(1) not in groups:
-            raise UsageError("C02", f"'{template}' names {{{found.group(1)}}}, but the pattern has {', '.join(groups)}",
-                             where=where, remedy="name one of these, or add it to the pattern")
+            message = (
+                f"'{template}' names {{{found.group(1)}}}, but the pattern has {', '.join(groups)}"
+            )
+            remedy = "name one of these, or add it to the pattern"
+            raise UsageError("C02", message, where=where, remedy=remedy)
         return groups[found.group(1)]
 
     return re.sub(r"\{(\w+)\}", value, template)
@@ -114,24 +134,31 @@ def files_below(folder: Path) -> tuple[str, ...]:
         UsageError: not a folder. EnvironmentFault: no permission.
     """
     if not folder.is_dir():
-        raise UsageError("C04", "no such folder", where=folder, remedy="give the folder of the recordings with --source")
+        remedy = "give the folder of the recordings with --source"
+        raise UsageError("C04", "no such folder", where=folder, remedy=remedy)
     if not os.access(folder, os.R_OK | os.X_OK):
-        raise EnvironmentFault("F13", "permission denied", where=folder, remedy="change its permissions")
+        remedy = "change its permissions"
+        raise EnvironmentFault("F13", "permission denied", where=folder, remedy=remedy)
     found: list[str] = []
     for parent, folders, names in os.walk(folder, followlinks=False):
         folders[:] = sorted(f for f in folders if not f.startswith("."))
-        found += [Path(parent, name).relative_to(folder).as_posix() for name in names if not name.startswith(".")]
+        found += [
+            Path(parent, name).relative_to(folder).as_posix()
+            for name in names
+            if not name.startswith(".")
+        ]
         if len(found) > _MOST_FILES:
-            raise UsageError("C07", f"more than {_MOST_FILES} files", where=folder,
-                             remedy="give a folder that holds the recordings only")
+            remedy = "give a folder that holds the recordings only"
+            raise UsageError("C07", f"more than {_MOST_FILES} files", where=folder, remedy=remedy)
     return tuple(sorted(found))
 
 
 def inside(folder: Path, relative: str, where: object) -> Path:
     """The path of a file of the recording, which its name must not lead out of the folder (X11); a link may, it is the user's."""
     if Path(relative).is_absolute() or os.path.normpath(relative).startswith(".."):
-        raise UsageError("X11", f"'{relative}' lies outside the source folder", where=where,
-                         remedy="keep the files of a recording together")
+        message = f"'{relative}' lies outside the source folder"
+        remedy = "keep the files of a recording together"
+        raise UsageError("X11", message, where=where, remedy=remedy)
     return folder / relative
 
 

@@ -29,7 +29,9 @@ _SEARCHED = 40  # lines above the numbers
 _SAMPLED = 20  # lines of numbers that say which columns are numbers
 _MARKS = "#%/*! "  # what a comment begins with
 _DELIMITERS = (",", ";", "\t", " ", "|")
-_BEHIND_SIGN = re.compile(r"(.*[^\s,/])(?:,| /)\s+(\S(?:.{0,18}\S)?)")  # a unit as quantities and axes are labelled
+_BEHIND_SIGN = re.compile(
+    r"(.*[^\s,/])(?:,| /)\s+(\S(?:.{0,18}\S)?)"
+)  # a unit as quantities and axes are labelled
 _NO_UNIT = frozenset({"", "-", "1", "none", "n/a", "[]"})
 FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
 
@@ -143,8 +145,16 @@ def _names_above(
             cells = [cell.strip(" ,;\t") for cell in cells_of(line.strip(), delimiter)]
             fitted = _fitted(cells, width, rows)
             if fitted is None:
-                times = any(re.match(r"\d{1,2}:\d\d", cell) for cell in cells)  # a message of the recorder
-                if rank == 0 and not comment and abs(len(cells) - width) == 1 and _words(cells) and not times:
+                times = any(
+                    re.match(r"\d{1,2}:\d\d", cell) for cell in cells
+                )  # a message of the recorder
+                if (
+                    rank == 0
+                    and not comment
+                    and abs(len(cells) - width) == 1
+                    and _words(cells)
+                    and not times
+                ):
                     odd = number, len(cells)
                 continue
             of_units = _are_units(fitted)
@@ -163,12 +173,9 @@ def _names_above(
         units, unit_line = ("",) * width, 0  # the only line of words: these are the names
     if best is None:
         if odd is not None:
-            raise InputRejected(
-                "F16",
-                f"{odd[1]} names above {width} columns",
-                where=f"{source}, line {odd[0]}",
-                remedy="correct the header, or give [format] header = false and columns by number",
-            )
+            message = f"{odd[1]} names above {width} columns"
+            remedy = "correct the header, or give [format] header = false and columns by number"
+            raise InputRejected("F16", message, where=f"{source}, line {odd[0]}", remedy=remedy)
         return None, units, set()
     return best[1], units, {best[2], unit_line} - {0}
 
@@ -262,9 +269,7 @@ def split_unit(name: str) -> tuple[str, str]:
     return whole[: len(stem)].strip(), unit
 
 
-def names_and_units(
-    cells: Sequence[str],
-) -> tuple[tuple[str, ...], dict[str, str], dict[str, str]]:
+def names_and_units(cells: Sequence[str]) -> tuple[tuple[str, ...], dict[str, str], dict[str, str]]:
     """Return the names, the units in brackets behind them, and which names come again.
 
     Names that differ only in their brackets keep them: "q[elbow]", "axis 1 (deg)", "axis 1 (Nm)".
@@ -302,10 +307,7 @@ def without_repeats(columns: dict[str, Array], header: Header, source: str) -> d
         ):
             continue
         at = header.names.index(first) + 1, header.names.index(name) + 1
-        raise InputRejected(
-            "S03",
-            f"columns {at[0]} and {at[1]} are both named '{first[:80]}'",
-            where=f"{source}, line {header.line}",
-            remedy="rename one of them in the file",
-        )
+        message = f"columns {at[0]} and {at[1]} are both named '{first[:80]}'"
+        remedy = "rename one of them in the file"
+        raise InputRejected("S03", message, where=f"{source}, line {header.line}", remedy=remedy)
     return {name: values for name, values in columns.items() if name not in header.again}

@@ -47,12 +47,9 @@ def read_json(data: bytes, source: str) -> RawTable:
         InputRejected: F08 not JSON, S12 no recording in it, X05 larger than a recording.
     """
     if len(data) > _LARGEST:
-        raise InputRejected(
-            "X05",
-            f"{len(data)} bytes of JSON; import reads up to {_LARGEST}",
-            where=source,
-            remedy="split the recording, or save it as CSV or NPY",
-        )
+        message = f"{len(data)} bytes of JSON; import reads up to {_LARGEST}"
+        remedy = "split the recording, or save it as CSV or NPY"
+        raise InputRejected("X05", message, where=source, remedy=remedy)
     document = _of_pandas(_parsed(data, source))
     frames = _frames(document, _DEEPEST)
     notes = tuple(itertools.islice(_notes(document), _MOST_NOTES))
@@ -63,12 +60,9 @@ def read_json(data: bytes, source: str) -> RawTable:
         if (values := _array(value)) is not None:
             arrays[distinct(name, arrays, source)] = values
     if not arrays:
-        raise InputRejected(
-            "S12",
-            "no list of samples in the JSON file",
-            where=source,
-            remedy="save a list of frames, or one array a signal",
-        )
+        message = "no list of samples in the JSON file"
+        remedy = "save a list of frames, or one array a signal"
+        raise InputRejected("S12", message, where=source, remedy=remedy)
     table = columns_of_arrays(arrays, source)
     return replace(table, notes=(*table.notes, *notes))
 
@@ -87,11 +81,24 @@ def _of_pandas(document: Any) -> Any:
     if not isinstance(document, dict) or not document:
         return document
     names, rows = document.get("columns"), document.get("data")
-    if isinstance(names, list) and isinstance(rows, list) and all(isinstance(name, str) for name in names):
+    if (
+        isinstance(names, list)
+        and isinstance(rows, list)
+        and all(isinstance(name, str) for name in names)
+    ):
         alike = all(isinstance(row, list) and len(row) == len(names) for row in rows)
-        return dict(zip(names, map(list, zip(*rows, strict=True)), strict=True)) if alike and rows else document
-    numbered = all(isinstance(value, dict) and value and all(key.isdecimal() for key in value) for value in document.values())
-    return {name: list(value.values()) for name, value in document.items()} if numbered else document
+        return (
+            dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
+            if alike and rows
+            else document
+        )
+    numbered = all(
+        isinstance(value, dict) and value and all(key.isdecimal() for key in value)
+        for value in document.values()
+    )
+    return (
+        {name: list(value.values()) for name, value in document.items()} if numbered else document
+    )
 
 
 def _parsed(data: bytes, source: str) -> Any:
@@ -103,12 +110,9 @@ def _parsed(data: bytes, source: str) -> Any:
             lines = text.splitlines()
             return [json.loads(line) for line in lines if line.strip()]
     except (ValueError, RecursionError) as problem:
-        raise InputRejected(
-            "F08",
-            f"not valid JSON: {problem}",
-            where=source,
-            remedy="copy the file again, or end the recording before it is copied",
-        ) from None
+        message = f"not valid JSON: {problem}"
+        remedy = "copy the file again, or end the recording before it is copied"
+        raise InputRejected("F08", message, where=source, remedy=remedy) from None
 
 
 def _frames(value: Any, depth: int) -> list[Mapping[str, Any]] | None:
@@ -184,19 +188,15 @@ def table_of_frames(frames: Sequence[Mapping[str, Any]], source: str) -> RawTabl
             elif isinstance(value, int | float):
                 if path not in columns:
                     if len(columns) == _MOST_COLUMNS:
-                        raise InputRejected(
-                            "X05",
-                            f"more than {_MOST_COLUMNS} numbers in a frame",
-                            where=source,
-                            remedy="save the signals of the joints alone",
-                        )
+                        message = f"more than {_MOST_COLUMNS} numbers in a frame"
+                        remedy = "save the signals of the joints alone"
+                        raise InputRejected("X05", message, where=source, remedy=remedy)
                     columns[path] = np.full(len(frames), np.nan)
                     groups.setdefault(group, []).append(path)
                 columns[path][i] = _real(value)
     if not columns:
-        raise InputRejected(
-            "S12", "the frames hold no numbers", where=source, remedy="save the samples as numbers"
-        )
+        remedy = "save the samples as numbers"
+        raise InputRejected("S12", "the frames hold no numbers", where=source, remedy=remedy)
     labels = {
         path: found[0]
         for path, found in texts.items()

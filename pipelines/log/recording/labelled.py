@@ -62,8 +62,17 @@ def labelled_lines(lines: list[tuple[int, str]]) -> LabelledLines | None:
     names, count = Counter(names_of(line)[0] for _, line in middle).most_common(1)[0]
     if count < _LEAST * len(middle) or len(set(names)) < max(len(names), 2):
         return None
-    rows = [(number, found) for number, line in lines for said, found in (names_of(line),) if said == names]
-    return LabelledLines(names, rows, len(lines) - len(rows)) if len(rows) >= _LEAST * len(lines) else None
+    rows = [
+        (number, found)
+        for number, line in lines
+        for said, found in (names_of(line),)
+        if said == names
+    ]
+    return (
+        LabelledLines(names, rows, len(lines) - len(rows))
+        if len(rows) >= _LEAST * len(lines)
+        else None
+    )
 
 
 def _names(form: str) -> tuple[str, ...]:
@@ -91,14 +100,19 @@ def _names(form: str) -> tuple[str, ...]:
     place: Counter[str] = Counter()
     names = []
     for k, name in enumerate(found):
-        names.append(f"{name}[{place[name]}]" if name and times[name] > 1 else name or f"column_{k + 1}")
+        names.append(
+            f"{name}[{place[name]}]" if name and times[name] > 1 else name or f"column_{k + 1}"
+        )
         place[name] += 1
     return tuple(names)
 
 
 def yaml_documents(data: bytes) -> list[dict[str, Any]] | None:
     """Return YAML documents of mappings and lists of scalars, as `ros2 topic echo` writes them; None where it is no such text."""
-    if not re.match(rb"(---\r?\n)?[A-Za-z_]\w*:( \S.*)?\r?\n", data[:300]) or data.count(b"\n---") < 2:
+    if (
+        not re.match(rb"(---\r?\n)?[A-Za-z_]\w*:( \S.*)?\r?\n", data[:300])
+        or data.count(b"\n---") < 2
+    ):
         return None
     text = data.decode("utf-8", "replace").replace("\r\n", "\n")
     parts = [part for part in re.split(r"(?m)^---[^\S\n]*$", text) if part.strip()]
@@ -135,6 +149,10 @@ def _yaml_lines(text: str) -> Iterator[tuple[int, bool, str, Any]]:
         value = (found[3] if found[2] else found[5]) or ""
         scalar: Any = value.strip().strip("'\"")
         if _VALUE.fullmatch(value.strip()) and ":" not in value:
-            scalar = float(value) if "." in value or not value.strip().lstrip("+-").isdecimal() else int(value)
+            scalar = (
+                float(value)
+                if "." in value or not value.strip().lstrip("+-").isdecimal()
+                else int(value)
+            )
         opens = not found[2] and not value.strip()
         yield len(found[1]), bool(found[2]), found[4] or "", None if opens else scalar

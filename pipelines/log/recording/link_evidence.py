@@ -22,7 +22,9 @@ from pipelines.log.limits import FEWEST
 
 __all__ = ["LinkFit", "TorqueModel", "best_unit", "fit_of_links", "fits_by_unit", "unlike_links"]
 
-TorqueModel = Callable[[Array, Array, Array], Array | None]  # (samples, joints) [rad] -> [N m]; None where links are unknown
+TorqueModel = Callable[
+    [Array, Array, Array], Array | None
+]  # (samples, joints) [rad] -> [N m]; None where links are unknown
 
 
 @dataclass(frozen=True)
@@ -32,12 +34,18 @@ class Config:
     window: float = 0.1  # [s] of the cubic that is differentiated (Savitzky & Golay 1964): an arm's moves take longer
     fewest: int = 5  # samples in it: a cubic has four coefficients
     changes: float = 0.1  # of the links' torque over the motion: else friction and noise are most of what changes
-    explained: float = 0.5  # of the power that friction leaves: most of it, or the torque is not said to follow
+    explained: float = (
+        0.5  # of the power that friction leaves: most of it, or the torque is not said to follow
+    )
     most: float = 0.8  # of the links' torque is at joints they explain: the light ones of a wrist may be friction alone
     slow: float = 0.01  # of a joint's fastest speed: below, it may rest, and noise alone gives the speed a sign
-    alone: float = 0.99  # of the torque with its friction, which takes more than a hundredth of any drive's
+    alone: float = (
+        0.99  # of the torque with its friction, which takes more than a hundredth of any drive's
+    )
     gain: float = 3.0  # a payload as heavy as the links, whose masses are roughly known
-    unnamed_gain: float = 1.5  # of a torque without a unit: a share of a rated torque may be near it by chance
+    unnamed_gain: float = (
+        1.5  # of a torque without a unit: a share of a rated torque may be near it by chance
+    )
     better: float = 0.5  # of what one unit or order leaves open is left by another that fits better
     proof: float = 0.1  # of the torque may be left open by the unit that is proved
     friction: float = 0.3  # correlation with the direction of motion of what the links leave: where it is friction
@@ -53,13 +61,20 @@ class LinkFit:
     followed: bool  # at the joints that have most of the links' torque
     alone: bool  # without any friction: computed, or simulated
     varies: bool  # the links' torque changes over the motion, so that the others say something
-    left: float  # share of the torque's change that links and friction leave open, mean of the joints
+    left: (
+        float  # share of the torque's change that links and friction leave open, mean of the joints
+    )
     signs: Array  # (joints,) -1 where weight and friction both have the other sign, 1 where both have the links', else 0
     otherwise: str = ""  # what would explain it far better: two joints exchanged, or an angle counted from another link
 
 
 def fits_by_unit(
-    model: TorqueModel, q: Array, tau: Array, t: Array, factors: Mapping[str, Array], config: Config = Config()
+    model: TorqueModel,
+    q: Array,
+    tau: Array,
+    t: Array,
+    factors: Mapping[str, Array],
+    config: Config = Config(),
 ) -> dict[str, LinkFit]:
     """Return the fit for each unit that positions `q` may be in; `factors` hold its SI value, one a joint."""
     torque = _smooth(tau, t, config)[0]
@@ -73,8 +88,10 @@ def fits_by_unit(
             continue
         every = max(1, len(torque) // config.samples_of_orders)
         some = (motion[0][::every], motion[1][::every], motion[2][::every])
-        found[unit] = replace(fit_of_links(torque, links, motion[1], config),
-                              otherwise=_otherwise(model, some, torque[::every], config))
+        found[unit] = replace(
+            fit_of_links(torque, links, motion[1], config),
+            otherwise=_otherwise(model, some, torque[::every], config),
+        )
     return found
 
 
@@ -84,11 +101,17 @@ def best_unit(fits: Mapping[str, LinkFit], config: Config = Config()) -> tuple[s
     Gears near 57 make radians of a motor look like degrees of a joint: proved is a unit in which torques are N m as well.
     """
     by_fit = sorted(fits, key=lambda unit: fits[unit].left)
-    if not by_fit or (len(by_fit) > 1 and fits[by_fit[0]].left > config.better * fits[by_fit[1]].left):
+    if not by_fit or (
+        len(by_fit) > 1 and fits[by_fit[0]].left > config.better * fits[by_fit[1]].left
+    ):
         return "", False
     best = fits[by_fit[0]]
-    nearly_one = np.abs(np.log(np.abs(best.gains[np.isfinite(best.gains)]))) < math.log(config.unnamed_gain)
-    return by_fit[0], best.followed and best.varies and best.left < config.proof and bool(nearly_one.all())
+    nearly_one = np.abs(np.log(np.abs(best.gains[np.isfinite(best.gains)]))) < math.log(
+        config.unnamed_gain
+    )
+    return by_fit[0], best.followed and best.varies and best.left < config.proof and bool(
+        nearly_one.all()
+    )
 
 
 def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config()) -> LinkFit:
@@ -97,10 +120,16 @@ def fit_of_links(tau: Array, model: Array, dq: Array, config: Config = Config())
     The model explains a joint's torque where it takes most of what friction leaves.
     """
     rest, links = _without_friction(tau, dq, config), _without_friction(model, dq, config)
-    inner, power, all_power = (rest * links).sum(axis=0), (links**2).sum(axis=0), (rest**2).sum(axis=0)
+    inner, power, all_power = (
+        (rest * links).sum(axis=0),
+        (links**2).sum(axis=0),
+        (rest**2).sum(axis=0),
+    )
     explains = inner**2 > config.explained * all_power * power
     gains = np.where(explains, inner / np.where(power > 0.0, power, 1.0), math.nan)
-    varies = bool(power.sum() >= config.changes**2 * float(np.sum(model**2)))  # not at rest, or one joint at even speeds
+    varies = bool(
+        power.sum() >= config.changes**2 * float(np.sum(model**2))
+    )  # not at rest, or one joint at even speeds
     followed = float(power[explains].sum()) > config.most * float(power.sum())
     left = np.var(tau - np.nan_to_num(gains) * model, axis=0).sum()
     alone = bool(left < (1.0 - config.alone) * np.var(tau, axis=0).sum())
@@ -122,37 +151,51 @@ def _without_friction(values: Array, dq: Array, config: Config) -> Array:
     rest = np.empty_like(values)
     for j in range(values.shape[1]):
         slow = max(config.slow * float(np.abs(dq[:, j]).max()), 1e-300)
-        friction = np.column_stack([np.clip(dq[:, j] / slow, -1.0, 1.0), dq[:, j], np.ones(len(dq))])
-        rest[:, j] = values[:, j] - friction @ np.linalg.lstsq(friction, values[:, j], rcond=None)[0]
+        friction = np.column_stack(
+            [np.clip(dq[:, j] / slow, -1.0, 1.0), dq[:, j], np.ones(len(dq))]
+        )
+        rest[:, j] = (
+            values[:, j] - friction @ np.linalg.lstsq(friction, values[:, j], rcond=None)[0]
+        )
     return rest
 
 
 def _left(rest: Array, links: Array, tau: Array) -> float:
     """Return the share of each joint's torque that neither links nor friction explain, its mean over the joints."""
     power = (links**2).sum(axis=0)
-    gain = np.where(power > 0.0, (rest * links).sum(axis=0) / np.where(power > 0.0, power, 1.0), 0.0)
+    gain = np.where(
+        power > 0.0, (rest * links).sum(axis=0) / np.where(power > 0.0, power, 1.0), 0.0
+    )
     size = np.maximum(tau.var(axis=0), 1e-300)
     return float(np.mean(((rest - gain * links) ** 2).mean(axis=0) / size))
 
 
-def _otherwise(model: TorqueModel, motion: tuple[Array, Array, Array], tau: Array, config: Config) -> str:
+def _otherwise(
+    model: TorqueModel, motion: tuple[Array, Array, Array], tau: Array, config: Config
+) -> str:
     """Return under which other meaning of the joints the links explain the torque far better; "" where under none."""
     dq = motion[1]
     links = model(*motion)
     if links is None:
         return ""
     best, found = config.better * _left_of(tau, links, dq, config), ""
-    for words, candidates in itertools.chain(_exchanged(model, motion, links, tau), _coupled(model, motion, tau)):
+    for words, candidates in itertools.chain(
+        _exchanged(model, motion, links, tau), _coupled(model, motion, tau)
+    ):
         left = min((_left_of(*candidate, config) for candidate in candidates), default=math.inf)
         if left < best:
             best, found = left, words
     return found
 
 
-_Meanings = Iterator[tuple[str, list[tuple[Array, Array, Array]]]]  # words, and torque, links' torque, speed (samples, joints)
+_Meanings = Iterator[
+    tuple[str, list[tuple[Array, Array, Array]]]
+]  # words, and torque, links' torque, speed (samples, joints)
 
 
-def _exchanged(model: TorqueModel, motion: tuple[Array, Array, Array], links: Array, tau: Array) -> _Meanings:
+def _exchanged(
+    model: TorqueModel, motion: tuple[Array, Array, Array], links: Array, tau: Array
+) -> _Meanings:
     """Yield each two joints the other way round, in the torque alone or in the motion as well."""
     for a, b in itertools.combinations(range(tau.shape[1]), 2):
         order = np.arange(tau.shape[1])
@@ -160,7 +203,10 @@ def _exchanged(model: TorqueModel, motion: tuple[Array, Array, Array], links: Ar
         q, dq, ddq = (x[:, order] for x in motion)
         other = model(q, dq, ddq)
         both = [] if other is None else [(tau[:, order], other, dq)]
-        yield f"joints {a + 1} and {b + 1} exchanged: in which order are they?", [(tau[:, order], links, motion[1]), *both]
+        yield (
+            f"joints {a + 1} and {b + 1} exchanged: in which order are they?",
+            [(tau[:, order], links, motion[1]), *both],
+        )
 
 
 def _coupled(model: TorqueModel, motion: tuple[Array, Array, Array], tau: Array) -> _Meanings:
@@ -191,9 +237,14 @@ def unlike_links(fit: LinkFit, factor: float, named: bool, config: Config = Conf
         return ""
     off = float(known[np.argmax(np.abs(np.log(np.abs(known))))])
     most = config.gain if named else config.unnamed_gain
-    return "" if 1.0 / most <= abs(off) <= most else (
-        f"{off:.3g} times what weight and inertia of the robot's own links ask for at one joint: a share of a rated torque, "
-        "or the motor's side?")
+    return (
+        ""
+        if 1.0 / most <= abs(off) <= most
+        else (
+            f"{off:.3g} times what weight and inertia of the robot's own links ask for at one joint: a share of a rated torque, "
+            "or the motor's side?"
+        )
+    )
 
 
 def _smooth(q: Array, t: Array, config: Config) -> tuple[Array, Array, Array]:

@@ -32,9 +32,16 @@ class SourceFile:
     columns: tuple[str, ...]
 
 
-def make_log(source: Source, material: Material, assembled: Assembled, t: Array, signals: Mapping[str, Signal],
-             steps: tuple[str, ...], altered: tuple[str, ...], number: int | None) -> tuple[
-                 ExperimentLog, tuple[SourceFile, ...], tuple[str, ...]]:
+def make_log(
+    source: Source,
+    material: Material,
+    assembled: Assembled,
+    t: Array,
+    signals: Mapping[str, Signal],
+    steps: tuple[str, ...],
+    altered: tuple[str, ...],
+    number: int | None,
+) -> tuple[ExperimentLog, tuple[SourceFile, ...], tuple[str, ...]]:
     """One log of converted signals, the files it came from, and `altered` with what was done here as well.
 
     Raises:
@@ -43,29 +50,54 @@ def make_log(source: Source, material: Material, assembled: Assembled, t: Array,
     """
     recipe, robot = material.recipe, material.robot
     about = _about(recipe.log, source, recipe.where)
-    name = (clean(filenames.fill(about.name, source.groups, recipe.where), 200) or "log") + (f"-{number}" if number else "")
-    files = tuple(SourceFile(file, table.sha256,
-                             tuple(c for columns in assembled.columns.values() for c in columns if c in table.columns))
-                  for file, table in source.tables.items())
+    name = (clean(filenames.fill(about.name, source.groups, recipe.where), 200) or "log") + (
+        f"-{number}" if number else ""
+    )
+    files = tuple(
+        SourceFile(
+            file,
+            table.sha256,
+            tuple(
+                c for columns in assembled.columns.values() for c in columns if c in table.columns
+            ),
+        )
+        for file, table in source.tables.items()
+    )
     step = _sample_time(recipe, t)
     if t.size < FEWEST:
-        raise InputRejected("T08", f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}", where=source.primary,
-                            remedy="record longer, or resample faster")
+        message = f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}"
+        remedy = "record longer, or resample faster"
+        raise InputRejected("T08", message, where=source.primary, remedy=remedy)
     if about.period is not None and shorter_than_period(t, step, about.period):
         short = f"{recorded_span(t, step):.4g} s < {about.period:g} s period"
         if number is None:
-            raise InputRejected("T07", short, where=source.primary, remedy="record a whole period, or correct period")
+            remedy = "record a whole period, or correct period"
+            raise InputRejected("T07", short, where=source.primary, remedy=remedy)
         # A part of a log that had to be split need not hold a whole period; it is then a log without one.
         about, altered = replace(about, period=None), (*altered, f"period left out: {short}")
     if about.experiment == "frf" and "v" not in signals:
-        raise InputRejected("S01", "an frf log without its excitation v", where=source.primary, remedy="map signals.v")
-    ordered = {"t": Signal(t, "s", schema.SIGNALS["t"][1])} | {key: signals[key] for key in schema.SIGNALS if key in signals}
+        message = "an frf log without its excitation v"
+        raise InputRejected("S01", message, where=source.primary, remedy="map signals.v")
+    ordered = {"t": Signal(t, "s", schema.SIGNALS["t"][1])} | {
+        key: signals[key] for key in schema.SIGNALS if key in signals
+    }
     log = ExperimentLog(
-        name=name, experiment=about.experiment, role=about.role, origin=about.origin, torque=about.torque, robot_name=robot.name,
-        sample_time=step, robot_text=format_robot(robot),
-        signals=ordered, recorded=about.recorded, joint=about.joint, period=about.period,
-        posture=None if about.posture is None else np.array(about.posture), controller=_controller(material),
-        derived=_derived(files, material, steps, altered, about.recorded) if altered else None)
+        name=name,
+        experiment=about.experiment,
+        role=about.role,
+        origin=about.origin,
+        torque=about.torque,
+        robot_name=robot.name,
+        sample_time=step,
+        robot_text=format_robot(robot),
+        signals=ordered,
+        recorded=about.recorded,
+        joint=about.joint,
+        period=about.period,
+        posture=None if about.posture is None else np.array(about.posture),
+        controller=_controller(material),
+        derived=_derived(files, material, steps, altered, about.recorded) if altered else None,
+    )
     return log, files, altered
 
 
@@ -84,13 +116,15 @@ def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
     for key, known in (("experiment", schema.EXPERIMENTS), ("role", schema.ROLES)):
         if key in groups:
             if groups[key] not in known:
-                raise UsageError("C02", f"'{source.primary}' gives {key} '{groups[key]}', must be one of {', '.join(known)}",
-                                 where=where, remedy=f"rename the file, or write {key} = … in a [[file]] case before it")
+                message = f"'{source.primary}' gives {key} '{groups[key]}', must be one of {', '.join(known)}"
+                remedy = f"rename the file, or write {key} = … in a [[file]] case before it"
+                raise UsageError("C02", message, where=where, remedy=remedy)
             found[key] = groups[key]
     if "joint" in groups:
         if not groups["joint"].isdigit():
-            raise UsageError("C02", f"'{source.primary}' gives joint '{groups['joint']}', must be a number", where=where,
-                             remedy="rename the file, or take digits alone: {joint:[0-9]+}")
+            message = f"'{source.primary}' gives joint '{groups['joint']}', must be a number"
+            remedy = "rename the file, or take digits alone: {joint:[0-9]+}"
+            raise UsageError("C02", message, where=where, remedy=remedy)
         found["joint"] = int(groups["joint"])
     if source.case is not None:
         keys = ("name", "experiment", "role", "joint", "period", "recorded", "posture")
@@ -99,8 +133,9 @@ def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
     if about.experiment not in schema.ONE_JOINT:
         return replace(about, joint=None)
     if about.joint is None:
-        raise UsageError("C02", f"{about.experiment} log '{source.primary}' without its joint", where=where,
-                         remedy="write joint = … in its [[file]], or {joint} in the pattern")
+        message = f"{about.experiment} log '{source.primary}' without its joint"
+        remedy = "write joint = … in its [[file]], or {joint} in the pattern"
+        raise UsageError("C02", message, where=where, remedy=remedy)
     return about
 
 
@@ -108,17 +143,39 @@ def _controller(material: Material) -> Controller | None:
     spec = material.recipe.controller
     if spec is None:
         return None
-    arrays: dict[str, Any] = {key: np.array(value) for key in ("kp", "kd", "ki", "output_limit", "torque_resolution")
-                              if (value := getattr(spec, key)) is not None}
-    return Controller(law=spec.law, feedforward=spec.feedforward, velocity=spec.velocity, delay=spec.delay, **arrays)
+    arrays: dict[str, Any] = {
+        key: np.array(value)
+        for key in ("kp", "kd", "ki", "output_limit", "torque_resolution")
+        if (value := getattr(spec, key)) is not None
+    }
+    return Controller(
+        law=spec.law,
+        feedforward=spec.feedforward,
+        velocity=spec.velocity,
+        delay=spec.delay,
+        **arrays,
+    )
 
 
-def _derived(files: tuple[SourceFile, ...], material: Material, steps: tuple[str, ...], altered: tuple[str, ...],
-             recorded: str | None) -> Derived:
+def _derived(
+    files: tuple[SourceFile, ...],
+    material: Material,
+    steps: tuple[str, ...],
+    altered: tuple[str, ...],
+    recorded: str | None,
+) -> Derived:
     # `created` is the time of the recording where the recipe gives it. Where it does not, no honest time is left: the
     # clock on the wall and the times of files differ from one import to the next, and equal inputs give equal bytes. It is
     # then SOURCE_DATE_EPOCH, by default 1970-01-01T00:00:00Z: to be read as "not known". provenance.json has the hour.
-    record = {"recipe": material.recipe_path.name, "files": {file.name: file.sha256 for file in files}, "converted": list(steps),
-              "altered": list(altered)}
-    sha256 = files[0].sha256 if len(files) == 1 else hashlib.sha256("\n".join(file.sha256 for file in files).encode()).hexdigest()
+    record = {
+        "recipe": material.recipe_path.name,
+        "files": {file.name: file.sha256 for file in files},
+        "converted": list(steps),
+        "altered": list(altered),
+    }
+    sha256 = (
+        files[0].sha256
+        if len(files) == 1
+        else hashlib.sha256("\n".join(file.sha256 for file in files).encode()).hexdigest()
+    )
     return Derived("import", json.dumps(record, sort_keys=True), sha256, created(recorded))

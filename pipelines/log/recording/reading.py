@@ -47,18 +47,29 @@ __all__ = [
 ]
 
 WITHOUT_NAME, BY_FILE = "columns without a name", "columns named by their file"
-_PLANS = frozenset({"plan", "planned", "reference", "ref", "desired", "setpoint", "setpoints", "target", "targets"})
+_PLANS = frozenset(
+    {"plan", "planned", "reference", "ref", "desired", "setpoint", "setpoints", "target", "targets"}
+)
 _FEEDFORWARD, _FEEDBACK = frozenset({"ff", "feedforward"}), frozenset({"fb", "feedback"})
-_FILE_OF_AXIS = re.compile(r"(.*(?:joint|axis|axe|achse|motor|mot|id|actuator|servo|drive|node|j|m|a)[ _-]?)(\d+)(\D*)",
-                           re.IGNORECASE)
+_FILE_OF_AXIS = re.compile(
+    r"(.*(?:joint|axis|axe|achse|motor|mot|id|actuator|servo|drive|node|j|m|a)[ _-]?)(\d+)(\D*)",
+    re.IGNORECASE,
+)
 _PATH = re.compile(r"[./]")
 # Messages by fields that others have not, whose definition says rad, rad/s and N m: ROS sensor_msgs/JointState,
 # libfranka's RobotState, Universal Robots' RTDE outputs, MuJoCo's mjData.
-_MESSAGES = tuple((message, frozenset(fields.split())) for message, fields in (
-    ("sensor_msgs/JointState", "joint_states position"), ("sensor_msgs/JointState", "field position effort"),
-    ("sensor_msgs/JointState", "header position effort"), ("libfranka's RobotState", "q tau_J"),
-    ("libfranka's RobotState", "q tau_ext_hat_filtered"),
-    ("Universal Robots' RTDE", "actual_q actual_current"), ("mjData", "qpos qfrc_actuator")))
+_MESSAGES = tuple(
+    (message, frozenset(fields.split()))
+    for message, fields in (
+        ("sensor_msgs/JointState", "joint_states position"),
+        ("sensor_msgs/JointState", "field position effort"),
+        ("sensor_msgs/JointState", "header position effort"),
+        ("libfranka's RobotState", "q tau_J"),
+        ("libfranka's RobotState", "q tau_ext_hat_filtered"),
+        ("Universal Robots' RTDE", "actual_q actual_current"),
+        ("mjData", "qpos qfrc_actuator"),
+    )
+)
 _MOST_JOINTS = 16
 _UNIT_NORM = 1e-3  # error of a quaternion's norm, written with four digits or more
 _MOST_BLOCKS = 6
@@ -103,7 +114,11 @@ class Reading:
     @property
     def message(self) -> str:
         """Return the message whose definition gives the unit of its fields, in SI, where the columns are those fields; else ""."""
-        names = [word for name in (*self.table.columns, *self.table.text, *self.table.labels) for word in _PATH.split(name)]
+        names = [
+            word
+            for name in (*self.table.columns, *self.table.text, *self.table.labels)
+            for word in _PATH.split(name)
+        ]
         paths = {re.sub(r"[\W\d_]+$", "", name) for name in names}
         return next((message for message, fields in _MESSAGES if fields <= paths), "")
 
@@ -115,7 +130,9 @@ class Reading:
             return ()
         pattern = re.compile(rf"{re.escape(named[1])}\d+{re.escape(named[3])}")
         files = sorted(self.path.parent.glob(f"*{self.path.suffix}"))[:200]
-        return tuple(file.name for file in files if file != self.path and pattern.fullmatch(file.stem))
+        return tuple(
+            file.name for file in files if file != self.path and pattern.fullmatch(file.stem)
+        )
 
 
 def arm_beside(folder: Path, named: str | None = None) -> Arm:
@@ -157,7 +174,11 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     ]
     n = arm.robot.n_joints if arm.robot else None
     groups = [_without_rest(table, g, n) for g in groups if not _is_orientation(table, g)]
-    groups = [g for g in groups if g.quantity != "position" or np.ptp(matrix(table, g.columns), axis=0).any()]
+    groups = [
+        g
+        for g in groups
+        if g.quantity != "position" or np.ptp(matrix(table, g.columns), axis=0).any()
+    ]
     groups = _derivatives(table, _parts_and_plans(groups, path, used), clock)
     q = choose(groups, ("position",), n, commanded=False)
     if q.group is None and all(group.origin == "commanded" for group in q.others):
@@ -167,11 +188,15 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     unnamed = tuple(
         g
         for g in groups
-        if not g.quantity and n in (None, len(g.columns)) and not (q.group and g.columns == q.group.columns)
+        if not g.quantity
+        and n in (None, len(g.columns))
+        and not (q.group and g.columns == q.group.columns)
     )
     tau = choose(groups, ("torque", "current"), n, commanded=True)
-    if q.group and tau.group and _equal(
-        matrix(table, tau.group.columns), matrix(table, q.group.columns)
+    if (
+        q.group
+        and tau.group
+        and _equal(matrix(table, tau.group.columns), matrix(table, q.group.columns))
     ):
         # Numbers that equal the positions are their targets by any name: tq_0, tq_1, …
         tau = Choice(None, tau.others)
@@ -189,11 +214,23 @@ def read_recording(path: Path, table: RawTable, arm: Arm) -> Reading:
     if q.group and dq.group:
         t, speed = clock.values if clock else None, matrix(table, dq.group.columns)
         slope = slope_of(matrix(table, q.group.columns), speed, t)
-        alternatives = [g for g in q.others if g.origin != "commanded" and len(g.columns) == speed.shape[1]]
-        if slope is None and any(slope_of(matrix(table, g.columns), speed, t) for g in alternatives):
+        alternatives = [
+            g for g in q.others if g.origin != "commanded" and len(g.columns) == speed.shape[1]
+        ]
+        if slope is None and any(
+            slope_of(matrix(table, g.columns), speed, t) for g in alternatives
+        ):
             q = Choice(None, (q.group, *q.others))  # the velocity is another position's
-        elif slope is None and q.group and dq.group.columns and crossed(matrix(table, q.group.columns), speed, t):
-            q, dq = Choice(None, (q.group, *q.others)), Choice(None, (dq.group, *dq.others))  # in two orders of the joints
+        elif (
+            slope is None
+            and q.group
+            and dq.group.columns
+            and crossed(matrix(table, q.group.columns), speed, t)
+        ):
+            q, dq = (
+                Choice(None, (q.group, *q.others)),
+                Choice(None, (dq.group, *dq.others)),
+            )  # in two orders of the joints
     return Reading(path, table, arm, clock, q, dq, _in_one_order(q, tau), table, slope, by_evidence)
 
 
@@ -230,7 +267,11 @@ def _with_file_name(groups: list[Group], path: Path) -> list[Group]:
 def _without_rest(table: RawTable, group: Group, n: int | None) -> Group:
     """Leave out columns behind those of the robot's joints that never change: unused axes, an object that rests."""
     first, rest = group.columns[:n], group.columns[n:] if n else ()
-    if not rest or any(np.ptp(table.columns[c]) > 0.0 for c in rest) or any(np.ptp(table.columns[c]) == 0.0 for c in first):
+    if (
+        not rest
+        or any(np.ptp(table.columns[c]) > 0.0 for c in rest)
+        or any(np.ptp(table.columns[c]) == 0.0 for c in first)
+    ):
         return group
     return replace(group, columns=first)
 
@@ -238,7 +279,9 @@ def _without_rest(table: RawTable, group: Group, n: int | None) -> Group:
 def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> list[Group]:
     """Tell the points of a plan, by its clock (ROS: time_from_start) or file, and the parts of a controller's torque."""
     planned = any({"from", "start"} <= set(words_of(column)) for column in clock)
-    if planned or (_PLANS & set(words_of(path.stem)) and all(g.origin != "measured" for g in groups)):
+    if planned or (
+        _PLANS & set(words_of(path.stem)) and all(g.origin != "measured" for g in groups)
+    ):
         groups = [replace(g, origin="commanded") for g in groups]
     said = [set(g.words.split()) for g in groups]
     if not any(words & _FEEDFORWARD for words in said):
@@ -252,14 +295,24 @@ def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> l
 def _derivatives(table: RawTable, groups: list[Group], clock: Clock | None) -> list[Group]:
     """Name by evidence what names leave open: the slope of a position is its velocity, that of a velocity an acceleration."""
     known = [g for g in groups if g.quantity in ("position", "") and len(g.columns) <= _MOST_JOINTS]
-    values = {g: matrix(table, g.columns) for g in sorted(known, key=lambda g: g.rank)[:_MOST_BLOCKS]}
+    values = {
+        g: matrix(table, g.columns) for g in sorted(known, key=lambda g: g.rank)[:_MOST_BLOCKS]
+    }
     source: dict[Group, Group] = {}  # derivative -> what it is the slope of
     for a, b in permutations(values, 2):
         if slope_of(values[a], values[b], clock.values if clock else None, every=True) is not None:
             source.setdefault(b, a)
     named = {g: "acceleration" if a in source else "velocity" for g, a in source.items()}
-    return [replace(g, quantity=named[g], origin=g.origin if WORDS["commanded"] & set(g.words.split()) else source[g].origin)
-            if g in named else g for g in groups]
+    return [
+        replace(
+            g,
+            quantity=named[g],
+            origin=g.origin if WORDS["commanded"] & set(g.words.split()) else source[g].origin,
+        )
+        if g in named
+        else g
+        for g in groups
+    ]
 
 
 def _is_orientation(table: RawTable, group: Group) -> bool:
@@ -276,11 +329,18 @@ def _undisputed(table: RawTable, q: Choice) -> Choice:
         return q
     x = matrix(table, q.group.columns)
     for other in q.others:
-        if len(other.columns) != x.shape[1] or other.origin == "commanded" or other.motor != q.group.motor:
+        if (
+            len(other.columns) != x.shape[1]
+            or other.origin == "commanded"
+            or other.motor != q.group.motor
+        ):
             continue
         y = matrix(table, other.columns)
         offset, noise = np.abs(np.median(x - y, axis=0)), np.std(x - y, axis=0)
-        if noise.max() < 0.2 * np.std(x, axis=0).max() and (offset > 5.0 * noise + 1e-3 * np.std(x, axis=0)).any():
+        if (
+            noise.max() < 0.2 * np.std(x, axis=0).max()
+            and (offset > 5.0 * noise + 1e-3 * np.std(x, axis=0)).any()
+        ):
             return Choice(None, (q.group, *q.others))
     return q
 
@@ -293,9 +353,7 @@ def _unnamed_positions(
     Torques, currents or velocities must be named as well, and a commanded position must be followed.
     """
     beside = [g for g in groups if g.quantity in ("torque", "current", "velocity")]
-    named = [
-        g for g in groups if not g.quantity and g.names_joints and n in (None, len(g.columns))
-    ]
+    named = [g for g in groups if not g.quantity and g.names_joints and n in (None, len(g.columns))]
     if len(named) != 1 or not any(len(g.columns) == len(named[0].columns) for g in beside):
         return found if not found.others else Choice(None, (*found.others, *named))
     references = [g for g in found.others if len(g.columns) == len(named[0].columns)]
@@ -351,7 +409,11 @@ def _blocks(
         if not tau.group and not tau.others:
             tau = Choice(others[0]) if len(others) == 1 else Choice(None, tuple(others))
         return Choice(q), Choice(dq), tau
-    named = tuple(g for g in groups if not g.quantity and len(g.columns) == (arm.robot.n_joints if arm.robot else 0))
+    named = tuple(
+        g
+        for g in groups
+        if not g.quantity and len(g.columns) == (arm.robot.n_joints if arm.robot else 0)
+    )
     candidates = named or tuple(_block(part, "") for part in open_blocks)
     return (
         Choice(None, candidates),

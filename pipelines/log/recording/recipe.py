@@ -31,8 +31,20 @@ from typing import Any, Literal
 
 from pipelines.log.recording.dialect import TextFormat
 
-__all__ = ["ColumnSpec", "ControllerSpec", "DriveSpec", "FileSpec", "LogSpec", "MissingSpec", "Numbers", "Recipe", "ResampleSpec",
-           "SignalSpec", "TableSpec", "TimeSpec"]
+__all__ = [
+    "ColumnSpec",
+    "ControllerSpec",
+    "DriveSpec",
+    "FileSpec",
+    "LogSpec",
+    "MissingSpec",
+    "Numbers",
+    "Recipe",
+    "ResampleSpec",
+    "SignalSpec",
+    "TableSpec",
+    "TimeSpec",
+]
 
 Numbers = float | tuple[float, ...]  # one for all joints, or one a joint
 Columns = str | int | tuple[str | int, ...]
@@ -66,15 +78,21 @@ class LogSpec:
     __pydantic_config__ = _STRICT
     match: Texts = ()
     name: str = "{stem}"
-    experiment: Experiment = "free"  # a group {experiment} of the pattern comes first; likewise role and joint
+    experiment: Experiment = (
+        "free"  # a group {experiment} of the pattern comes first; likewise role and joint
+    )
     role: Role = "identify"
     origin: Literal["measured", "simulated"] = "measured"
     torque: Literal["held-command", "measured"] = "held-command"
     joint: int | None = None  # 1-based, of friction and frf logs
     period: float | None = None  # [s]
-    recorded: str | None = None  # ISO 8601 with its offset from UTC, or a date and time of TOML with it
+    recorded: str | None = (
+        None  # ISO 8601 with its offset from UTC, or a date and time of TOML with it
+    )
     posture: tuple[float, ...] | None = None  # [rad]
-    begin: float | None = None  # [s] after its first sample, that a log begins at: what comes before is left out
+    begin: float | None = (
+        None  # [s] after its first sample, that a log begins at: what comes before is left out
+    )
 
 
 @dataclass(frozen=True)
@@ -91,12 +109,21 @@ class TimeSpec:
     @property
     def parts(self) -> tuple[tuple[str | int, str | None], ...]:
         """The columns that are added, each with its unit."""
-        columns = self.column if isinstance(self.column, tuple) else () if self.column is None else (self.column,)
+        columns = (
+            self.column
+            if isinstance(self.column, tuple)
+            else ()
+            if self.column is None
+            else (self.column,)
+        )
         units = self.unit if isinstance(self.unit, tuple) else (self.unit,) * len(columns)
         return tuple(zip(columns, units, strict=True))
+
     rate: float | None = None  # [Hz]
     sample_time: float | None = None  # [s]
-    longest_gap: float | None = None  # [s] default 10 samples; a longer one ends a log. Resampling alone bridges more
+    longest_gap: float | None = (
+        None  # [s] default 10 samples; a longer one ends a log. Resampling alone bridges more
+    )
 
 
 @dataclass(frozen=True)
@@ -104,13 +131,23 @@ class SignalSpec:
     """A line of `[signals]`: where a signal stands and what its numbers mean."""
 
     __pydantic_config__ = _STRICT
-    columns: Columns | None = None  # a list, a pattern such as "Joint_{j}", a 1-based number, or the name of a matrix
+    columns: Columns | None = (
+        None  # a list, a pattern such as "Joint_{j}", a 1-based number, or the name of a matrix
+    )
     column: Columns | None = None  # the same, for one joint
-    unit: Texts | None = None  # required: of the numbers as recorded, one or one a joint; "counts" needs counts_per_rev
-    file: str | None = None  # in another file of the same recording: a name with {groups} and {stem}
+    unit: Texts | None = (
+        None  # required: of the numbers as recorded, one or one a joint; "counts" needs counts_per_rev
+    )
+    file: str | None = (
+        None  # in another file of the same recording: a name with {groups} and {stem}
+    )
     counts_per_rev: Numbers | None = None
-    wrap: float | None = None  # the counter starts again after so much, in the recorded unit: unwrapped
-    scale: Numbers = 1.0  # times this before the unit: per mille of the rated torque, a current probe
+    wrap: float | None = (
+        None  # the counter starts again after so much, in the recorded unit: unwrapped
+    )
+    scale: Numbers = (
+        1.0  # times this before the unit: per mille of the rated torque, a current probe
+    )
     sign: Numbers = 1.0  # 1 or -1, motor side
     offset: Numbers = 0.0  # SI, added after the transmission, joint side
     side: Literal["motor", "joint"] | None = None  # default: motor where [drive] has a transmission
@@ -126,7 +163,9 @@ class DriveSpec:
 
     __pydantic_config__ = _STRICT
     transmission: tuple[Numbers, ...] | None = None  # N as rows, or the gear ratios alone
-    torque_constant: Numbers | None = None  # [N m/A] motor side; needed where torque is recorded as current
+    torque_constant: Numbers | None = (
+        None  # [N m/A] motor side; needed where torque is recorded as current
+    )
 
 
 @dataclass(frozen=True)

@@ -52,8 +52,9 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     try:
         table = _dated(parse_toml(text), where)
     except (ValueError, RecursionError) as problem:
-        raise UsageError("C01", f"the recipe is not valid TOML: {problem}", where=where,
-                         remedy="correct that line; strings need quotes, tables [ ]") from None
+        message = f"the recipe is not valid TOML: {problem}"
+        remedy = "correct that line; strings need quotes, tables [ ]"
+        raise UsageError("C01", message, where=where, remedy=remedy) from None
     _blanks(table, where)
     if "where" in table:
         raise UsageError("C01", "'where' is not a key of a recipe", where=where, remedy="remove it")
@@ -67,8 +68,9 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
         found.raise_all()
         raise  # never reached: there is an error at least
     except RecursionError:
-        raise UsageError("C02", "the recipe is nested too deeply", where=where,
-                         remedy="rrrid import --guess FILE drafts a recipe") from None
+        message = "the recipe is nested too deeply"
+        remedy = "rrrid import --guess FILE drafts a recipe"
+        raise UsageError("C02", message, where=where, remedy=remedy) from None
     _bounds(recipe, where)
     _format(recipe.format, where)
     _meaning(recipe, where)
@@ -79,8 +81,9 @@ def _blanks(table: dict[str, Any], where: object) -> None:
     """C02: what --guess could not know and nobody has filled in."""
     if blanks := [place for place, text in _texts(table, "") if BLANK in text.upper()]:
         more = f" and at {', '.join(blanks[1:6])}" if len(blanks) > 1 else ""
-        raise UsageError("C02", f"'{blanks[0]}' is still marked {BLANK}", where=where,
-                         remedy=f"replace the blank marked {BLANK} at {blanks[0]}{more}; the draft says what belongs there")
+        message = f"'{blanks[0]}' is still marked {BLANK}"
+        remedy = f"replace the blank marked {BLANK} at {blanks[0]}{more}; the draft says what belongs there"
+        raise UsageError("C02", message, where=where, remedy=remedy)
 
 
 def _texts(value: Any, path: str) -> Iterator[tuple[str, str]]:
@@ -107,7 +110,10 @@ def _plain(value: Any) -> Any:
 def _dated(table: dict[str, Any], where: object) -> dict[str, Any]:
     """The recipe with `recorded` of [log] and of every [[file]] as UTC, in text."""
     cases = table["file"] if isinstance(table.get("file"), list) else []
-    for place, owner in (("log", table.get("log")), *((f"file[{i}]", case) for i, case in enumerate(cases, start=1))):
+    for place, owner in (
+        ("log", table.get("log")),
+        *((f"file[{i}]", case) for i, case in enumerate(cases, start=1)),
+    ):
         if isinstance(owner, dict) and "recorded" in owner:
             owner["recorded"] = _utc(owner["recorded"], f"'{place}.recorded'", where)
     return table
@@ -119,44 +125,83 @@ def _utc(value: object, what: str, where: object) -> str:
     Raises:
         UsageError: C02, no time, or no offset.
     """
-    remedy = "write it with its offset from UTC, 2024-05-17T11:30:00+02:00, or with Z, or leave it out"
+    remedy = (
+        "write it with its offset from UTC, 2024-05-17T11:30:00+02:00, or with Z, or leave it out"
+    )
     try:
-        time = value if isinstance(value, datetime.datetime) else datetime.datetime.fromisoformat(str(value))
+        time = (
+            value
+            if isinstance(value, datetime.datetime)
+            else datetime.datetime.fromisoformat(str(value))
+        )
     except ValueError:
-        raise UsageError("C02", f"{what} is '{value}', not a date and time of ISO 8601", where=where, remedy=remedy) from None
+        message = f"{what} is '{value}', not a date and time of ISO 8601"
+        raise UsageError("C02", message, where=where, remedy=remedy) from None
     if time.tzinfo is None:
-        raise UsageError("C02", f"{what} is {value}: the offset from UTC is missing", where=where, remedy=remedy)
+        message = f"{what} is {value}: the offset from UTC is missing"
+        raise UsageError("C02", message, where=where, remedy=remedy)
     return time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
 
 
 def _place(error: Any) -> list[Any]:
     """Return the keys that lead to the value of a complaint, without the types that pydantic tried."""
-    return [part for part in error["loc"] if not (isinstance(part, str) and ("[" in part or part in ("str", "int", "float")))]
+    return [
+        part
+        for part in error["loc"]
+        if not (isinstance(part, str) and ("[" in part or part in ("str", "int", "float")))
+    ]
 
 
-_SECTIONS: Mapping[str, type] = {"log": LogSpec, "file": FileSpec, "time": TimeSpec, "signals": SignalSpec, "drive": DriveSpec,
-                                 "resample": ResampleSpec,
-                                 "missing": MissingSpec, "format": TextFormat, "controller": ControllerSpec, "table": TableSpec}
+_SECTIONS: Mapping[str, type] = {
+    "log": LogSpec,
+    "file": FileSpec,
+    "time": TimeSpec,
+    "signals": SignalSpec,
+    "drive": DriveSpec,
+    "resample": ResampleSpec,
+    "missing": MissingSpec,
+    "format": TextFormat,
+    "controller": ControllerSpec,
+    "table": TableSpec,
+}
 
 
 def _explain(error: Any, where: object) -> UsageError:
     """The first complaint of pydantic in our words, with the key it is about."""
     path = _place(error)
-    place = ".".join(f"[{part + 1}]" if isinstance(part, int) else str(part) for part in path).replace(".[", "[")
+    place = ".".join(
+        f"[{part + 1}]" if isinstance(part, int) else str(part) for part in path
+    ).replace(".[", "[")
     if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
-        kind = Recipe if len(path) == 1 else ColumnSpec if "columns" in path[:-1] else _SECTIONS[str(path[0])]
+        kind = (
+            Recipe
+            if len(path) == 1
+            else ColumnSpec
+            if "columns" in path[:-1]
+            else _SECTIONS[str(path[0])]
+        )
         known = [f.name for f in fields(kind) if f.name != "where"]
-        return UsageError("C01", f"'{place}' is not a key of a recipe{did_you_mean(str(path[-1]), known)}", where=where,
-                          remedy=f"known here: {', '.join(known)}")
+        message = f"'{place}' is not a key of a recipe{did_you_mean(str(path[-1]), known)}"
+        return UsageError("C01", message, where=where, remedy=f"known here: {', '.join(known)}")
     if error["type"] in ("missing", "missing_argument"):
-        return UsageError("C02", f"'{place}' is missing", where=where, remedy="rrrid import --guess FILE drafts a recipe")
-    return UsageError("C02", f"'{place}': {error['msg']}, not {error['input']!r}", where=where,
-                      remedy="correct the value; the module recipe.py lists the keys")
+        remedy = "rrrid import --guess FILE drafts a recipe"
+        return UsageError("C02", f"'{place}' is missing", where=where, remedy=remedy)
+    message = f"'{place}': {error['msg']}, not {error['input']!r}"
+    remedy = "correct the value; the module recipe.py lists the keys"
+    return UsageError("C02", message, where=where, remedy=remedy)
 
 
 _LARGEST = 1e12
 # Numbers that must be finite and above a bound.
-_POSITIVE = ("rate", "sample_time", "longest_gap", "counts_per_rev", "wrap", "period", "torque_constant")
+_POSITIVE = (
+    "rate",
+    "sample_time",
+    "longest_gap",
+    "counts_per_rev",
+    "wrap",
+    "period",
+    "torque_constant",
+)
 
 
 def _numbers(owner: object, path: str) -> Iterator[tuple[str, str, float]]:
@@ -187,17 +232,21 @@ def _bounds(recipe: Recipe, where: object) -> None:
         if path.startswith(("robot.", "missing.")):
             continue
         if not math.isfinite(number):
-            raise UsageError("C02", f"'{path}' is {number}, must be a finite number", where=where, remedy="correct the number")
+            message = f"'{path}' is {number}, must be a finite number"
+            raise UsageError("C02", message, where=where, remedy="correct the number")
         if abs(number) > _LARGEST:
-            raise UsageError("C02", f"'{path}' is {number}, must lie within ±{_LARGEST:g}", where=where,
-                             remedy="correct the number, or use another unit")
+            message = f"'{path}' is {number}, must lie within ±{_LARGEST:g}"
+            remedy = "correct the number, or use another unit"
+            raise UsageError("C02", message, where=where, remedy=remedy)
         if key in _POSITIVE and number <= 0.0:
-            raise UsageError("C02", f"'{path}' is {number}, must be above 0", where=where, remedy="correct the number")
+            message = f"'{path}' is {number}, must be above 0"
+            raise UsageError("C02", message, where=where, remedy="correct the number")
         if key == "sign" and abs(number) != 1.0:
-            raise UsageError("C02", f"'{path}' is {number}, must be 1 or -1", where=where, remedy="use scale for other factors")
+            message = f"'{path}' is {number}, must be 1 or -1"
+            raise UsageError("C02", message, where=where, remedy="use scale for other factors")
         if key in ("joint", "column", "columns") and (number < 1 or number != int(number)):
-            raise UsageError("C02", f"'{path}' is {number}, must be 1 or more", where=where,
-                             remedy="joints and columns count from 1")
+            message = f"'{path}' is {number}, must be 1 or more"
+            raise UsageError("C02", message, where=where, remedy="joints and columns count from 1")
 
 
 def _format(form: TextFormat | None, where: object) -> None:
@@ -205,17 +254,27 @@ def _format(form: TextFormat | None, where: object) -> None:
     if form is None:
         return
     wrong = {
-        "delimiter": bool(form.delimiter) and (len(str(form.delimiter)) != 1 or str(form.delimiter) in "\0\r\n.\"'"
-                                               or str(form.delimiter).isalnum()),
+        "delimiter": bool(form.delimiter)
+        and (
+            len(str(form.delimiter)) != 1
+            or str(form.delimiter) in "\0\r\n.\"'"
+            or str(form.delimiter).isalnum()
+        ),
         "decimal": form.decimal not in (None, ".", ","),
         "encoding": form.encoding is not None and not _known_encoding(form.encoding),
-        "comment": form.comment is not None and (not form.comment or any(c in form.comment for c in "\0\r\n")),
+        "comment": form.comment is not None
+        and (not form.comment or any(c in form.comment for c in "\0\r\n")),
     }
-    remedies = {"delimiter": "one character: , ; tab or blank", "decimal": "'.' or ','", "encoding": "for example utf-8 or latin-1",
-                "comment": "the characters that begin a comment"}
+    remedies = {
+        "delimiter": "one character: , ; tab or blank",
+        "decimal": "'.' or ','",
+        "encoding": "for example utf-8 or latin-1",
+        "comment": "the characters that begin a comment",
+    }
     for key, bad in wrong.items():
         if bad:
-            raise UsageError("C02", f"'format.{key}' is {getattr(form, key)!r}", where=where, remedy=f"give {remedies[key]}")
+            message = f"'format.{key}' is {getattr(form, key)!r}"
+            raise UsageError("C02", message, where=where, remedy=f"give {remedies[key]}")
 
 
 def _known_encoding(name: str) -> bool:
@@ -231,42 +290,57 @@ def _meaning(recipe: Recipe, where: object) -> None:
     known = [name for name in schema.SIGNALS if name != "t"]
     for name, spec in recipe.signals.items():
         if name not in known:
-            raise UsageError("C01", f"'signals.{name}' is not a signal{did_you_mean(name, known)}", where=where,
-                             remedy=f"signals: {', '.join(known)}; time has its own table [time]")
+            message = f"'signals.{name}' is not a signal{did_you_mean(name, known)}"
+            remedy = f"signals: {', '.join(known)}; time has its own table [time]"
+            raise UsageError("C01", message, where=where, remedy=remedy)
         if (spec.columns is None) == (spec.column is None):
-            raise UsageError("C02", f"'signals.{name}' needs columns (a list, a pattern or a name), once", where=where,
-                             remedy='write columns = "q_{j}", or columns = ["a", "b", "c"]')
-        if "counts" in (spec.unit if isinstance(spec.unit, tuple) else (spec.unit,)) and spec.counts_per_rev is None:
-            raise UsageError("C02", f"'signals.{name}' is in counts: counts_per_rev is missing", where=where,
-                             remedy="add counts_per_rev")
+            message = f"'signals.{name}' needs columns (a list, a pattern or a name), once"
+            remedy = 'write columns = "q_{j}", or columns = ["a", "b", "c"]'
+            raise UsageError("C02", message, where=where, remedy=remedy)
+        if (
+            "counts" in (spec.unit if isinstance(spec.unit, tuple) else (spec.unit,))
+            and spec.counts_per_rev is None
+        ):
+            message = f"'signals.{name}' is in counts: counts_per_rev is missing"
+            raise UsageError("C02", message, where=where, remedy="add counts_per_rev")
     references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]
     if len(references) not in (0, 3):
-        raise UsageError("C02", f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together", where=where,
-                         remedy="map all three, or none")
+        message = f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together"
+        raise UsageError("C02", message, where=where, remedy="map all three, or none")
     no_logs = not recipe.log.match and not any(not case.skip for case in recipe.file)
     if no_logs and recipe.table:
         return  # maps alone: no clock, no signals
     for name in ("q", "tau"):
         if name not in recipe.signals:
-            raise InputRejected("S01", f"the recipe maps no signal '{name}'", where=where,
-                                remedy=f"add {name} = {{ columns = …, unit = … }} to [signals]")
-    rates = {"time.rate": recipe.time.rate, "resample.rate": recipe.resample.rate if recipe.resample else None}
+            message = f"the recipe maps no signal '{name}'"
+            remedy = f"add {name} = {{ columns = …, unit = … }} to [signals]"
+            raise InputRejected("S01", message, where=where, remedy=remedy)
+    rates = {
+        "time.rate": recipe.time.rate,
+        "resample.rate": recipe.resample.rate if recipe.resample else None,
+    }
     for place, rate in rates.items():
         if rate is not None and rate < 1.0:
-            raise InputRejected("S09", f"{place} is {rate:g} Hz: a period?", where=where,
-                                remedy=f"a period of {rate:g} s is a rate of {1 / rate:g} Hz")
+            message = f"{place} is {rate:g} Hz: a period?"
+            remedy = f"a period of {rate:g} s is a rate of {1 / rate:g} Hz"
+            raise InputRejected("S09", message, where=where, remedy=remedy)
     if recipe.time.sample_time is not None and recipe.time.sample_time > 1.0:
-        raise InputRejected("S09", f"time.sample_time is {recipe.time.sample_time:g} s: a rate?", where=where,
-                            remedy=f"write rate = {recipe.time.sample_time:g}")
+        message = f"time.sample_time is {recipe.time.sample_time:g} s: a rate?"
+        remedy = f"write rate = {recipe.time.sample_time:g}"
+        raise InputRejected("S09", message, where=where, remedy=remedy)
     parts = recipe.time.column if isinstance(recipe.time.column, tuple) else ()
     if isinstance(recipe.time.unit, tuple) and len(recipe.time.unit) != len(parts):
-        raise UsageError("C02", f"'time.unit' holds {len(recipe.time.unit)} units for {max(1, len(parts))} columns", where=where,
-                         remedy='give one unit a column: column = ["sec", "nanosec"], unit = ["s", "ns"]')
+        message = (
+            f"'time.unit' holds {len(recipe.time.unit)} units for {max(1, len(parts))} columns"
+        )
+        remedy = 'give one unit a column: column = ["sec", "nanosec"], unit = ["s", "ns"]'
+        raise UsageError("C02", message, where=where, remedy=remedy)
     if recipe.time.rate is not None and recipe.time.sample_time is not None:
-        raise UsageError("C02", "'time' has both rate and sample_time", where=where, remedy="give one of them")
+        remedy = "give one of them"
+        raise UsageError("C02", "'time' has both rate and sample_time", where=where, remedy=remedy)
     if recipe.time.column is None and recipe.time.rate is None and recipe.time.sample_time is None:
-        raise UsageError("C02", "'time' has neither column nor rate", where=where,
-                         remedy="give the column of the time stamps, or the sampling rate [Hz]")
+        remedy = "give the column of the time stamps, or the sampling rate [Hz]"
+        raise UsageError("C02", "'time' has neither column nor rate", where=where, remedy=remedy)
     if no_logs:
-        raise UsageError("C02", "the recipe matches no files", where=where,
-                         remedy='write match = "*.csv" in [log], or [[file]] cases')
+        remedy = 'write match = "*.csv" in [log], or [[file]] cases'
+        raise UsageError("C02", "the recipe matches no files", where=where, remedy=remedy)

@@ -37,18 +37,33 @@ def lost_numbers(table: RawTable) -> list[float]:
 
 def sound_samples(table: RawTable, lost: Sequence[float]) -> RawTable:
     """Leave out what would disturb a guess: rows with a hole, an absurd or a lost number, columns of nothing else."""
-    usable = {name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
-              for name, values in table.columns.items()}
+    usable = {
+        name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
+        for name, values in table.columns.items()
+    }
     # A table of several topics leaves the cells of the others empty: the rows in which most columns hold numbers.
     masks = Counter(known.tobytes() for known in usable.values() if known.any())
     topic = np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
     usable = {name: known[topic] for name, known in usable.items()}
-    table = replace(table, columns={name: values[topic] for name, values in table.columns.items()}, rows=table.rows[topic],
-                    lines=None if table.lines is None else table.lines[topic])
-    columns = {name: values for name, values in table.columns.items() if usable[name].mean() > _USABLE}
-    keep = np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
+    table = replace(
+        table,
+        columns={name: values[topic] for name, values in table.columns.items()},
+        rows=table.rows[topic],
+        lines=None if table.lines is None else table.lines[topic],
+    )
+    columns = {
+        name: values for name, values in table.columns.items() if usable[name].mean() > _USABLE
+    }
+    keep = (
+        np.all([usable[name] for name in columns], axis=0) if columns else np.zeros(0, dtype=bool)
+    )
     if keep.sum() < FEWEST:
-        raise InputRejected("T08", f"{int(keep.sum())} samples without a hole", where=table.source,
-                            remedy="give a recording of a motion")
-    return replace(table, columns={name: values[keep] for name, values in columns.items()}, rows=table.rows[keep],
-                   lines=None if table.lines is None else table.lines[keep])
+        message = f"{int(keep.sum())} samples without a hole"
+        remedy = "give a recording of a motion"
+        raise InputRejected("T08", message, where=table.source, remedy=remedy)
+    return replace(
+        table,
+        columns={name: values[keep] for name, values in columns.items()},
+        rows=table.rows[keep],
+        lines=None if table.lines is None else table.lines[keep],
+    )

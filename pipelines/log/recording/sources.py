@@ -26,16 +26,35 @@ __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
 _LARGEST_YAML = 200_000_000  # [B], as of JSON
-_ENDINGS = {"npy": (".npy",), "npz": (".npz",), "parquet": (".parquet",), "json": (".json", ".jsonl"), "text": (),
-            "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5")}
-_REFUSED = ((b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
-            (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
-            (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"),
-            (b"#ROSBAG", "F06", "a bag of ROS 1", "export its topics: rostopic echo -b FILE -p /joint_states > run.csv"),
-            (b"\x89MCAP0", "F06", "an MCAP file", "export its topics as CSV or JSON"),
-            (b"SQLite format 3", "F06", "a data base, such as a bag of ROS 2", "export its topics or tables as CSV"),
-            (b"TDSm", "F06", "a TDMS file of LabVIEW", "export it as CSV, or save it as MAT"),
-            (b"ARROW1", "F06", "an Arrow (Feather) file", "save it as Parquet"))
+_ENDINGS = {
+    "npy": (".npy",),
+    "npz": (".npz",),
+    "parquet": (".parquet",),
+    "json": (".json", ".jsonl"),
+    "text": (),
+    "mat5": (".mat",),
+    "mat73": (".mat", ".h5", ".hdf5"),
+}
+_REFUSED = (
+    (b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
+    (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
+    (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"),
+    (
+        b"#ROSBAG",
+        "F06",
+        "a bag of ROS 1",
+        "export its topics: rostopic echo -b FILE -p /joint_states > run.csv",
+    ),
+    (b"\x89MCAP0", "F06", "an MCAP file", "export its topics as CSV or JSON"),
+    (
+        b"SQLite format 3",
+        "F06",
+        "a data base, such as a bag of ROS 2",
+        "export its topics or tables as CSV",
+    ),
+    (b"TDSm", "F06", "a TDMS file of LabVIEW", "export it as CSV, or save it as MAT"),
+    (b"ARROW1", "F06", "an Arrow (Feather) file", "save it as Parquet"),
+)
 
 
 def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> RawTable:
@@ -47,8 +66,8 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
     """
     status = regular_file(path)
     if status.st_size > _LARGEST:
-        raise InputRejected("X05", f"{status.st_size} bytes; import reads files up to {_LARGEST}", where=path,
-                            remedy="split the recording")
+        message = f"{status.st_size} bytes; import reads files up to {_LARGEST}"
+        raise InputRejected("X05", message, where=path, remedy="split the recording")
     try:
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with os.fdopen(handle, "rb") as file:
@@ -62,10 +81,20 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
     kind = _kind(data, source)
     table = unstacked(_read(kind, data, path, source, text))
     checks = table.checks
-    named = {ending: what for what, endings in _ENDINGS.items() for ending in endings}.get(path.suffix.lower(), "text")
+    named = {ending: what for what, endings in _ENDINGS.items() for ending in endings}.get(
+        path.suffix.lower(), "text"
+    )
     if path.suffix.lower() not in _ENDINGS[kind] and named != kind:
-        checks = (Check.of("F06", "warn", f"named '{path.suffix}', but its content is {kind}; read as that", where=source,
-                           remedy="rename it"), *checks)
+        checks = (
+            Check.of(
+                "F06",
+                "warn",
+                f"named '{path.suffix}', but its content is {kind}; read as that",
+                where=source,
+                remedy="rename it",
+            ),
+            *checks,
+        )
     return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
 
 
@@ -76,8 +105,9 @@ def _refuse_locked(handle: int, path: Path) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
-        raise EnvironmentFault("F15", "in use by another process", where=path,
-                               remedy="wait until the recording is finished") from None
+        message = "in use by another process"
+        remedy = "wait until the recording is finished"
+        raise EnvironmentFault("F15", message, where=path, remedy=remedy) from None
     except OSError:
         return  # a file system without locks cannot say
 
@@ -88,13 +118,16 @@ def _kind(data: bytes, source: str) -> str:
         return "npz"
     for magic, code, what, remedy in _REFUSED:
         if data.startswith(magic):
-            raise (UsageError if code == "X12" else InputRejected)(code, f"{what}, not a recording", where=source, remedy=remedy)
+            raise (UsageError if code == "X12" else InputRejected)(
+                code, f"{what}, not a recording", where=source, remedy=remedy
+            )
     if data.startswith(b"\x93NUMPY"):
         return "npy"
     if data.startswith(b"PAR1"):
         return "parquet"
     if data[:1] == b"\x80" and data[1:2] in (b"\x02", b"\x03", b"\x04", b"\x05"):
-        raise InputRejected("X07", "a pickle, which is never opened", where=source, remedy="save plain numbers as NPY or CSV")
+        message = "a pickle, which is never opened"
+        raise InputRejected("X07", message, where=source, remedy="save plain numbers as NPY or CSV")
     if data.startswith(b"\x89HDF\r\n\x1a\n") or data.startswith(b"MATLAB 7.3"):
         return "mat73"
     if data.startswith(b"MATLAB 5.0") or _is_mat4(data, source):
@@ -108,8 +141,16 @@ def _is_mat4(data: bytes, source: str) -> bool:
 
 def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
     if kind == "text":
-        documents = yaml_documents(data) if text in (None, TextFormat()) and len(data) <= _LARGEST_YAML else None
-        return read_text(data, source, text) if documents is None else table_of_frames(documents, source)
+        documents = (
+            yaml_documents(data)
+            if text in (None, TextFormat()) and len(data) <= _LARGEST_YAML
+            else None
+        )
+        return (
+            read_text(data, source, text)
+            if documents is None
+            else table_of_frames(documents, source)
+        )
     if kind == "json":
         return read_json(data, source)
     if kind == "npy":
@@ -120,7 +161,9 @@ def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | No
         import pyarrow.compute
         import pyarrow.parquet  # noqa: F401
 
-        return _in_child(lambda: columns_of_arrays(read_parquet(data, source), source), path, source)
+        return _in_child(
+            lambda: columns_of_arrays(read_parquet(data, source), source), path, source
+        )
     if kind == "mat5":
         import scipy.io  # noqa: F401  imported before the fork, so that every child has it
 
@@ -132,11 +175,17 @@ def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | No
 
 def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable:
     """The table, read where a crash or a flood of memory costs a child process only."""
+
     def work() -> Answer:
         table = read()
-        about = {"names": list(table.columns), "text": dict(table.text), "units": dict(table.units), "notes": list(table.notes),
-                 "groups": {k: list(v) for k, v in table.groups.items()},
-                 "checks": [check.as_dict() for check in table.checks]}
+        about = {
+            "names": list(table.columns),
+            "text": dict(table.text),
+            "units": dict(table.units),
+            "notes": list(table.notes),
+            "groups": {k: list(v) for k, v in table.groups.items()},
+            "checks": [check.as_dict() for check in table.checks],
+        }
         return Answer(about, {str(i): values for i, values in enumerate(table.columns.values())})
 
     try:
@@ -148,14 +197,25 @@ def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable
         raise
     try:
         return _told(answer, source)
-    except (KeyError, TypeError, AttributeError, StopIteration):  # a child that a file has broken says anything
+    except (
+        KeyError,
+        TypeError,
+        AttributeError,
+        StopIteration,
+    ):  # a child that a file has broken says anything
         raise damaged(source) from None
 
 
 def _told(answer: Answer, source: str) -> RawTable:
     about = answer.about
     columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
-    return RawTable(source, columns, np.arange(len(next(iter(columns.values())))), text=about["text"], units=about["units"],
-                    notes=tuple(about["notes"]),
-                    groups={key: tuple(names) for key, names in about["groups"].items()},
-                    checks=tuple(Check(**check) for check in about["checks"]))
+    return RawTable(
+        source,
+        columns,
+        np.arange(len(next(iter(columns.values())))),
+        text=about["text"],
+        units=about["units"],
+        notes=tuple(about["notes"]),
+        groups={key: tuple(names) for key, names in about["groups"].items()},
+        checks=tuple(Check(**check) for check in about["checks"]),
+    )

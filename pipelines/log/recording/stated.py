@@ -17,7 +17,15 @@ from pipelines.log.recording.column_names import read_name, words_of
 from pipelines.log.recording.vocabulary import WORDS, narrow_signs, plain_letters
 from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["Statement", "stated_counts", "stated_gear", "stated_of_some_joints", "stated_rate", "stated_scale", "stated_unit"]
+__all__ = [
+    "Statement",
+    "stated_counts",
+    "stated_gear",
+    "stated_of_some_joints",
+    "stated_rate",
+    "stated_scale",
+    "stated_unit",
+]
 
 _NUMBER = r"(?<![\w.,:])([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?![\d:])"
 _COUNT = r"(?:counts?|ticks?|cnts?|cts|steps?|incs?|increments?|inkremente?|incrementi?|lsb|units?|digits?|bits?)"
@@ -30,9 +38,15 @@ _BITS = re.compile(r"(?<![\d.])(\d\d)[ -]?bit")
 _SCALE = (re.compile(rf"{_NUMBER}\s*([^\W\d][^\s\d/]*){_PER}(?:one )?{_COUNT}\b"),
           re.compile(rf"(?<![\w.])1 ?{_COUNT}\s*(?:=|is|corresponds to|equals)\s*{_NUMBER}\s*([^\W\d][^\s\d,;]*)"))  # fmt: skip
 _RATIO = re.compile(r"(?<![\d:.])(\d+(?:[.,]\d+)?)\s*:\s*(\d+(?:[.,]\d+)?)(?![\d:])")
-_QUANTITY = re.compile(rf"{_NUMBER}\s*(k?hz|fps|sps|[mµμu]?s(?:ec\w*)?|milli\w+|micro\w+|毫秒|ミリ秒|秒)?(?![\w/])")
-_FRACTION = re.compile(r"(?<![\w./])1\.?0* ?/ ?(\d+)\.?0*(?![\w./])(?: ?s(?:ec\w*)?\b)?")  # of a second, as programs write a step
-_THINNED = re.compile(r"decimat\w*+\W++(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)|jede[rn]? \d")
+_QUANTITY = re.compile(
+    rf"{_NUMBER}\s*(k?hz|fps|sps|[mµμu]?s(?:ec\w*)?|milli\w+|micro\w+|毫秒|ミリ秒|秒)?(?![\w/])"
+)
+_FRACTION = re.compile(
+    r"(?<![\w./])1\.?0* ?/ ?(\d+)\.?0*(?![\w./])(?: ?s(?:ec\w*)?\b)?"
+)  # of a second, as programs write a step
+_THINNED = re.compile(
+    r"decimat\w*+\W++(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)|jede[rn]? \d"
+)
 _GENERIC = frozenset({
     "all", "alle", "are", "base", "column", "columns", "data", "each", "einheit", "einheiten", "in", "is", "of",
     "otherwise", "si", "signals", "stated", "the", "to", "todas", "toutes", "unidad", "unidades", "unit", "unita", "unite",
@@ -56,7 +70,9 @@ _VOID = frozenset({
     "home", "initial", "offset", "start", "zero",
     "printed", "probably", "raw", "show", "shown", "shows", "todo", "unknown", "was", "were",
 })  # fmt: skip
-_SI = re.compile(r"\bsi[ -](?:base )?(?:units?|einheiten|unites?)\b|\b(?:units?|einheiten|unites?|unidades|unita)\W+(?:\w+ )?si\b")
+_SI = re.compile(
+    r"\bsi[ -](?:base )?(?:units?|einheiten|unites?)\b|\b(?:units?|einheiten|unites?|unidades|unita)\W+(?:\w+ )?si\b"
+)
 _SI_UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "current": "A", "time": "s"}
 _LONGEST = 300  # characters of a line that is read
 _OF_EACH = frozenset({"per", "pro", "par", "por", "je", "a", "/", "1"})
@@ -77,13 +93,22 @@ def _clauses(notes: Sequence[str]) -> Iterator[str]:
     """Yield the parts of lines that say one thing each; a line of two cells is a name and its value."""
     for line in notes:
         text = narrow_signs(line).strip().lstrip("#%/*!;\"' ").strip(" ,;\t\"'")[:_LONGEST]
-        cells = [cell.strip() for cell in re.split(r"[;\t]|,(?!\d)|(?<=[^\W\d]),", text) if cell.strip()]
-        if len(cells) > 1 and all(re.fullmatch(r"[+-]?\d\S*( ?[^\W\d]+)?", cell) for cell in cells[1 : 2 + (len(cells) > 3)]):
+        cells = [
+            cell.strip() for cell in re.split(r"[;\t]|,(?!\d)|(?<=[^\W\d]),", text) if cell.strip()
+        ]
+        if len(cells) > 1 and all(
+            re.fullmatch(r"[+-]?\d\S*( ?[^\W\d]+)?", cell)
+            for cell in cells[1 : 2 + (len(cells) > 3)]
+        ):
             yield " ".join(cells)
             continue
         before = ""
-        for part in map(str.strip, re.split(r"[;\t|、，；]|,(?!\d)|\.\s|\s/\s|\bund\b|\band\b|\bet\b", text)):
-            if canonical_unit(part.strip("[]() ")) in UNITS:  # "pose in mm and rad": a further unit of the same
+        for part in map(
+            str.strip, re.split(r"[;\t|、，；]|,(?!\d)|\.\s|\s/\s|\bund\b|\band\b|\bet\b", text)
+        ):
+            if (
+                canonical_unit(part.strip("[]() ")) in UNITS
+            ):  # "pose in mm and rad": a further unit of the same
                 yield f"{before} {part}".strip()
             elif part:
                 before = part.rpartition(" ")[0]
@@ -109,9 +134,21 @@ def _units(clause: str) -> Iterator[tuple[str, str]]:
             unit = canonical_unit(bare.strip("[]() "))
             before = pieces[k - 1].lower() if k else ""
             behind = pieces[k + length].strip("=:") if k + length < len(pieces) else ""
-            number = any(re.match(r"[+-]?\d", word) for word in (before.strip("=:±~"), behind)) or before in _OF_EACH
-            named = bare[:1] in "[(" or re.fullmatch(r"in|en|em|units?|einheit(?:en)?|.*[:=]", before) or len(pieces) == 1
-            if len(said) == length and unit in UNITS and not number and (named or (len(unit) > 1 and bare.lower() != "min")):
+            number = (
+                any(re.match(r"[+-]?\d", word) for word in (before.strip("=:±~"), behind))
+                or before in _OF_EACH
+            )
+            named = (
+                bare[:1] in "[("
+                or re.fullmatch(r"in|en|em|units?|einheit(?:en)?|.*[:=]", before)
+                or len(pieces) == 1
+            )
+            if (
+                len(said) == length
+                and unit in UNITS
+                and not number
+                and (named or (len(unit) > 1 and bare.lower() != "min"))
+            ):
                 yield unit, " ".join(words)
                 k += length - 1
                 break
@@ -120,7 +157,9 @@ def _units(clause: str) -> Iterator[tuple[str, str]]:
         k += 1
 
 
-def stated_unit(notes: Sequence[str], quantity: str, linear: bool = False, motor: bool = False) -> Statement | None:
+def stated_unit(
+    notes: Sequence[str], quantity: str, linear: bool = False, motor: bool = False
+) -> Statement | None:
     """Return the unit of a quantity that the file states, its value "" where two lines disagree.
 
     Args:
@@ -130,25 +169,41 @@ def stated_unit(notes: Sequence[str], quantity: str, linear: bool = False, motor
     found: dict[str, str] = {}
     for clause in _clauses(notes):
         words = _words(clause)
-        if words & _VOID or (words & WORDS["other"]) - {"data"} or words & (WORDS["temperature"] | _GEARS):
+        if (
+            words & _VOID
+            or (words & WORDS["other"]) - {"data"}
+            or words & (WORDS["temperature"] | _GEARS)
+        ):
             continue
         ordered = bool(words & WORDS["commanded"]) and not words & WORDS["measured"]
         of_motor = bool(words & WORDS["motor"]) and not words & WORDS["joint"]
-        if ordered or (of_motor and not motor) or (quantity == "torque" and words & WORDS["partial"]):
+        if (
+            ordered
+            or (of_motor and not motor)
+            or (quantity == "torque" and words & WORDS["partial"])
+        ):
             continue
         if _SI.search(plain_letters(clause).lower()) and quantity in _SI_UNITS and not linear:
             found.setdefault(_SI_UNITS[quantity], clause)
         for unit, before in _units(clause):
             own = UNITS[unit].quantity
             beside = {word for word in _words(before) if not word.isdecimal()}
-            told = read_name(before).quantity == own or beside <= _GENERIC | WORDS["joint"] | {unit.lower()}
-            if own == quantity and told and (
-                    own != "position" or linear == (unit in ("m", "cm", "mm", "um"))):
+            told = read_name(before).quantity == own or beside <= _GENERIC | WORDS["joint"] | {
+                unit.lower()
+            }
+            if (
+                own == quantity
+                and told
+                and (own != "position" or linear == (unit in ("m", "cm", "mm", "um")))
+            ):
                 found.setdefault(canonical_unit(unit), clause)
     if not found:
         return None
     same = len({UNITS[unit] for unit in found}) == 1
-    return Statement(next(iter(found)) if same else "", " and ".join(f"'{words}'" for words in dict.fromkeys(found.values())))
+    return Statement(
+        next(iter(found)) if same else "",
+        " and ".join(f"'{words}'" for words in dict.fromkeys(found.values())),
+    )
 
 
 def stated_rate(notes: Sequence[str]) -> Statement | None:
@@ -182,7 +237,9 @@ def _rate_of(number: float, unit: str, text: str) -> float:
     interval = bool(set(re.findall(r"[a-z]+", text)) & set(_STEPS))
     if unit:
         known = UNITS.get(canonical_unit(unit))
-        return 1.0 / (number * known.factor) if known is not None and known.quantity == "time" else 0.0
+        return (
+            1.0 / (number * known.factor) if known is not None and known.quantity == "time" else 0.0
+        )
     if interval:  # a step without a unit is in s, as programs write it
         return 1.0 / number if number < 1.0 else 0.0
     return number if re.search(r"rate|fps|\bf_?s\b|freq", text) and number >= 1.0 else 0.0
@@ -193,7 +250,11 @@ def stated_of_some_joints(notes: Sequence[str], n: int) -> list[str]:
     of_joint, found = (WORDS["joint"] | {"q"}) - {"a"}, []
     for clause in _clauses(notes):
         words = words_of(clause[:_LONGEST])
-        numbers = {number for word, number in itertools.pairwise(words) if word in of_joint and number.isdecimal()}
+        numbers = {
+            number
+            for word, number in itertools.pairwise(words)
+            if word in of_joint and number.isdecimal()
+        }
         more = {word for word in words if not word.isdecimal()} - of_joint - WORDS["noise"]
         if 0 < len(numbers) < n and len(more) > 2 and not any(_units(clause)):
             found.append(clause.strip("#%/*!;\"' \t,")[:_LONGEST])
@@ -213,7 +274,10 @@ def stated_counts(notes: Sequence[str]) -> Statement | None:
                 found.setdefault(2.0 ** int(bits), clause)
     for scale in stated_scale(notes, "position"):
         if canonical_unit(scale.value) in UNITS:
-            found.setdefault(2.0 * math.pi / (scale.number * UNITS[canonical_unit(scale.value)].factor), scale.words)
+            found.setdefault(
+                2.0 * math.pi / (scale.number * UNITS[canonical_unit(scale.value)].factor),
+                scale.words,
+            )
     return _only(found)
 
 

@@ -265,7 +265,9 @@ _KOREAN = {
     "joint": "관절 축",
     "noise": "값",
 }
-_NARROW = {wide: wide - 0xFEE0 for wide in range(0xFF01, 0xFF5F) if chr(wide) != "，"} | str.maketrans("【】〔〕", "[][]")
+_NARROW = {
+    wide: wide - 0xFEE0 for wide in range(0xFF01, 0xFF5F) if chr(wide) != "，"
+} | str.maketrans("【】〔〕", "[][]")
 _LANGUAGES = (_ENGLISH, _GERMAN, _FRENCH, _SPANISH, _ITALIAN, _PORTUGUESE, _DUTCH, _SWEDISH, _POLISH, _CZECH, _TURKISH,
               _RUSSIAN, _CHINESE, _JAPANESE, _KOREAN)  # fmt: skip
 
@@ -280,7 +282,13 @@ def plain_letters(text: str) -> str:
     apart = unicodedata.normalize("NFD", narrow_signs(text))
     apart = re.sub("([α-ω])\u0307", r"d\1", re.sub("([α-ω])\u0308", r"dd\1", apart))
     bare = "".join(c for c in apart if not "\u0300" <= c <= "\u036f")
-    return unicodedata.normalize("NFC", bare).replace("ß", "ss").replace("ł", "l").replace("Ł", "L").replace("ı", "i")
+    return (
+        unicodedata.normalize("NFC", bare)
+        .replace("ß", "ss")
+        .replace("ł", "l")
+        .replace("Ł", "L")
+        .replace("ı", "i")
+    )
 
 
 def _merged(languages: tuple[Mapping[str, str], ...]) -> dict[str, frozenset[str]]:
@@ -290,9 +298,21 @@ def _merged(languages: tuple[Mapping[str, str], ...]) -> dict[str, frozenset[str
         for meaning, words in language.items():
             for word in words.split():
                 taken.setdefault(plain_letters(word), meaning)
-    return {meaning: frozenset(w for w, of in taken.items() if of == meaning) for meaning in _ENGLISH}
+    return {
+        meaning: frozenset(w for w, of in taken.items() if of == meaning) for meaning in _ENGLISH
+    }
 
 
 WORDS = _merged(_LANGUAGES)
-QUANTITIES = ("position", "velocity", "acceleration", "torque", "current", "time", "index", "temperature", "other")
+QUANTITIES = (
+    "position",
+    "velocity",
+    "acceleration",
+    "torque",
+    "current",
+    "time",
+    "index",
+    "temperature",
+    "other",
+)
 ALL_WORDS = frozenset[str]().union(*WORDS.values())
