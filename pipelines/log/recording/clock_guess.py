@@ -18,8 +18,8 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.recording.clock import counted_on
+from pipelines.log.recording.column_groups import Group, unit_of_group
 from pipelines.log.recording.column_names import read_name, words_of
-from pipelines.log.recording.column_roles import Group, unit_of_group
 from pipelines.log.recording.evidence import Guess, Slope, units_of_ratio
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.stated import Statement, stated_scale, stated_unit

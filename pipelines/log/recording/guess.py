@@ -18,7 +18,14 @@ import numpy as np
 
 from pipelines.errors import InputRejected, clean
 from pipelines.log.recording.clock_guess import round_rate
-from pipelines.log.recording.column_roles import Choice, Group, texts_of, unit_of_group
+from pipelines.log.recording.column_groups import (
+    Choice,
+    Group,
+    lost_numbers,
+    sound_samples,
+    texts_of,
+    unit_of_group,
+)
 from pipelines.log.recording.evidence import Guess, held, velocity_unit
 from pipelines.log.recording.inference import Inference, Model, unit_of_joint, whole
 from pipelines.log.recording.raw import RawTable
@@ -29,7 +36,6 @@ from pipelines.log.recording.reading import (
     with_companion,
 )
 from pipelines.log.recording.recipe_reader import BLANK
-from pipelines.log.recording.sound import lost_numbers, sound_samples
 from pipelines.log.recording.sources import read_table
 from pipelines.log.recording.stated import stated_gear, stated_of_some_joints, stated_scale
 from pipelines.log.units import UNITS

@@ -17,7 +17,7 @@ import numpy as np
 from pipelines.errors import clean
 from pipelines.log.experiment import Array
 from pipelines.log.recording.clock_guess import SECONDS, clock_as_stated, rate_as_stated, round_rate
-from pipelines.log.recording.column_roles import Group, unit_of_group
+from pipelines.log.recording.column_groups import Group, unit_of_group
 from pipelines.log.recording.evidence import (
     Guess,
     Slope,

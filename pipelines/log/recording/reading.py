@@ -17,8 +17,7 @@ import numpy as np
 from pipelines.errors import RrridError
 from pipelines.log.experiment import Array
 from pipelines.log.recording.clock_guess import Clock, find_clock
-from pipelines.log.recording.column_names import words_of
-from pipelines.log.recording.column_roles import (
+from pipelines.log.recording.column_groups import (
     Choice,
     Group,
     by_texts,
@@ -28,9 +27,9 @@ from pipelines.log.recording.column_roles import (
     groups_of,
     texts_of,
 )
+from pipelines.log.recording.column_names import WORDS, words_of
 from pipelines.log.recording.evidence import Slope, crossed, slope_of
 from pipelines.log.recording.raw import RawTable
-from pipelines.log.recording.vocabulary import WORDS
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
 

@@ -29,8 +29,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from pipelines.log.recording.dialect import TextFormat
-
 __all__ = [
     "ColumnSpec",
     "ControllerSpec",
@@ -43,6 +41,7 @@ __all__ = [
     "ResampleSpec",
     "SignalSpec",
     "TableSpec",
+    "TextFormat",
     "TimeSpec",
 ]
 
@@ -183,6 +182,18 @@ class MissingSpec:
 
     __pydantic_config__ = _STRICT
     values: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class TextFormat:
+    """The format of a text file as a recipe states it; the rest is detected."""
+
+    __pydantic_config__ = _STRICT
+    delimiter: str | None = None
+    decimal: str | None = None  # "." or ","
+    header: bool | None = None  # false: the first line is data already
+    encoding: str | None = None
+    comment: str | None = None  # lines that start so are left out
 
 
 @dataclass(frozen=True)

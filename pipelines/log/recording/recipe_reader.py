@@ -12,7 +12,6 @@ from typing import Any
 
 from pipelines.errors import Gathering, InputRejected, UsageError, did_you_mean
 from pipelines.log import schema
-from pipelines.log.recording.dialect import TextFormat
 from pipelines.log.recording.recipe import (
     ColumnSpec,
     ControllerSpec,
@@ -24,6 +23,7 @@ from pipelines.log.recording.recipe import (
     ResampleSpec,
     SignalSpec,
     TableSpec,
+    TextFormat,
     TimeSpec,
 )
 from pipelines.log.shipped import shipped

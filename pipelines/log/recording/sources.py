@@ -1,4 +1,4 @@
-"""Read a recorded file by what it is, not by what it is called: text, JSON, NPY, NPZ, Parquet, MAT v5 or v7.3."""
+"""Read a recorded file by its content, whatever its name: text, JSON, NPY, NPZ, Parquet or MAT."""
 
 from __future__ import annotations
 
@@ -14,51 +14,40 @@ from pipelines.errors import Check, EnvironmentFault, InputRejected, UsageError
 from pipelines.log.atomic import fault_of
 from pipelines.log.files import regular_file
 from pipelines.log.guard import Answer, guarded
-from pipelines.log.recording.arrays import read_npy, read_npz, read_parquet
-from pipelines.log.recording.dialect import TextFormat
-from pipelines.log.recording.json_table import is_json, read_json, table_of_frames
-from pipelines.log.recording.labelled import yaml_documents
-from pipelines.log.recording.matlab import damaged, read_mat5, read_mat73
-from pipelines.log.recording.raw import RawTable, columns_of_arrays, unstacked
-from pipelines.log.recording.tabular import read_text
+from pipelines.log.recording import array_files, frames
+from pipelines.log.recording.raw import Arrays, RawTable, columns_of_arrays, unstacked
+from pipelines.log.recording.recipe import TextFormat
+from pipelines.log.recording.tables import read_text
 
 __all__ = ["read_table"]
 
 _LARGEST = 2 << 30  # [B]
-_LARGEST_YAML = 200_000_000  # [B], as of JSON
 _ENDINGS = {
-    "npy": (".npy",),
-    "npz": (".npz",),
-    "parquet": (".parquet",),
-    "json": (".json", ".jsonl"),
-    "text": (),
-    "mat5": (".mat",),
-    "mat73": (".mat", ".h5", ".hdf5"),
-}
+    "npy": (".npy",), "npz": (".npz",), "parquet": (".parquet",), "json": (".json", ".jsonl"),
+    "text": (), "mat5": (".mat",), "mat73": (".mat", ".h5", ".hdf5"),
+}  # fmt: skip
+_KIND_OF_ENDING = {ending: kind for kind, endings in _ENDINGS.items() for ending in endings}
 _REFUSED = (
     (b"PK\x03\x04", "X12", "an archive (zip or xlsx)", "unpack it, or export the sheet as CSV"),
     (b"\x1f\x8b", "X12", "a gzip archive", "unpack it"),
     (b"\xd0\xcf\x11\xe0", "F06", "an old spreadsheet", "export the sheet as CSV"),
-    (
-        b"#ROSBAG",
-        "F06",
-        "a bag of ROS 1",
-        "export its topics: rostopic echo -b FILE -p /joint_states > run.csv",
-    ),
+    (b"#ROSBAG", "F06", "a bag of ROS 1",
+     "export its topics: rostopic echo -b FILE -p /joint_states > run.csv"),
     (b"\x89MCAP0", "F06", "an MCAP file", "export its topics as CSV or JSON"),
-    (
-        b"SQLite format 3",
-        "F06",
-        "a data base, such as a bag of ROS 2",
-        "export its topics or tables as CSV",
-    ),
+    (b"SQLite format 3", "F06", "a data base, such as a bag of ROS 2",
+     "export its topics or tables as CSV"),
     (b"TDSm", "F06", "a TDMS file of LabVIEW", "export it as CSV, or save it as MAT"),
     (b"ARROW1", "F06", "an Arrow (Feather) file", "save it as Parquet"),
-)
+)  # fmt: skip
+_KINDS = (
+    (b"\x93NUMPY", "npy"), (b"PAR1", "parquet"), (b"\x89HDF\r\n\x1a\n", "mat73"),
+    (b"MATLAB 7.3", "mat73"), (b"MATLAB 5.0", "mat5"),
+)  # fmt: skip
+_PICKLES = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 
 
 def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> RawTable:
-    """Everything numeric in a recorded file; `name` is what messages call it, such as its path below the source folder.
+    """Return everything numeric in a recorded file; messages call it `name`.
 
     Raises:
         InputRejected: the file is damaged, hostile or holds no table; the code says which.
@@ -81,20 +70,10 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
     kind = _kind(data, source)
     table = unstacked(_read(kind, data, path, source, text))
     checks = table.checks
-    named = {ending: what for what, endings in _ENDINGS.items() for ending in endings}.get(
-        path.suffix.lower(), "text"
-    )
-    if path.suffix.lower() not in _ENDINGS[kind] and named != kind:
-        checks = (
-            Check.of(
-                "F06",
-                "warn",
-                f"named '{path.suffix}', but its content is {kind}; read as that",
-                where=source,
-                remedy="rename it",
-            ),
-            *checks,
-        )
+    ending = path.suffix.lower()
+    if ending not in _ENDINGS[kind] and _KIND_OF_ENDING.get(ending, "text") != kind:
+        message = f"named '{path.suffix}', but its content is {kind}; read as that"
+        checks = (Check.of("F06", "warn", message, where=source, remedy="rename it"), *checks)
     return replace(table, checks=checks, sha256=hashlib.sha256(data).hexdigest())
 
 
@@ -105,108 +84,86 @@ def _refuse_locked(handle: int, path: Path) -> None:
     try:
         fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:
-        message = "in use by another process"
-        remedy = "wait until the recording is finished"
+        message, remedy = "in use by another process", "wait until the recording is finished"
         raise EnvironmentFault("F15", message, where=path, remedy=remedy) from None
     except OSError:
         return  # a file system without locks cannot say
 
 
 def _kind(data: bytes, source: str) -> str:
-    """F06: what the first bytes say."""
+    """F06: return the kind of a file by its first bytes."""
     if data.startswith(b"PK\x03\x04") and source.lower().endswith(".npz"):
         return "npz"
     for magic, code, what, remedy in _REFUSED:
         if data.startswith(magic):
-            raise (UsageError if code == "X12" else InputRejected)(
-                code, f"{what}, not a recording", where=source, remedy=remedy
-            )
-    if data.startswith(b"\x93NUMPY"):
-        return "npy"
-    if data.startswith(b"PAR1"):
-        return "parquet"
-    if data[:1] == b"\x80" and data[1:2] in (b"\x02", b"\x03", b"\x04", b"\x05"):
-        message = "a pickle, which is never opened"
-        raise InputRejected("X07", message, where=source, remedy="save plain numbers as NPY or CSV")
-    if data.startswith(b"\x89HDF\r\n\x1a\n") or data.startswith(b"MATLAB 7.3"):
-        return "mat73"
-    if data.startswith(b"MATLAB 5.0") or _is_mat4(data, source):
-        return "mat5"
-    return "json" if is_json(data) else "text"
-
-
-def _is_mat4(data: bytes, source: str) -> bool:
-    return source.lower().endswith(".mat") and len(data) > 20 and b"\0" in data[:4]
+            kind = UsageError if code == "X12" else InputRejected
+            raise kind(code, f"{what}, not a recording", where=source, remedy=remedy)
+    if data.startswith(_PICKLES):
+        message, remedy = "a pickle, which is never opened", "save plain numbers as NPY or CSV"
+        raise InputRejected("X07", message, where=source, remedy=remedy)
+    for magic, name in _KINDS:
+        if data.startswith(magic):
+            return name
+    if source.lower().endswith(".mat") and len(data) > 20 and b"\0" in data[:4]:
+        return "mat5"  # version 4
+    return "json" if frames.is_json(data) else "text"
 
 
 def _read(kind: str, data: bytes, path: Path, source: str, text: TextFormat | None) -> RawTable:
     if kind == "text":
-        documents = (
-            yaml_documents(data)
-            if text in (None, TextFormat()) and len(data) <= _LARGEST_YAML
-            else None
-        )
-        return (
-            read_text(data, source, text)
-            if documents is None
-            else table_of_frames(documents, source)
-        )
+        detect = text in (None, TextFormat()) and len(data) <= frames.LARGEST
+        if detect and (documents := frames.yaml_documents(data)) is not None:
+            return frames.table_of_frames(documents, source)
+        return read_text(data, source, text)
     if kind == "json":
-        return read_json(data, source)
+        return frames.read_json(data, source)
     if kind == "npy":
-        return columns_of_arrays(read_npy(data, source), source)
+        return columns_of_arrays(array_files.read_npy(data, source), source)
+    # Libraries are imported before the fork, so that every child has them.
     if kind == "npz":
-        return _in_child(lambda: columns_of_arrays(read_npz(data, source), source), path, source)
+        return _in_child(lambda: array_files.read_npz(data, source), path, source)
     if kind == "parquet":
         import pyarrow.compute
         import pyarrow.parquet  # noqa: F401
 
-        return _in_child(
-            lambda: columns_of_arrays(read_parquet(data, source), source), path, source
-        )
+        return _in_child(lambda: array_files.read_parquet(data, source), path, source)
     if kind == "mat5":
-        import scipy.io  # noqa: F401  imported before the fork, so that every child has it
+        import scipy.io  # noqa: F401
 
-        return _in_child(lambda: columns_of_arrays(read_mat5(data, source), source), path, source)
+        return _in_child(lambda: array_files.read_mat5(data, source), path, source)
     import h5py  # noqa: F401
 
-    return _in_child(lambda: columns_of_arrays(read_mat73(path, source), source), path, source)
+    return _in_child(lambda: array_files.read_mat73(path, source), path, source)
 
 
-def _in_child(read: Callable[[], RawTable], path: Path, source: str) -> RawTable:
-    """The table, read where a crash or a flood of memory costs a child process only."""
+def _in_child(read: Callable[[], Arrays], path: Path, source: str) -> RawTable:
+    """Return the table, read where a crash or a flood of memory costs a child process only."""
 
     def work() -> Answer:
-        table = read()
+        table = columns_of_arrays(read(), source)
         about = {
             "names": list(table.columns),
             "text": dict(table.text),
             "units": dict(table.units),
             "notes": list(table.notes),
-            "groups": {k: list(v) for k, v in table.groups.items()},
+            "groups": {name: list(columns) for name, columns in table.groups.items()},
             "checks": [check.as_dict() for check in table.checks],
         }
-        return Answer(about, {str(i): values for i, values in enumerate(table.columns.values())})
+        return Answer(about, {str(i): x for i, x in enumerate(table.columns.values())})
 
     try:
         answer = guarded(work, path)
     except InputRejected as problem:
-        # However it was damaged, and however the library took it: one message (F08).
-        if problem.code == "RRID-F03":
-            raise damaged(source) from None
+        if problem.code == "RRID-F03":  # however it was damaged and the library took it
+            raise array_files.damaged_mat(source) from None
         raise
     try:
-        return _told(answer, source)
-    except (
-        KeyError,
-        TypeError,
-        AttributeError,
-        StopIteration,
-    ):  # a child that a file has broken says anything
-        raise damaged(source) from None
+        return _table_of(answer, source)
+    except (KeyError, TypeError, AttributeError, StopIteration):  # of a child that a file broke
+        raise array_files.damaged_mat(source) from None
 
 
-def _told(answer: Answer, source: str) -> RawTable:
+def _table_of(answer: Answer, source: str) -> RawTable:
     about = answer.about
     columns = {name: np.asarray(answer.arrays[str(i)]) for i, name in enumerate(about["names"])}
     return RawTable(

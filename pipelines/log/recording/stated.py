@@ -13,8 +13,13 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from pipelines.log.recording.column_names import read_name, words_of
-from pipelines.log.recording.vocabulary import WORDS, narrow_signs, plain_letters
+from pipelines.log.recording.column_names import (
+    WORDS,
+    narrow_signs,
+    plain_letters,
+    read_name,
+    words_of,
+)
 from pipelines.log.units import UNITS, canonical_unit
 
 __all__ = [

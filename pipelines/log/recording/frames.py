@@ -1,14 +1,16 @@
-"""Read a JSON recording: a list of frames, frames one a line, or arrays by name.
+"""Read documents: JSON, as frames or arrays by name, and the YAML of `ros2 topic echo`.
 
-[{"t": 0.0, "q": [0.1, 0.2]}, …]            columns t, q[0], q[1]
+[{"t": 0.0, "q": [0.1, 0.2]}, …], or one frame a line   columns t, q[0], q[1]
 {"frames": [{"joints": {"j1": {"pos": 0.1}}}, …]}       joints.j1.pos
-{"t": [0.0, …], "q": [[0.1, 0.2], …]}       t, q_1, q_2
+{"t": [0.0, …], "q": [[0.1, 0.2], …]}                   t, q_1, q_2
+position: - 0.1 - 0.2 --- (in lines of their own)       position[0], position[1]
 """
 
 from __future__ import annotations
 
 import itertools
 import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -19,24 +21,19 @@ from pipelines.errors import InputRejected
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.raw import RawTable, columns_of_arrays, described, distinct
+from pipelines.log.recording.tables import LABELLED_VALUE
 
-__all__ = ["is_json", "read_json", "table_of_frames"]
+__all__ = ["LARGEST", "is_json", "read_json", "table_of_frames", "yaml_documents"]
 
-_LARGEST = 200_000_000  # [bytes]; parsed, JSON takes about ten times its size
+LARGEST = 200_000_000  # [bytes]; parsed, JSON takes about ten times its size
 _DEEPEST = 8  # levels of names within a frame
 _MOST_COLUMNS = 2000
 _MOST_NOTES = 200
 
 
 def is_json(data: bytes) -> bool:
-    """Tell whether the file begins as JSON does: a list of lists or objects, or an object."""
-    head = (
-        data[:256]
-        .lstrip(b"\xef\xbb\xbf \t\r\n")
-        .replace(b" ", b"")
-        .replace(b"\n", b"")
-        .replace(b"\r", b"")
-    )
+    """Return whether the file begins as JSON does: a list of lists or objects, or an object."""
+    head = data[:256].lstrip(b"\xef\xbb\xbf \t\r\n").translate(None, b" \r\n")
     return head.startswith((b'{"', b"[{", b"[[", b"{}", b"[]"))
 
 
@@ -46,29 +43,29 @@ def read_json(data: bytes, source: str) -> RawTable:
     Raises:
         InputRejected: F08 not JSON, S12 no recording in it, X05 larger than a recording.
     """
-    if len(data) > _LARGEST:
-        message = f"{len(data)} bytes of JSON; import reads up to {_LARGEST}"
+    if len(data) > LARGEST:
+        message = f"{len(data)} bytes of JSON; import reads up to {LARGEST}"
         remedy = "split the recording, or save it as CSV or NPY"
         raise InputRejected("X05", message, where=source, remedy=remedy)
     document = _of_pandas(_parsed(data, source))
-    frames = _frames(document, _DEEPEST)
     notes = tuple(itertools.islice(_notes(document), _MOST_NOTES))
-    if frames is not None:
+    if (frames := _frames(document, _DEEPEST)) is not None:
         return replace(table_of_frames(frames, source), notes=notes)
     arrays: dict[str, Array] = {}
     for name, value in _series(document, "", _DEEPEST):
         if (values := _array(value)) is not None:
             arrays[distinct(name, arrays, source)] = values
     if not arrays:
-        message = "no list of samples in the JSON file"
         remedy = "save a list of frames, or one array a signal"
-        raise InputRejected("S12", message, where=source, remedy=remedy)
+        raise InputRejected(
+            "S12", "no list of samples in the JSON file", where=source, remedy=remedy
+        )
     table = columns_of_arrays(arrays, source)
     return replace(table, notes=(*table.notes, *notes))
 
 
 def _notes(document: Any) -> Iterator[str]:
-    """Yield "metadata.physics_dt = 0.005" of every number and text beside the samples."""
+    """Yield "metadata.physics_dt = 0.005" of every number and text outside the samples."""
     for path, value in _named(document, "", _DEEPEST) if isinstance(document, dict) else ():
         if isinstance(value, int | float | str):
             yield f"{path} = {value}"
@@ -77,28 +74,23 @@ def _notes(document: Any) -> Iterator[str]:
 
 
 def _of_pandas(document: Any) -> Any:
-    """Return a frame that pandas wrote by columns, or as names and rows, as one array a column; anything else as it is."""
+    """Return a frame that pandas wrote as one array a column; anything else as it is."""
     if not isinstance(document, dict) or not document:
         return document
     names, rows = document.get("columns"), document.get("data")
     if (
         isinstance(names, list)
         and isinstance(rows, list)
-        and all(isinstance(name, str) for name in names)
+        and all(isinstance(n, str) for n in names)
     ):
         alike = all(isinstance(row, list) and len(row) == len(names) for row in rows)
-        return (
-            dict(zip(names, map(list, zip(*rows, strict=True)), strict=True))
-            if alike and rows
-            else document
-        )
+        columns = map(list, zip(*rows, strict=True)) if alike and rows else None
+        return document if columns is None else dict(zip(names, columns, strict=True))
     numbered = all(
-        isinstance(value, dict) and value and all(key.isdecimal() for key in value)
-        for value in document.values()
+        isinstance(column, dict) and column and all(key.isdecimal() for key in column)
+        for column in document.values()
     )
-    return (
-        {name: list(value.values()) for name, value in document.items()} if numbered else document
-    )
+    return {k: list(column.values()) for k, column in document.items()} if numbered else document
 
 
 def _parsed(data: bytes, source: str) -> Any:
@@ -107,8 +99,7 @@ def _parsed(data: bytes, source: str) -> Any:
         try:
             return json.loads(text)
         except json.JSONDecodeError:
-            lines = text.splitlines()
-            return [json.loads(line) for line in lines if line.strip()]
+            return [json.loads(line) for line in text.splitlines() if line.strip()]
     except (ValueError, RecursionError) as problem:
         message = f"not valid JSON: {problem}"
         remedy = "copy the file again, or end the recording before it is copied"
@@ -136,7 +127,7 @@ def _named(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
 
 
 def _series(value: Any, path: str, depth: int) -> Iterator[tuple[str, Any]]:
-    """Yield (path, value) as `_named` does; samples in an object with a name go by it, with its unit in brackets."""
+    """Yield (path, value) as `_named` does; samples in an object with a name go by it."""
     if isinstance(value, list) and depth > 0 and value and all(isinstance(x, dict) for x in value):
         for k, item in enumerate(value):
             yield from _series(item, f"{path}[{k}]", depth - 1)
@@ -163,18 +154,15 @@ def _array(value: Any) -> Array | None:
 def _cells(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
     """Yield (path, group, value) of every number and text of a frame."""
     for path, value in _named(frame, "", _DEEPEST):
-        if not isinstance(value, list):
-            yield path, path, value
-            continue
-        for k, item in enumerate(value):
+        for k, item in enumerate(value) if isinstance(value, list) else ():
             if isinstance(item, dict):
-                yield from (
-                    (f"{path}[{k}].{inner}", f"{path}[{k}].{inner}", cell)
-                    for inner, cell in _named(item, "", _DEEPEST)
-                    if not isinstance(cell, list)
-                )
+                for inner, cell in _named(item, "", _DEEPEST):
+                    if not isinstance(cell, list):
+                        yield f"{path}[{k}].{inner}", f"{path}[{k}].{inner}", cell
             elif not isinstance(item, list):
                 yield f"{path}[{k}]", path, item
+        if not isinstance(value, list):
+            yield path, path, value
 
 
 def table_of_frames(frames: Sequence[Mapping[str, Any]], source: str) -> RawTable:
@@ -197,16 +185,14 @@ def table_of_frames(frames: Sequence[Mapping[str, Any]], source: str) -> RawTabl
     if not columns:
         remedy = "save the samples as numbers"
         raise InputRejected("S12", "the frames hold no numbers", where=source, remedy=remedy)
-    labels = {
-        path: found[0]
-        for path, found in texts.items()
-        if len(found) == len(frames) and len(set(found)) == 1
-    }
+    constant = [
+        k for k, all_of in texts.items() if len(all_of) == len(frames) and len(set(all_of)) == 1
+    ]
     return RawTable(
         source,
         columns,
         np.arange(len(frames)),
-        labels=labels,
+        labels={path: texts[path][0] for path in constant},
         groups={name: tuple(paths) for name, paths in groups.items() if paths != [name]},
         text={path: found[0][:40] for path, found in texts.items() if path not in columns},
     )
@@ -217,3 +203,42 @@ def _real(value: float) -> float:
         return float(value)
     except OverflowError:  # an integer of hundreds of digits
         return float("inf")
+
+
+def yaml_documents(data: bytes) -> list[dict[str, Any]] | None:
+    """Return YAML documents of mappings and lists of scalars; None where it is no such text."""
+    first = re.match(rb"(---\r?\n)?[A-Za-z_]\w*:( \S.*)?\r?\n", data[:300])
+    if first is None or data.count(b"\n---") < 2:
+        return None
+    text = data.decode("utf-8", "replace").replace("\r\n", "\n")
+    return [_yaml(part) for part in re.split(r"(?m)^---[^\S\n]*$", text) if part.strip()]
+
+
+def _yaml(text: str) -> dict[str, Any]:
+    root: dict[str, Any] = {}
+    path: list[tuple[int, dict[str, Any]]] = [(-1, root)]
+    holder, name = root, ""  # of the last key
+    for line in text.split("\n"):
+        found = re.fullmatch(r"( *)(?:(- )\s*(.*)|([\w/.]+):(?: (.*))?)", line)
+        if found is None:
+            continue
+        value = ((found[3] if found[2] else found[5]) or "").strip()
+        if found[2]:
+            if not isinstance(holder.get(name), list):
+                holder[name] = []
+            holder[name].append(_scalar(value))
+            continue
+        while path[-1][0] >= len(found[1]):
+            path.pop()
+        holder, name = path[-1][1], found[4]
+        holder[name] = _scalar(value) if value else {}
+        if not value:
+            path.append((len(found[1]), holder[name]))
+    return root
+
+
+def _scalar(text: str) -> Any:
+    if LABELLED_VALUE.fullmatch(text) and ":" not in text:
+        whole = "." not in text and text.lstrip("+-").isdecimal()
+        return int(text) if whole else float(text)
+    return text.strip("'\"")
