@@ -1,4 +1,4 @@
-"""Group the columns of a recording by what their names say, one group a signal, in the joints' order.
+"""Group the columns of a recording by their names, one group a signal, in the joints' order.
 
 A group holds the columns of one quantity, one origin (measured, plain, commanded) and one side. The
 robot beside the recording, where there is one, gives the joints' names and count; otherwise numbers
@@ -24,8 +24,8 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
 from pipelines.log.units import canonical_unit
 
-__all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of", "lost_numbers",
-           "sound_samples", "texts_of", "unit_of_group"]  # fmt: skip
+__all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of",
+           "lost_numbers", "sound_samples", "texts_of", "unit_of_group"]  # fmt: skip
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
@@ -53,7 +53,7 @@ class Group:
 
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:
-        """Return the side of the gear by name: q is a joint's; robot learning may scale its data."""
+        """Return the side of the gear by name: q is a joint's; robot learning may scale it."""
         if _LEARNING & set(self.words.split()):
             return "scaled"
         return "motor" if self.motor else "joint" if self.names_joints else ""
@@ -64,7 +64,7 @@ class Group:
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
-        """Order of preference: measured, plain, commanded; joint before motor, raw before filtered."""
+        """Order of preference: measured, plain, commanded; of the joint, the motor; raw, filtered."""
         return (("measured", "plain", "commanded").index(self.origin), self.motor, self.filtered)
 
 
@@ -320,7 +320,7 @@ def companion_of(path: Path, table: RawTable) -> RawTable | None:
 
 
 def lost_numbers(table: RawTable) -> list[float]:
-    """Return whole numbers, farther off than all others are from each other: they mark lost samples."""
+    """Return whole numbers that mark lost samples: far off all other numbers of their column."""
     found: Counter[float] = Counter()
     for column in table.columns.values():
         values = column[np.isfinite(column) & (np.abs(column) < _NO_NUMBER)]
@@ -341,7 +341,7 @@ def sound_samples(table: RawTable, lost: Sequence[float]) -> RawTable:
         name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
         for name, values in table.columns.items()
     }
-    # A table of several topics leaves the cells of the others empty: the rows of most columns count.
+    # A table of several topics leaves cells of the others empty: the rows of most columns count.
     masks = Counter(known.tobytes() for known in usable.values() if known.any())
     topic = np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
     usable = {name: known[topic] for name, known in usable.items()}

@@ -1,9 +1,9 @@
 """Read from a column's name which quantity it holds, whether it was measured, and of which joint.
 
-A name is split into words: at signs, at changes of case, between letters and digits, and where a run
-of letters consists of known words ("jointpos", "taucmd"). Known words give the quantity, its source
-and its side; the other words and the numbers name the joint. The head noun is the last one: a "torque
-current" is a current, a "current torque" a torque as it is now.
+A name is split into words: at signs, at changes of case, between letters and digits, and where a
+run of letters consists of known words ("jointpos", "taucmd"). Known words give the quantity, its
+source and its side; the other words and the numbers name the joint. The head noun is the last one:
+a "torque current" is a current, a "current torque" a torque as it is now.
 
 The vocabulary lists words by meaning, in all languages (English, then by language), without case or
 accents. A word has one meaning only: an ambiguous one ("temps" is a time in French, temperatures in
@@ -21,8 +21,8 @@ from typing import Literal
 
 from pipelines.log.units import UNITS, canonical_unit
 
-__all__ = ["ALL_WORDS", "WORDS", "ColumnName", "narrow_signs", "plain_letters", "read_name", "signal_of",
-           "words_of"]  # fmt: skip
+__all__ = ["ALL_WORDS", "WORDS", "ColumnName", "narrow_signs", "plain_letters", "read_name",
+           "signal_of", "words_of"]  # fmt: skip
 
 _VOCABULARY = {
     "position": """
@@ -132,15 +132,15 @@ _VOCABULARY = {
         データ ロボット の 第 값""",
 }  # fmt: skip
 
-_QUANTITIES = ("position", "velocity", "acceleration", "torque", "current", "time", "index", "temperature",
-               "other")  # fmt: skip
+_QUANTITIES = ("position", "velocity", "acceleration", "torque", "current", "time", "index",
+               "temperature", "other")  # fmt: skip
 _NARROW = {wide: wide - 0xFEE0 for wide in range(0xFF01, 0xFF5F) if chr(wide) != "，"}
 _NARROW |= str.maketrans("【】〔〕", "[][]")
 _LETTERS = str.maketrans({"ß": "ss", "ł": "l", "Ł": "L", "ı": "i"})
 
 
 def narrow_signs(text: str) -> str:
-    """Return a text with wide Latin letters and signs (Ａ, （, １, 【) as narrow ones in their places."""
+    """Return a text with wide letters and signs (Ａ, （, １, 【) as narrow ones in their places."""
     return text.translate(_NARROW)
 
 
@@ -159,7 +159,7 @@ Origin = Literal["measured", "plain", "commanded"]
 _ROLE_WORDS = ALL_WORDS.difference(*(WORDS[quantity] for quantity in _QUANTITIES)) | {"d"}
 # Words of two letters and fewer that others are written to without a space.
 _SHORT = frozenset(["q", "qd", "dq", "iq", "fb", "ff", "sp", "tq", "ee", "ft", "io"])
-# Words that may be part of another: any of a script without spaces, the longer ones of Latin letters.
+# Words that may be part of another: of scripts without spaces, and the longer ones of others.
 _COMPOUND = sorted(
     (
         word
@@ -189,8 +189,8 @@ _SUFFIX_UNITS = {
     if (word := re.sub("[ ^]", "", unit.lower()).replace("/", join)) not in _NOT_IN_NAMES
 } | {word: unit for unit, words in _UNIT_WORDS.items() for word in words.split()}
 _JOINED = {  # pairs of words that are a single one
-    ("q", "dot"): "dq", ("q", "ddot"): "ddq", ("d", "q"): "dq", ("dd", "q"): "ddq", ("q", "dd"): "ddq",
-    ("theta", "dot"): "dtheta", ("d", "tau"): "dtau", ("tau", "dot"): "dtau",
+    ("q", "dot"): "dq", ("q", "ddot"): "ddq", ("d", "q"): "dq", ("dd", "q"): "ddq",
+    ("q", "dd"): "ddq", ("theta", "dot"): "dtheta", ("d", "tau"): "dtau", ("tau", "dot"): "dtau",
 }  # fmt: skip
 _SIGNALS = {"position": "q", "velocity": "dq", "acceleration": "ddq", "torque": "tau",
             "current": "current", "time": "t"}  # fmt: skip
@@ -292,7 +292,7 @@ def read_name(column: str, unit: str = "") -> ColumnName:
         column,
         quantity,
         origin,
-        # Where both are recorded, q is the joint's position and theta the motor's (Spong 1987, eq. 1).
+        # Of two positions, q is the joint's and theta the motor's (Spong 1987, eq. 1).
         motor=bool(held & (WORDS["motor"] | {"theta", "dtheta"})),
         partial=bool(held & WORDS["partial"]) or (estimated and not moves),
         filtered=bool(held & WORDS["variant"]),
@@ -317,7 +317,8 @@ def _head(nouns: Sequence[tuple[int, str]]) -> tuple[int | None, str]:
             return None, whole
     motion = [noun for noun in nouns if noun[1] not in ("time", "index")]
     times = [noun for noun in nouns if noun[1] == "time"]
-    return (motion[-1:] or times[:1] or nouns[:1] or [(None, "")])[0]
+    chosen = motion[-1:] or times[:1] or nouns[:1]
+    return chosen[0] if chosen else (None, "")
 
 
 def _unit_in_name(column: str, quantity: str) -> tuple[str, frozenset[str]]:

@@ -450,8 +450,8 @@ def without_repeats(columns: dict[str, Array], header: Header, source: str) -> d
         InputRejected: S03, two columns of one name hold different numbers.
     """
     for name, first in header.again.items():
-        pair = columns.get(name), columns.get(first)
-        if pair[0] is not None and pair[1] is not None and np.array_equal(*pair, equal_nan=True):
+        both = [columns[key] for key in (name, first) if key in columns]
+        if len(both) == 2 and np.array_equal(both[0], both[1], equal_nan=True):
             continue
         at = header.names.index(first) + 1, header.names.index(name) + 1
         message = f"columns {at[0]} and {at[1]} are both named '{first[:80]}'"
