@@ -22,14 +22,12 @@ from pipelines.log.doctor.checks_subject import many
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
 from pipelines.log.recording import filenames
-from pipelines.log.recording.examine import examine
+from pipelines.log.recording.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.log.recording.guess import Draft, guess_recipe
 from pipelines.log.recording.joint_side import Converted, joint_side
-from pipelines.log.recording.make_log import SourceFile, make_log
+from pipelines.log.recording.make_log import ImportedTable, SourceFile, examine, import_table, make_log
 from pipelines.log.recording.recipe import ResampleSpec
-from pipelines.log.recording.recordings import Map, Material, Source, assemble, collect, parse_map
 from pipelines.log.recording.repair import Limits, Recording, late_intervals, mend
-from pipelines.log.recording.table_columns import ImportedTable, import_table
 from pipelines.log.results import NOT_STORED
 from pipelines.log.robot import RobotDescription
 from pipelines.log.table import write_table

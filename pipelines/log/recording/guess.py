@@ -34,7 +34,7 @@ from pipelines.log.recording.reading import (
     read_recording,
     with_companion,
 )
-from pipelines.log.recording.recipe_reader import BLANK
+from pipelines.log.recording.recipe import BLANK
 from pipelines.log.recording.sources import read_table
 from pipelines.log.recording.stated import stated_gear, stated_of_some_joints, stated_scale
 from pipelines.log.recording.unit_guess import velocity_unit, whole

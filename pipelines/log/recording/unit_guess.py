@@ -20,7 +20,7 @@ from pipelines.log.recording.evidence import (
     rollover,
     unlike_links,
 )
-from pipelines.log.recording.recipe_reader import BLANK
+from pipelines.log.recording.recipe import BLANK
 from pipelines.log.robot import Joint
 from pipelines.log.units import UNITS, of_rated
 
