@@ -46,8 +46,8 @@ _BAD_ARCHIVE = (zipfile.BadZipFile, zlib.error, EOFError, OSError, NotImplemente
                 RuntimeError, ValueError, struct.error)  # fmt: skip
 # NameError: a local variable of scipy that damage leaves unset.
 _BAD_MAT = (ValueError, TypeError, IndexError, KeyError, OSError, OverflowError, EOFError,
-            AttributeError, NotImplementedError, struct.error, zlib.error, ZeroDivisionError, RuntimeError,
-            AssertionError, MemoryError, NameError)  # fmt: skip
+            AttributeError, NotImplementedError, struct.error, zlib.error, ZeroDivisionError,
+            RuntimeError, AssertionError, MemoryError, NameError)  # fmt: skip
 
 
 def _too_large(declared: int, source: str, of: str = "") -> InputRejected:

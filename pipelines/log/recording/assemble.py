@@ -161,11 +161,7 @@ def _hits(recipe: Recipe, names: tuple[str, ...], path: Path) -> tuple[Hits, Fit
 
 
 def _folder(recipe: Path, source: Path | None) -> Path:
-    """Return the folder of the recordings: --source, or that of a recipe of one's own.
-
-    Raises:
-        UsageError: C04, no such folder, or none was given.
-    """
+    """Return the folder of the recordings: --source, or that of a recipe of one's own."""
     if source is None:
         names = shipped_names("recipes")
         if recipe.stem in names and recipe == shipped("recipes", recipe.stem):

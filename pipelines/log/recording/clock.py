@@ -195,10 +195,8 @@ def _plausible(median: float, factor: float, unit: str, step: float | None, wher
         fits = _fitting(median, step)
         hint = f"; in {fits[0]} it would fit" if fits else ""
         declared = f"{1 / step:.6g} Hz is declared{hint}"
-        message, remedy = (
-            f"time in {unit} makes {found:.6g} Hz, but {declared}",
-            "correct unit or rate",
-        )
+        message = f"time in {unit} makes {found:.6g} Hz, but {declared}"
+        remedy = "correct unit or rate"
         raise InputRejected("S08", message, where=where, remedy=f"{remedy} in [time]")
     if step is None and not _SLOWEST / 10 <= found <= 10 * _FASTEST:
         right = " or ".join(_plausible_units(median)) or "a sample index"
@@ -235,10 +233,8 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     found += [_single(table, c) for c in times if _rises(table.columns[c])]
     if not found and (backwards := [c for c in times if _rises(-table.columns[c])]):
         message = "falls from row to row: the newest row is first"
-        where, remedy = (
-            f"{table.source}, column '{backwards[0]}'",
-            "sort the rows by it, the oldest first",
-        )
+        where = f"{table.source}, column '{backwards[0]}'"
+        remedy = "sort the rows by it, the oldest first"
         raise InputRejected("T01", message, where=where, remedy=remedy)
     if found:
         uneven = [_unevenness(clock.values) for clock in found]

@@ -64,7 +64,7 @@ class Group:
 
     @property
     def rank(self) -> tuple[int, bool, bool]:
-        """Order of preference: measured, plain, commanded; of the joint, the motor; raw, filtered."""
+        """Order of preference: measured, plain, commanded; joint, motor; raw, filtered."""
         return (("measured", "plain", "commanded").index(self.origin), self.motor, self.filtered)
 
 
@@ -82,7 +82,7 @@ Member = tuple[ColumnName, int | None]  # a column and its joint (from 0), where
 def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False) -> list[Group]:
     """Return the groups of the columns; `joints` names the robot's, from the base to the tip.
 
-    Where one of them `slides`, its force stands in a group with the torques of the others.
+    Where one of them `slides`, its force is grouped with the torques of the others.
     """
     texts = texts_of(table, joints)
     patterns = _patterns(table, joints)
@@ -201,7 +201,7 @@ def by_texts(
 ) -> tuple[list[str], Order | None]:
     """Return the columns in the robot's order by the `texts` that name them.
 
-    The order is None where the texts say nothing of the columns.
+    Without texts of these columns there is no order.
     """
     if len(texts) != len(columns) or len(texts) < 2:
         return list(columns), None
@@ -348,10 +348,8 @@ def sound_samples(table: RawTable, lost: Sequence[float]) -> RawTable:
     names = [name for name, known in usable.items() if known.mean() > _USABLE]
     keep = np.all([usable[name] for name in names], axis=0) if names else np.zeros(0, dtype=bool)
     if keep.sum() < FEWEST:
-        message, remedy = (
-            f"{int(keep.sum())} samples without a hole",
-            "give a recording of a motion",
-        )
+        message = f"{int(keep.sum())} samples without a hole"
+        remedy = "give a recording of a motion"
         raise InputRejected("T08", message, where=table.source, remedy=remedy)
     rows = np.flatnonzero(topic)[keep]
     lines = None if table.lines is None else table.lines[rows]

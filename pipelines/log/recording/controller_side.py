@@ -2,7 +2,7 @@
 
     offset -> transmission -> unit -> sign -> scale        q_motor = N (q_joint - offset)
 
-in the recipe's order of columns, at its rate. Importing the table by the same recipe gives the motion.
+in the recipe's order of columns, at its rate. Importing the table by the recipe gives the motion.
 """
 
 from __future__ import annotations

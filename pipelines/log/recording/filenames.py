@@ -46,10 +46,8 @@ def _compiled(pattern: str) -> re.Pattern[str]:
     try:
         return re.compile("".join(parts))
     except re.error as problem:
-        message, remedy = (
-            f"pattern '{pattern}': {problem}",
-            "write {name}, or {name:regular expression}",
-        )
+        message = f"pattern '{pattern}': {problem}"
+        remedy = "write {name}, or {name:regular expression}"
         raise UsageError("C02", message, where="match", remedy=remedy) from None
 
 

@@ -1,8 +1,8 @@
 """Draft a recipe for a recording, with the evidence for every guess, for a person to correct.
 
-The draft says what each value rests on: a name, a limit of the robot in the folder, the agreement of
-a velocity with the slope of a position, jumps of one size, the sign of the power. What neither names
-nor numbers decide is marked FILL IN, with the candidates; what is only likely is marked "check:".
+The draft says what each value rests on: a name, a limit of the robot in the folder, the agreement
+of a velocity with the slope of a position, jumps of one size, the sign of the power. What neither
+names nor numbers decide is marked FILL IN, with the candidates; what is likely is marked "check:".
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Weigh what a recording says of its clock, positions and torques.
+"""Weigh the evidence for the clock, positions and torques of a recording.
 
 Names, lines of the file, numbers and the robot's links are the evidence. Each finding is a value
 with its confidence and reasons; where these contradict each other, or say nothing, the value is ""
@@ -63,7 +63,7 @@ Model = Callable[[RobotDescription, Array, Array, Array], Array | None]
 
 
 class Inference:
-    """What is known of one recording. Not frozen: later findings rest on earlier ones."""
+    """The findings about one recording. Not frozen: later ones rest on earlier ones."""
 
     def __init__(self, reading: Reading, model: Model | None) -> None:
         self.reading, self.model = reading, model

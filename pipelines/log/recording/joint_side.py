@@ -310,11 +310,7 @@ class _Converter:
         return si, current
 
     def _excitation(self, name: str, units: tuple[str, ...], where: str) -> str:
-        """Return the quantity of an excitation by the controller's law: torque or acceleration.
-
-        Raises:
-            InputRejected: S05, its unit is of the other.
-        """
+        """Return the quantity of an excitation by the controller's law: torque or acceleration."""
         law = self.recipe.controller.law if self.recipe.controller else None
         if law in ("pd", "pd+feedforward"):
             return "torque"

@@ -1,4 +1,4 @@
-"""Make the logs and tables of an import: what the recipe and the file's name say of each.
+"""Make the logs and tables of an import, by the recipe and the file's name.
 
 Maps and calibrations without a clock are no logs: their columns become a table in SI.
 """
@@ -164,10 +164,8 @@ def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
 def _refuse_other_joints(about: LogSpec, recipe: Recipe, n: int) -> None:
     """C02: joint, posture and gains are those of the robot's joints."""
     if about.joint is not None and not 1 <= about.joint <= n:
-        message, remedy = (
-            f"joint {about.joint}, the robot has joints 1 to {n}",
-            "joints count from 1",
-        )
+        message = f"joint {about.joint}, the robot has joints 1 to {n}"
+        remedy = "joints count from 1"
         raise UsageError("C02", message, where=recipe.where, remedy=remedy)
     given = {f"controller.{key}": getattr(recipe.controller, key, None) for key in _GAINS}
     for key, values in ({"posture": about.posture} | given).items():

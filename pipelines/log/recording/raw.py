@@ -59,7 +59,7 @@ class RawTable:
         """Return the column of a name or a 1-based number, for the signal `wanted`: "tau_1", "t".
 
         Raises:
-            InputRejected: S01, there is none; S12, it does not hold numbers.
+            InputRejected: S01, it does not exist; S12, it does not hold numbers.
         """
         if isinstance(column, int):
             ordered = list(self.columns)
@@ -210,11 +210,7 @@ def _constants(arrays: Arrays) -> Iterator[str]:
 
 
 def _samples_of(arrays: Arrays, source: str) -> int:
-    """Return the number of samples: the side of most arrays, the longer one of two shared alike.
-
-    Raises:
-        InputRejected: S11, two sides are shared alike, and neither is clearly longer.
-    """
+    """Return the number of samples: the side of most arrays, the longer one of two shared alike."""
     shared: Counter[int] = Counter()
     for array in arrays.values():
         rows, wide = (array.shape[0], 1) if array.ndim == 1 else array.shape

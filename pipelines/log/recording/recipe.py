@@ -320,11 +320,7 @@ def _date(table: dict[str, Any], where: object) -> None:
 
 
 def _utc(value: object, what: str, where: object) -> str:
-    """Return a time as UTC. One without its offset is another hour in every country.
-
-    Raises:
-        UsageError: C02, no time, or no offset.
-    """
+    """Return a time as UTC. One without its offset is another hour in every country."""
     example = "write it with its offset from UTC, 2024-05-17T11:30:00+02:00, or with Z"
     remedy = f"{example}, or leave it out"
     try:
@@ -354,10 +350,8 @@ def _explain(error: Any, where: object) -> UsageError:
         kind = ColumnSpec if "columns" in path[:-1] else _SECTIONS.get(str(path[0]), Recipe)
         known = [f.name for f in fields(Recipe if len(path) == 1 else kind) if f.name != "where"]
         hint = did_you_mean(str(path[-1]), known)
-        message, remedy = (
-            f"'{place}' is not a key of a recipe{hint}",
-            f"known here: {', '.join(known)}",
-        )
+        message = f"'{place}' is not a key of a recipe{hint}"
+        remedy = f"known here: {', '.join(known)}"
         return UsageError("C01", message, where=where, remedy=remedy)
     if error["type"] in ("missing", "missing_argument"):
         return UsageError("C02", f"'{place}' is missing", where=where, remedy=_DRAFT)

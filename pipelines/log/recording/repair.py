@@ -1,7 +1,7 @@
 """Repair a recording where that is honest, refuse it where it is not, and say what was done.
 
-Samples go in, samples come out: nothing is ever filled in. A missing one leaves a gap in time; a clock
-that was set back ends one log and begins the next.
+Samples go in, samples come out: nothing is ever filled in. A missing one leaves a gap in time; a
+clock that was set back ends one log and begins the next.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from pipelines.log.limits import (
     sentinels,
 )
 
-__all__ = ["Limits", "Recording", "late_intervals", "mend"]
+__all__ = ["Limits", "Recording", "late_intervals", "repair"]
 
 _SHORTEST_PART = 0.1  # of all samples
 _MOST_MISSING = 0.2
@@ -73,14 +73,14 @@ class Recording:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a recipe says of missing samples and gaps."""
+    """The entries of a recipe for missing samples and gaps."""
 
     missing: tuple[float, ...] = ()
     longest_gap: float | None = None  # [s]; default what an observer predicts through
     resampled: bool = False
 
 
-def mend(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], tuple[Check, ...]]:
+def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], tuple[Check, ...]]:
     """Return the parts of a recording that can be logs, and what was done to get them.
 
     Raises:
@@ -154,10 +154,8 @@ def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
             if share > _MOST_MISSING:
                 some = f"{100 * share:.0f} % of its samples are missing"
                 message = "holds no number at all" if share == 1.0 else some
-                where, remedy = (
-                    recording.column(name, joint),
-                    "choose another column, or record again",
-                )
+                where = recording.column(name, joint)
+                remedy = "choose another column, or record again"
                 raise InputRejected("D02", message, where=where, remedy=remedy)
         lost |= holes.any(axis=1)
     if not lost.any():

@@ -1,7 +1,7 @@
 """Read a recorded file by its content: text, JSON, YAML, NPY, NPZ, Parquet or MAT.
 
-Documents are read here; tables of text and files of arrays have modules of their own. JSON holds frames
-or arrays by name, the YAML of `ros2 topic echo` frames:
+Documents are read here; tables of text and files of arrays have modules of their own. JSON holds
+frames or arrays by name, the YAML of `ros2 topic echo` frames:
 
 [{"t": 0.0, "q": [0.1, 0.2]}, …], or one frame a line   columns t, q[0], q[1]
 {"frames": [{"joints": {"j1": {"pos": 0.1}}}, …]}       joints.j1.pos
@@ -211,11 +211,7 @@ def _is_json(data: bytes) -> bool:
 
 
 def _read_json(data: bytes, source: str) -> RawTable:
-    """Return the table of a JSON recording.
-
-    Raises:
-        InputRejected: F08 not JSON, S12 no recording in it, X05 larger than a recording.
-    """
+    """Return the table of a JSON recording."""
     if len(data) > _LARGEST_JSON:
         message = f"{len(data)} bytes of JSON; import reads up to {_LARGEST_JSON}"
         remedy = "split the recording, or save it as CSV or NPY"

@@ -231,7 +231,7 @@ def stated_rate(notes: Sequence[str]) -> Statement | None:
 
 
 def _rate_of(number: float, unit: str, text: str) -> float:
-    """Return the rate [Hz] of a number with its unit, 0 where it is none."""
+    """Return the rate [Hz] of a number with its unit, 0 for anything else."""
     if number <= 0.0:
         return 0.0
     if unit in ("hz", "fps", "sps", "khz"):

@@ -317,10 +317,8 @@ def _numbers(
     if not whole and len(body) - 1 not in torn:
         torn.add(len(body) - 1)
         no_end = "the last line has no line end: whether its last number is whole is not known"
-        where, remedy = (
-            f"{source}, line {body[-1][0]}",
-            "end the recording before the file is copied",
-        )
+        where = f"{source}, line {body[-1][0]}"
+        remedy = "end the recording before the file is copied"
         message = f"{no_end}, it is left out"
         checks.append(Check.of("F09", "warn", message, where=where, remedy=remedy))
     good = [i for i in range(len(body)) if i not in torn]
@@ -337,10 +335,8 @@ def _numbers(
             message = f"{share} are out of step with the columns: {listed}"
             remedy = "export the file again, or cut the damaged part out"
             raise InputRejected("F09", message, where=source, remedy=remedy)
-        message, remedy = (
-            f"{share} left out: {listed}",
-            "copy or export the file again to have them all",
-        )
+        message = f"{share} left out: {listed}"
+        remedy = "copy or export the file again to have them all"
         checks.append(Check.of("F09", "repair", message, where=source, remedy=remedy))
     keep = [k for k in range(len(good)) if k not in found.wrong]
     columns = {name: np.ascontiguousarray(values[keep]) for name, values in found.columns.items()}

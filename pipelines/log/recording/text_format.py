@@ -92,10 +92,8 @@ def decode(data: bytes, source: str, encoding: str | None = None) -> tuple[str, 
         data = data.rstrip(b"\0")
         if len(data) < whole:
             left_out = f"{whole - len(data)} NUL bytes at the end left out"
-            message, remedy = (
-                f"{left_out}: the recorder lost its power",
-                "let the recorder close its file",
-            )
+            message = f"{left_out}: the recorder lost its power"
+            remedy = "let the recorder close its file"
             checks.append(Check.of("F09", "repair", message, where=source, remedy=remedy))
         if (at := data.find(b"\0")) >= 0:
             line = data[:at].count(b"\n") + 1

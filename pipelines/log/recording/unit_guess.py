@@ -54,7 +54,7 @@ _SHARE = 0.02  # of a bound: a number that keeps 0..1 and comes near both is a s
 
 @dataclass(frozen=True)
 class PositionEvidence:
-    """What is known of positions, apart from their numbers."""
+    """The evidence for the unit of positions, apart from their numbers."""
 
     slope: Slope | None  # of a recorded velocity, where the unit of time is known
     joints: Sequence[Joint] = ()  # of the robot
@@ -276,7 +276,7 @@ def torque_unit(
 ) -> Guess:
     """Return the unit of torques, "" where it stays open: by name, or by the robot's links.
 
-    `fit` is None where links or motion are unknown; the definition of a `message` is then enough.
+    Without a `fit` (links or motion are unknown) the definition of a `message` is enough.
     """
     peak = f"up to {float(np.abs(tau).max()):.4g}"
     unit = named or "N m"
