@@ -323,7 +323,8 @@ def assemble(
                     undeclared.append(f"{signal}: unit {listed} {origin}")
         if not here and file != primary:
             continue
-        clock = time if file == primary or _has_columns(table, time) else None
+        has_clock = all(isinstance(c, int) or c in table.columns for c, _ in time.parts)
+        clock = time if file == primary or has_clock else None
         with problems.part():
             t = _time(table, clock, assume_units, undeclared, checks)
         if not problems.found:
@@ -342,10 +343,6 @@ def assemble(
         remedy = "add [resample] rate = … to bring them on one clock"
         raise InputRejected("T06", message, where=where, remedy=remedy)
     return Assembled(joined, units, columns, tuple(checks), tuple(undeclared))
-
-
-def _has_columns(table: RawTable, time: TimeSpec) -> bool:
-    return all(isinstance(column, int) or column in table.columns for column, _ in time.parts)
 
 
 def _time(
@@ -373,23 +370,13 @@ def _recording(
     si: Mapping[str, float],
     clock: TimeSpec | None,
 ) -> Recording:
-    matrices = {
-        signal: np.column_stack([table.columns[name] for name in names])
-        for signal, names in columns.items()
-    }
-    in_rows = table.lines is None
-    places = table.rows + 1 if table.lines is None else table.lines
-    return Recording(
-        t,
-        matrices,
-        columns,
-        places,
-        table.source,
-        clock is not None and clock.column is not None,
-        "row" if in_rows else "line",
-        table.breaks,
-        si,
-    )
+    matrices = {}
+    for signal, names in columns.items():
+        matrices[signal] = np.column_stack([table.columns[name] for name in names])
+    places, word = (table.rows + 1, "row") if table.lines is None else (table.lines, "line")
+    clocked = clock is not None and clock.column is not None
+    breaks = table.breaks
+    return Recording(t, matrices, columns, places, table.source, clocked, word, breaks, si)
 
 
 def _begun(part: Recording, begin: float | None, checks: list[Check]) -> Recording:

@@ -27,8 +27,8 @@ from pipelines.log.recording.stated import Statement, stated_scale, stated_unit
 from pipelines.log.recording.unit_guess import units_of_ratio
 from pipelines.log.units import UNITS, canonical_unit, to_si
 
-__all__ = ["SECONDS", "Clock", "clock_as_stated", "counted_on", "find_clock", "rate_as_stated",
-           "round_rate", "time_of"]  # fmt: skip
+__all__ = ["SECONDS", "Clock", "clock_as_stated", "counted_on", "find_clock", "median_step",
+           "rate_as_stated", "round_rate", "time_of"]  # fmt: skip
 
 _COMMON = ("s", "ms", "us", "ns")
 SECONDS = {unit: UNITS[unit].factor for unit in (*_COMMON, "100 ns", "min", "d")}
@@ -225,9 +225,8 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         InputRejected: T01, the only column of time runs backwards.
     """
     of = {column: group.quantity for group in groups for column in group.columns}
-    times, counters, plain = (
-        [c for c in table.columns if of.get(c) == quantity] for quantity in ("time", "index", "")
-    )
+    times = [c for c in table.columns if of.get(c) == "time"]
+    plain = [c for c in table.columns if of.get(c) == ""]
     pairs = [_pair(table, *pair, named=True) for pair in itertools.pairwise(times)]
     found = [clock for clock in pairs if clock]
     found += [_single(table, c) for c in times if _rises(table.columns[c])]
@@ -246,6 +245,7 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
     counting = [c for c in even if _counts(table.columns[c])]
     for column in [*(c for c in even if c not in counting), *counting]:
         return _single(table, column)
+    counters = [c for c in table.columns if of.get(c) == "index"]
     counted = [c for c in counters if _rises(table.columns[c])]
     if not counted:
         return None
@@ -302,7 +302,8 @@ def _pair(table: RawTable, whole: str, fraction: str, named: bool) -> Clock | No
     return None
 
 
-def _median_step(values: Array) -> float:
+def median_step(values: Array) -> float:
+    """Return the median of the steps forward; 1 without any."""
     steps = np.diff(values)
     return float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
 
@@ -314,7 +315,7 @@ def _unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[
         q: (samples, joints) positions in any unit.
         slope: relation of a recorded velocity to the positions, per recorded unit of time.
     """
-    median, named = _median_step(clock.values), clock.units[0]
+    median, named = median_step(clock.values), clock.units[0]
     if clock.paired:
         rise = f"rise by {median:.4g} s, {1 / median:.4g} Hz"
         return "s", Guess("s", "sure", f"whole seconds and {clock.units[1]} together {rise}")

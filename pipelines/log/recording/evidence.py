@@ -225,24 +225,18 @@ def _jumps(
 class Config:
     """The comparison of a torque with that of the robot's own links."""
 
-    window: float = (
-        0.1  # [s] of the differentiated cubic (Savitzky & Golay 1964): moves take longer
-    )
+    window: float = 0.1  # [s] of the local cubic (Savitzky & Golay 1964): moves take longer
     fewest: int = 5  # samples in it: a cubic has four coefficients
     changes: float = 0.1  # of the links' torque over the motion: else friction and noise dominate
     explained: float = 0.5  # of the power that friction leaves, or the torque does not follow
-    most: float = (
-        0.8  # of the links' torque is at joints they explain: a light wrist has friction alone
-    )
+    most: float = 0.8  # of the links' torque is at joints they explain: not at a light wrist
     slow: float = 0.01  # of a joint's fastest speed: below, it may rest and noise gives it a sign
     alone: float = 0.99  # of the torque with its friction, a hundredth or more in any drive
     gain: float = 3.0  # a payload as heavy as the links, whose masses are roughly known
     unnamed_gain: float = 1.5  # without a unit: a share of a rated torque may be near it by chance
     better: float = 0.5  # of the residual of one unit or order is that of another that fits better
     proof: float = 0.1  # of the torque may be unexplained under the unit that is proved
-    friction: float = (
-        0.3  # correlation of the rest with the direction of motion, where it is friction
-    )
+    friction: float = 0.3  # correlation of the rest with the direction of motion
     samples: int = 4000  # of a recording that are compared: ten seconds of a fast one
     samples_of_orders: int = 600  # of these, for each exchange of two joints
 
@@ -338,9 +332,8 @@ def _without_friction(values: Array, dq: Array) -> Array:
 def _left(rest: Array, links: Array, tau: Array) -> float:
     """Return the share of a joint's torque that neither links nor friction explain, the mean."""
     power = (links**2).sum(axis=0)
-    gain = np.where(
-        power > 0.0, (rest * links).sum(axis=0) / np.where(power > 0.0, power, 1.0), 0.0
-    )
+    gain = (rest * links).sum(axis=0) / np.where(power > 0.0, power, 1.0)
+    gain = np.where(power > 0.0, gain, 0.0)
     size = np.maximum(tau.var(axis=0), 1e-300)
     return float(np.mean(((rest - gain * links) ** 2).mean(axis=0) / size))
 

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import InputRejected, clean
-from pipelines.log.recording.clock import round_rate
+from pipelines.log.recording.clock import median_step, round_rate
 from pipelines.log.recording.column_groups import (
     Choice,
     Group,
@@ -407,8 +407,7 @@ class _Drafting:
     def _resample(self) -> list[str]:
         if self.found.t is None:
             return []
-        steps = np.diff(self.found.t)
-        median = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+        steps, median = np.diff(self.found.t), median_step(self.found.t)
         uneven = float(np.percentile(np.abs(steps - median), 95)) / median
         if uneven < 0.05:
             even = f"time is even within {100 * uneven:.2g} %"
@@ -432,11 +431,11 @@ def _order(group: Group) -> list[str]:
 
 def _also(choice: Choice, table: RawTable) -> list[str]:
     """Return comments that name the other columns of that quantity."""
-    others = [group for group in choice.others[:6] if not group.partial]
-    return [
-        f"    # also there: {g.words} ({g.quantity}, {g.origin}), {_columns(g.columns, table)}"
-        for g in others
-    ]
+    lines = []
+    for group in (group for group in choice.others[:6] if not group.partial):
+        words = f"{group.words} ({group.quantity}, {group.origin})"
+        lines.append(f"    # also there: {words}, {_columns(group.columns, table)}")
+    return lines
 
 
 def _columns(names: Sequence[str], table: RawTable) -> str:

@@ -380,11 +380,8 @@ def _splits(columns: list[str], n: int | None) -> Iterator[list[list[str]]]:
 def _pairs(table: RawTable, blocks: list[list[str]], t: Array | None) -> list[tuple[int, int]]:
     """Return (position, velocity) of blocks that are slopes; of q, dq and ddq the first two."""
     values = [matrix(table, block) for block in blocks]
-    found = [
-        (a, b)
-        for a, b in permutations(range(len(blocks)), 2)
-        if slope_of(values[a], values[b], t, every=True) is not None
-    ]
+    pairs = permutations(range(len(blocks)), 2)
+    found = [(a, b) for a, b in pairs if slope_of(values[a], values[b], t, every=True)]
     derived = {b for _, b in found}
     return [(a, b) for a, b in found if a not in derived]
 

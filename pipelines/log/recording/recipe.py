@@ -76,9 +76,7 @@ class LogSpec:
     __pydantic_config__ = _STRICT
     match: Texts = ()
     name: str = "{stem}"
-    experiment: Experiment = (
-        "free"  # groups {experiment}, {role}, {joint} of the pattern come first
-    )
+    experiment: Experiment = "free"  # a group {experiment}, {role} or {joint} comes first
     role: Role = "identify"
     origin: Literal["measured", "simulated"] = "measured"
     torque: Literal["held-command", "measured"] = "held-command"
