@@ -28,6 +28,7 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.recipe import ColumnSpec, LogSpec, Recipe, TableSpec
 from pipelines.log.results import NOT_STORED
 from pipelines.log.robot import format_robot
+from pipelines.log.structure import refuse_unlike_format
 from pipelines.log.units import UNITS
 
 __all__ = ["ImportedTable", "SourceFile", "examine", "import_table", "make_log"]
@@ -39,7 +40,6 @@ _TIME = "RRID-S08"  # a recipe's unit of time can be wrong by a thousand and con
 _IN_RECIPE = {
     "RRID-S05": torque_in_recipe(), "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf)),
 }  # fmt: skip
-_GAINS = ("kp", "kd", "ki", "output_limit", "torque_resolution")
 _SI = {"time": "s", "position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2",
        "torque": "N m", "current": "A", "temperature": "degC"}  # fmt: skip
 _METRES = {"m": "m", "mm": "m", "um": "m", "m/s": "m/s", "mm/s": "m/s", "m/s^2": "m/s^2",
@@ -75,7 +75,6 @@ def make_log(
     """
     recipe, robot = material.recipe, material.robot
     about = _about(recipe.log, source, recipe.where)
-    _refuse_other_joints(about, recipe, robot.n_joints)
     name = clean(filenames.fill(about.name, source.groups, recipe.where), 200) or "log"
     files = _files(source, assembled)
     step = _sample_time(recipe, t)
@@ -161,24 +160,12 @@ def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
     return about
 
 
-def _refuse_other_joints(about: LogSpec, recipe: Recipe, n: int) -> None:
-    """C02: joint, posture and gains are those of the robot's joints."""
-    if about.joint is not None and not 1 <= about.joint <= n:
-        message = f"joint {about.joint}, the robot has joints 1 to {n}"
-        remedy = "joints count from 1"
-        raise UsageError("C02", message, where=recipe.where, remedy=remedy)
-    given = {f"controller.{key}": getattr(recipe.controller, key, None) for key in _GAINS}
-    for key, values in ({"posture": about.posture} | given).items():
-        if values is not None and len(values) != n:
-            message = f"'{key}' holds {len(values)} numbers, the robot has {n} joints"
-            raise UsageError("C02", message, where=recipe.where, remedy="give one number a joint")
-
-
 def _controller(material: Material) -> Controller | None:
     spec = material.recipe.controller
     if spec is None:
         return None
-    given = {key: getattr(spec, key) for key in _GAINS}
+    keys = ("kp", "kd", "ki", "output_limit", "torque_resolution")
+    given = {key: getattr(spec, key) for key in keys}
     arrays: dict[str, Any] = {k: np.array(x) for k, x in given.items() if x is not None}
     return Controller(
         law=spec.law,
@@ -215,8 +202,10 @@ def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Chec
     They are glitches, which stay, and time in another unit; the import has said the others.
 
     Raises:
-        InputRejected: what the doctor would reject, or repair before use: the import should have.
+        InputRejected: S20 unlike the format, and what the doctor would reject or repair before
+            use: the import should have.
     """
+    refuse_unlike_format(log)  # the doctor judges a log whose joint and gains are the robot's
     found = []
     for check in check_log(replace(log, source=recording), TRUSTED if trust_units else ()):
         kept = check.code == _KEPT and check.level == "repair"

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected, UsageError
 from pipelines.log.recording.recipe import parse_recipe
 from tests.log.recording.good import good, run, text, write
 
@@ -49,12 +49,12 @@ def test_integers_without_end(digits: int) -> None:
 
 
 @pytest.mark.parametrize(("before", "after", "words"), [
-    ('experiment = "free"', 'experiment = "friction"\njoint = 9', "joint 9, the robot has joints 1 to 3"),
-    ('experiment = "free"', 'experiment = "hold"\nposture = [0.1, 0.2]', "'posture' holds 2 numbers"),
-    ("[time]", '[controller]\nlaw = "pd"\nkp = [1.0, 2.0]\nkd = [1.0, 2.0]\n[time]', "'controller.kp' holds 2 numbers"),
+    ('experiment = "free"', 'experiment = "friction"\njoint = 9', "joint is 9, outside 1 … 3"),
+    ('experiment = "free"', 'experiment = "hold"\nposture = [0.1, 0.2]', "posture has 2 values for 3 joints"),
+    ("[time]", '[controller]\nlaw = "unknown"\noutput_limit = [1.0, 2.0]\n[time]', "output_limit has shape"),
 ])
 def test_numbers_of_other_joints(tmp_path: Path, before: str, after: str, words: str) -> None:
-    """A joint, a posture or gains that the robot does not have are refused before the log is judged."""
+    """A joint, a posture or limits that the robot does not have are refused before the doctor judges the log."""
     folder = write(tmp_path / "data", text(good())).parent
-    with pytest.raises(UsageError, match=f"RRID-C02 .*{words}"):
+    with pytest.raises(InputRejected, match=f"RRID-S20 .*{words}"):
         run(folder, HEAD.replace(before, after))
