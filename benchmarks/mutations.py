@@ -25,7 +25,7 @@ import numpy as np
 
 from pipelines.errors import RrridError
 from pipelines.log.recording.guess import guess_recipe
-from pipelines.log.recording.recipe_reader import parse_recipe
+from pipelines.log.recording.recipe import parse_recipe
 from pipelines.log.robot_files import load_robot
 from rrrid_cli.settings import make_settings
 

@@ -121,7 +121,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     arm = _arm(settings.model, robot)
     recipe = None
     if settings.recipe is not None:
-        from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
+        from pipelines.log.recording.recipe import find_recipe, parse_recipe
 
         path = find_recipe(settings.recipe)
         recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)

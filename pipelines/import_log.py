@@ -22,14 +22,12 @@ from pipelines.log.doctor.checks_subject import many
 from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import write_log
 from pipelines.log.recording import filenames
-from pipelines.log.recording.examine import examine
+from pipelines.log.recording.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.log.recording.guess import Draft, guess_recipe
 from pipelines.log.recording.joint_side import Converted, joint_side
-from pipelines.log.recording.make_log import SourceFile, make_log
+from pipelines.log.recording.make_log import ImportedTable, SourceFile, examine, import_table, make_log
 from pipelines.log.recording.recipe import ResampleSpec
-from pipelines.log.recording.recordings import Map, Material, Source, assemble, collect, parse_map
-from pipelines.log.recording.repair import Limits, Recording, late_intervals, mend
-from pipelines.log.recording.table_columns import ImportedTable, import_table
+from pipelines.log.recording.repair import Limits, Recording, late_intervals, repair
 from pipelines.log.results import NOT_STORED
 from pipelines.log.robot import RobotDescription
 from pipelines.log.table import write_table
@@ -161,18 +159,18 @@ def _import(source: Source, material: Material, mapped: Map, settings: Settings,
     recipe = material.recipe
     limits = Limits(recipe.missing.values, recipe.time.longest_gap, recipe.resample is not None)
     checks += assembled.checks
-    mended = []
+    repaired = []
     for recording in assembled.recordings:
-        parts, said = mend(recording, limits)
+        parts, said = repair(recording, limits)
         checks += said
-        mended.append(parts)
-    if len(mended) > 1 and any(len(parts) > 1 for parts in mended):
+        repaired.append(parts)
+    if len(repaired) > 1 and any(len(parts) > 1 for parts in repaired):
         raise InputRejected("T04", "gaps or steps of the clock in files with clocks of their own", where=source.primary,
                             remedy="bring the files on one clock before the import")
     repairs = tuple(f"{c.code}: {c.message}" for c in checks if c.level == "repair"
                     and any(c.where.startswith(t.source) for t in source.tables.values()))
     made = []
-    for parts in zip(*mended, strict=True):
+    for parts in zip(*repaired, strict=True):
         converted = [joint_side(part, recipe, assembled.units, material.robot, material.drive, settings.trust_units)
                      for part in parts]
         checks += [check for item in converted for check in item.checks]

@@ -108,7 +108,7 @@ def read(request: Request, settings: Settings) -> Inputs:
         robot, known = _robot(request, inputs)
         sources += known
         if settings.recipe is not None:
-            from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
+            from pipelines.log.recording.recipe import find_recipe, parse_recipe
 
             path = find_recipe(settings.recipe)
             recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)

@@ -12,7 +12,7 @@ from pipelines.errors import EnvironmentFault, UsageError
 from pipelines.log.guard_answer import Answer
 from pipelines.log.guard_child import Child, Lost
 
-__all__ = ["files_below", "fill", "lying_there", "match", "matches"]
+__all__ = ["files_below", "fill", "inside", "lying_there", "match", "matches", "unique"]
 
 _MOST_FILES = 100_000
 _NAMED = 5  # files that a message names
@@ -22,26 +22,33 @@ _SECONDS = 3.0  # for all patterns of a recipe on all names
 _MEMORY = 256 << 20  # [B]
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^{}]+(?:\{\d+(?:,\d*)?\}[^{}]*)*))?\}")
 
+Patterns = str | tuple[str, ...]
+
 
 @lru_cache(maxsize=256)
 def _compiled(pattern: str) -> re.Pattern[str]:
-    """The regular expression of a pattern: {name} any text without a slash, {name:regex} that, *, ** and ? as in a shell."""
+    """Return the regular expression of a pattern.
+
+    {name} is any text without a slash, {name:regex} that; *, ** and ? are as in a shell.
+    """
     if len(pattern) > _LONGEST:
-        raise UsageError("C02", f"a pattern of {len(pattern)} characters", where="match", remedy=f"write at most {_LONGEST}")
+        message, remedy = f"a pattern of {len(pattern)} characters", f"write at most {_LONGEST}"
+        raise UsageError("C02", message, where="match", remedy=remedy)
     parts, at = [], 0
     seen: set[str] = set()
     for found in _FIELD.finditer(pattern):
-        parts.append(_shell(pattern[at : found.start()]))
         name, inner = found.group(1), found.group(2) or r"[^/]+?"
-        parts.append(f"(?P={name})" if name in seen else f"(?P<{name}>{inner})")
+        group = f"(?P={name})" if name in seen else f"(?P<{name}>{inner})"
+        parts += [_shell(pattern[at : found.start()]), group]
         seen.add(name)
         at = found.end()
     parts.append(_shell(pattern[at:]))
     try:
         return re.compile("".join(parts))
     except re.error as problem:
-        raise UsageError("C02", f"pattern '{pattern}': {problem}", where="match",
-                         remedy="write {name}, or {name:regular expression}") from None
+        message = f"pattern '{pattern}': {problem}"
+        remedy = "write {name}, or {name:regular expression}"
+        raise UsageError("C02", message, where="match", remedy=remedy) from None
 
 
 def _shell(text: str) -> str:
@@ -49,100 +56,118 @@ def _shell(text: str) -> str:
     return text.replace(r"\*\*", ".*").replace(r"\*", "[^/]*").replace(r"\?", "[^/]")
 
 
-def matches(every: Sequence[str | tuple[str, ...]], names: Sequence[str], where: Path) -> list[dict[str, dict[str, str]]]:
-    """Of each of `every` patterns: the names that fit, each with its groups; in a time that no pattern exceeds.
+def _each(patterns: Patterns) -> tuple[str, ...]:
+    return (patterns,) if isinstance(patterns, str) else patterns
 
-    A regular expression can take longer than the world has lasted; what could is matched in a child process.
+
+def matches(
+    every: Sequence[Patterns], names: Sequence[str], where: Path
+) -> list[dict[str, dict[str, str]]]:
+    """Return the names that fit each of `every` patterns, with their groups, in limited time.
+
+    A regular expression can take very long; one that could is matched in a child process.
 
     Raises:
-        UsageError: C02, a pattern is none, or takes too long.
+        UsageError: C02, a pattern is invalid, or takes too long.
     """
-    flat = [pattern for patterns in every for pattern in ((patterns,) if isinstance(patterns, str) else patterns)]
+    flat = [pattern for patterns in every for pattern in _each(patterns)]
     for pattern in flat:
         _compiled(pattern)
 
     def work() -> list[dict[str, dict[str, str]]]:
-        return [{name: groups for name in names if (groups := match(patterns, name)) is not None} for patterns in every]
+        fits = [{name: match(patterns, name) for name in names} for patterns in every]
+        return [{k: groups for k, groups in fit.items() if groups is not None} for fit in fits]
 
-    if all(":" not in pattern and len(re.findall(r"\{|\*+", pattern)) <= _SIMPLE for pattern in flat):
+    if all(":" not in p and len(re.findall(r"\{|\*+", p)) <= _SIMPLE for p in flat):
         return work()
+    child = Child(lambda _: Answer({"found": work()}, {}))
     try:
-        answer = Child(lambda _: Answer({"found": work()}, {})).ask(None, where, _SECONDS, _MEMORY, _MEMORY, last=True)
+        answer = child.ask(None, where, _SECONDS, _MEMORY, _MEMORY, last=True)
     except Lost:
-        raise UsageError("C02", f"a pattern takes more than {_SECONDS:.0f} s: {', '.join(flat)}", where=where,
-                         remedy="write fewer wildcards, and no repetition inside another, such as (a+)+") from None
+        message = f"a pattern takes more than {_SECONDS:.0f} s: {', '.join(flat)}"
+        remedy = "write fewer wildcards, and no repetition inside another, such as (a+)+"
+        raise UsageError("C02", message, where=where, remedy=remedy) from None
     found: list[dict[str, dict[str, str]]] = answer.about["found"]
     return found
 
 
-def match(patterns: str | tuple[str, ...], relative: str) -> dict[str, str] | None:
-    """The groups of the first pattern that fits the path, {stem} among them; None where none fits."""
-    for pattern in (patterns,) if isinstance(patterns, str) else patterns:
+def match(patterns: Patterns, relative: str) -> dict[str, str] | None:
+    """Return the groups of the first pattern that fits the path, and {stem}; None otherwise."""
+    for pattern in _each(patterns):
         if found := _compiled(pattern).fullmatch(relative):
             return {"stem": Path(relative).stem} | found.groupdict(default="")
     return None
 
 
 def lying_there(names: Sequence[str], endings: Collection[str]) -> str:
-    """What a message says of the files in a folder, those with the `endings` of recordings first."""
+    """Return the files of a folder in words, those with the `endings` of recordings first."""
     if not names:
         return "no file lies there"
-    first = sorted(names, key=lambda name: Path(name).suffix.lower() not in endings)[:_NAMED]
-    more = f" and {len(names) - len(first)} more" if len(names) > len(first) else ""
-    return f"there {'lies' if len(names) == 1 else 'lie'} {', '.join(first)}{more}"
+    ordered = sorted(names, key=lambda name: Path(name).suffix.lower() not in endings)
+    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
+    lie = "lies" if len(names) == 1 else "lie"
+    return f"there {lie} {', '.join(ordered[:_NAMED])}{more}"
 
 
 def fill(template: str, groups: Mapping[str, str], where: object) -> str:
-    """A template with its {groups} filled in.
+    """Return a template with its {groups} filled in.
 
     Raises:
         UsageError: C02, it names a group that the pattern does not have.
     """
-    def value(found: re.Match[str]) -> str:
-        if found.group(1) not in groups:
-            raise UsageError("C02", f"'{template}' names {{{found.group(1)}}}, but the pattern has {', '.join(groups)}",
-                             where=where, remedy="name one of these, or add it to the pattern")
-        return groups[found.group(1)]
-
-    return re.sub(r"\{(\w+)\}", value, template)
+    for name in re.findall(r"\{(\w+)\}", template):
+        if name not in groups:
+            message = f"'{template}' names {{{name}}}, but the pattern has {', '.join(groups)}"
+            remedy = "name one of these, or add it to the pattern"
+            raise UsageError("C02", message, where=where, remedy=remedy)
+    return re.sub(r"\{(\w+)\}", lambda found: groups[found[1]], template)
 
 
 def files_below(folder: Path) -> tuple[str, ...]:
-    """Paths of all regular files below `folder`, relative, sorted; links to folders are not followed, hidden ones left out.
+    """Return the relative paths of all files below `folder`, without hidden ones, sorted.
+
+    Links to folders are not followed.
 
     Raises:
         UsageError: not a folder. EnvironmentFault: no permission.
     """
     if not folder.is_dir():
-        raise UsageError("C04", "no such folder", where=folder, remedy="give the folder of the recordings with --source")
+        remedy = "give the folder of the recordings with --source"
+        raise UsageError("C04", "no such folder", where=folder, remedy=remedy)
     if not os.access(folder, os.R_OK | os.X_OK):
-        raise EnvironmentFault("F13", "permission denied", where=folder, remedy="change its permissions")
+        remedy = "change its permissions"
+        raise EnvironmentFault("F13", "permission denied", where=folder, remedy=remedy)
     found: list[str] = []
     for parent, folders, names in os.walk(folder, followlinks=False):
         folders[:] = sorted(f for f in folders if not f.startswith("."))
-        found += [Path(parent, name).relative_to(folder).as_posix() for name in names if not name.startswith(".")]
+        shown = [name for name in names if not name.startswith(".")]
+        found += [Path(parent, name).relative_to(folder).as_posix() for name in shown]
         if len(found) > _MOST_FILES:
-            raise UsageError("C07", f"more than {_MOST_FILES} files", where=folder,
-                             remedy="give a folder that holds the recordings only")
+            message = f"more than {_MOST_FILES} files"
+            remedy = "give a folder that holds the recordings only"
+            raise UsageError("C07", message, where=folder, remedy=remedy)
     return tuple(sorted(found))
 
 
 def inside(folder: Path, relative: str, where: object) -> Path:
-    """The path of a file of the recording, which its name must not lead out of the folder (X11); a link may, it is the user's."""
+    """Return the path of a file, whose name must not lead out of the folder; a link may.
+
+    Raises:
+        UsageError: X11, it does.
+    """
     if Path(relative).is_absolute() or os.path.normpath(relative).startswith(".."):
-        raise UsageError("X11", f"'{relative}' lies outside the source folder", where=where,
-                         remedy="keep the files of a recording together")
+        message = f"'{relative}' lies outside the source folder"
+        remedy = "keep the files of a recording together"
+        raise UsageError("X11", message, where=where, remedy=remedy)
     return folder / relative
 
 
 def unique(names: Iterable[str]) -> tuple[str, ...]:
-    """The names, those that occur twice numbered."""
-    taken: set[str] = set()
-    out = []
+    """Return the names, those that occur twice numbered."""
+    taken: dict[str, None] = {}
     for name in names:
         fresh, number = name, 2
         while fresh in taken:
             fresh, number = f"{name}-{number}", number + 1
-        taken.add(fresh)
-        out.append(fresh)
-    return tuple(out)
+        taken[fresh] = None
+    return tuple(taken)

@@ -1,7 +1,7 @@
-"""Mend a recording where mending is honest, refuse it where it is not, and say every time what was done.
+"""Repair a recording where that is honest, refuse it where it is not, and say what was done.
 
-Samples go in, samples come out: nothing is ever filled in. What is missing leaves a gap in time; a clock that was set
-back ends one log and begins the next.
+Samples go in, samples come out: nothing is ever filled in. A missing one leaves a gap in time; a
+clock that was set back ends one log and begins the next.
 """
 
 from __future__ import annotations
@@ -14,13 +14,24 @@ import numpy.typing as npt
 
 from pipelines.errors import Check, Gathering, InputRejected
 from pipelines.log import limits as common
+from pipelines.log.doctor.checks_subject import many
 from pipelines.log.experiment import Array
-from pipelines.log.limits import ABSURD, FEWEST, GAP_LIMIT, GAP_TICKS, LARGEST_JITTER, MOST_STEPS, percent, sentinels
+from pipelines.log.limits import (
+    ABSURD,
+    FEWEST,
+    GAP_LIMIT,
+    GAP_TICKS,
+    LARGEST_JITTER,
+    MOST_STEPS,
+    percent,
+    sentinels,
+)
 
-__all__ = ["Limits", "Recording", "late_intervals", "mend"]
+__all__ = ["Limits", "Recording", "late_intervals", "repair"]
 
 _SHORTEST_PART = 0.1  # of all samples
 _MOST_MISSING = 0.2
+_NO_SAMPLE = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
 
 Index = npt.NDArray[np.int64]
 
@@ -37,18 +48,24 @@ class Recording:
     clocked: bool = True  # the file has a column of time; else a rate was declared
     word: str = "row"  # what `places` counts: "line" or "row"
     breaks: tuple[int, ...] = ()  # samples before which the file is damaged
-    si: Mapping[str, float] = field(default_factory=dict)  # name -> what one recorded unit is in SI; 1 where it is not said
+    si: Mapping[str, float] = field(default_factory=dict)  # name -> SI of one recorded unit, or 1
 
     def take(self, chosen: slice | npt.NDArray[np.bool_]) -> Recording:
-        kept = np.flatnonzero(chosen) if isinstance(chosen, np.ndarray) else np.arange(self.t.size)[chosen]
-        breaks = tuple(sorted({int(np.searchsorted(kept, b)) for b in self.breaks} - {0, kept.size}))
-        return replace(self, t=self.t[chosen], signals={name: values[chosen] for name, values in self.signals.items()},
-                       places=self.places[chosen], breaks=breaks)
+        kept = np.arange(self.t.size)[chosen]
+        breaks = {int(np.searchsorted(kept, b)) for b in self.breaks} - {0, kept.size}
+        return replace(
+            self,
+            t=self.t[chosen],
+            signals={name: values[chosen] for name, values in self.signals.items()},
+            places=self.places[chosen],
+            breaks=tuple(sorted(breaks)),
+        )
 
     def listed(self, which: Index) -> str:
-        """Lines or rows in words, the first few."""
+        """Return lines or rows in words, the first few."""
         shown = ", ".join(str(self.places[i]) for i in which[:5])
-        return f"{self.word}{'s' if which.size != 1 else ''} {shown}{' …' if which.size > 5 else ''}"
+        more = " …" if which.size > 5 else ""
+        return f"{self.word}{'s' if which.size != 1 else ''} {shown}{more}"
 
     def column(self, name: str, joint: int) -> str:
         return f"{self.where}, column '{self.columns[name][joint]}'"
@@ -56,147 +73,167 @@ class Recording:
 
 @dataclass(frozen=True)
 class Limits:
-    """What a recipe says of missing samples and gaps."""
+    """The entries of a recipe for missing samples and gaps."""
 
     missing: tuple[float, ...] = ()
     longest_gap: float | None = None  # [s]; default what an observer predicts through
     resampled: bool = False
 
 
-def mend(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], tuple[Check, ...]]:
-    """The parts of a recording that can be logs, and what was done to get them.
+def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], tuple[Check, ...]]:
+    """Return the parts of a recording that can be logs, and what was done to get them.
 
     Raises:
-        InputRejected: T01, T02, T04, T08, D02, D03: what cannot be mended.
+        InputRejected: T01, T02, T04, T08, D02, D03: what cannot be repaired.
     """
     checks: list[Check] = []
     if recording.t.size < 2:
-        raise InputRejected("T08", f"{recording.t.size} sample{'s' if recording.t.size != 1 else ''}", where=recording.where,
-                            remedy="record again")
+        message = many(recording.t.size, "sample")
+        raise InputRejected("T08", message, where=recording.where, remedy="record again")
     recording = _mark_missing(recording, limits.missing, checks)
     recording = _drop_missing(recording, checks)
     recording = _drop_duplicates(recording, checks)
-    parts = tuple(piece for part in _split_at_steps(recording, checks) for piece in _split_at_gaps(part, limits, checks))
-    if not limits.resampled:  # else what becomes of late samples is part of the record of the resampling
+    parts = tuple(
+        piece
+        for part in _split_at_steps(recording, checks)
+        for piece in _split_at_gaps(part, limits, checks)
+    )
+    if not limits.resampled:  # else late samples are part of the record of the resampling
         for part in parts:
             _report_clock(part, checks)
     return parts, tuple(checks)
 
 
-def _mark_missing(recording: Recording, missing: tuple[float, ...], checks: list[Check]) -> Recording:
-    """D03: declared sentinels become NaN; infinite, absurd and undeclared sentinel-like numbers are refused."""
+def _mark_missing(
+    recording: Recording, missing: tuple[float, ...], checks: list[Check]
+) -> Recording:
+    """D03: make declared sentinels NaN; refuse infinite, absurd and undeclared ones."""
     signals, problems = {}, Gathering()
     for name, values in recording.signals.items():
-        values = values.copy()
-        if missing:
-            hit = np.isin(values, np.array(missing))
-            if (count := int(hit.sum())) > 0:
-                values[hit] = np.nan
-                checks.append(Check.of("D03", "repair", f"{count} numbers of {name} are declared missing values",
-                                       where=recording.where, remedy="correct [missing] if these are samples"))
+        hit = np.isin(values, np.array(missing)) if missing else np.zeros(values.shape, dtype=bool)
+        signals[name] = values = np.where(hit, np.nan, values)
+        if hit.any():
+            message = f"{int(hit.sum())} numbers of {name} are declared missing values"
+            remedy = "correct [missing] if these are samples"
+            checks.append(Check.of("D03", "repair", message, where=recording.where, remedy=remedy))
         for joint in range(values.shape[1]):
             with problems.part():
                 _refuse_absurd(recording, name, joint, values[:, joint])
-        signals[name] = values
     problems.raise_all()
     return replace(recording, signals=signals)
 
 
 def _refuse_absurd(recording: Recording, name: str, joint: int, values: Array) -> None:
+    where = recording.column(name, joint)
     bad = np.flatnonzero(np.abs(values) * recording.si.get(name, 1.0) >= ABSURD)
-    remedy = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
     if bad.size:
-        raise InputRejected("D03", f"{values[bad[0]]:g} in {recording.listed(bad)}", where=recording.column(name, joint),
-                            remedy=remedy.format(repr(float(values[bad[0]]))))
+        message = f"{values[bad[0]]:g} in {recording.listed(bad)}"
+        remedy = _NO_SAMPLE.format(repr(float(values[bad[0]])))
+        raise InputRejected("D03", message, where=where, remedy=remedy)
     filler = np.flatnonzero(sentinels(values[:, None])[:, 0])
     if filler.size:
         value = f"{values[filler[0]]:.17g}"
-        raise InputRejected("D03", f"{value} in {recording.listed(filler)} looks like 'no sample': nothing else comes near it",
-                            where=recording.column(name, joint), remedy=remedy.format(value))
+        looks = f"{value} in {recording.listed(filler)} looks like 'no sample'"
+        message, remedy = f"{looks}: nothing else comes near it", _NO_SAMPLE.format(value)
+        raise InputRejected("D03", message, where=where, remedy=remedy)
 
 
 def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
-    """D01, D02: samples with a hole are left out, which leaves a gap in time; a channel of holes is refused."""
+    """D01, D02: leave out samples with a hole, which leaves a gap; refuse a channel of holes."""
     lost = ~np.isfinite(recording.t)
-    empty = np.all([np.isnan(values).all(axis=1) for values in recording.signals.values()], axis=0)
-    if recording.clocked and 0.0 < empty.mean() < 1.0:  # rows of other topics in one table: no samples of these signals
+    every = recording.signals.values()
+    empty = np.all([np.isnan(values).all(axis=1) for values in every], axis=0)
+    if recording.clocked and 0.0 < empty.mean() < 1.0:  # rows of other topics: no samples of these
         return _drop_missing(recording.take(~empty), checks)
     if lost.all():
-        raise InputRejected("D02", "no time stamp is a number", where=recording.where, remedy="choose another column of time")
+        message, remedy = "no time stamp is a number", "choose another column of time"
+        raise InputRejected("D02", message, where=recording.where, remedy=remedy)
     for name, values in recording.signals.items():
         holes = np.isnan(values)
-        for joint in np.flatnonzero(holes.mean(axis=0) > _MOST_MISSING):
-            share = holes[:, joint].mean()
-            raise InputRejected("D02", "holds no number at all" if share == 1.0
-                                else f"{100 * share:.0f} % of its samples are missing",
-                                where=recording.column(name, int(joint)), remedy="choose another column, or record again")
+        for joint, share in enumerate(holes.mean(axis=0)):
+            if share > _MOST_MISSING:
+                some = f"{100 * share:.0f} % of its samples are missing"
+                message = "holds no number at all" if share == 1.0 else some
+                where = recording.column(name, joint)
+                remedy = "choose another column, or record again"
+                raise InputRejected("D02", message, where=where, remedy=remedy)
         lost |= holes.any(axis=1)
     if not lost.any():
         return recording
     which = np.flatnonzero(lost)
+    samples = f"{which.size} of {lost.size} samples"
     if lost.mean() > _MOST_MISSING:
-        raise InputRejected("D02", f"{which.size} of {lost.size} samples have a missing value", where=recording.where,
-                            remedy="record again")
-    checks.append(Check.of("D01", "repair",
-                           f"{which.size} of {lost.size} samples with a missing value left out ({recording.listed(which)})",
-                           where=recording.where, remedy="look for what loses samples"))
+        message = f"{samples} have a missing value"
+        raise InputRejected("D02", message, where=recording.where, remedy="record again")
+    message = f"{samples} with a missing value left out ({recording.listed(which)})"
+    remedy = "look for what loses samples"
+    checks.append(Check.of("D01", "repair", message, where=recording.where, remedy=remedy))
     return recording.take(~lost)
 
 
 def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
-    """T02: a sample written twice is dropped; one stamp with two values is refused."""
+    """T02: drop a sample that is written twice; refuse one stamp with two values."""
     again = np.concatenate([[False], np.diff(recording.t) == 0.0])
     if not again.any():
         return recording
     which = np.flatnonzero(again)
-    differ = np.zeros(which.size, dtype=bool)
-    for values in recording.signals.values():
-        differ |= (values[which] != values[which - 1]).any(axis=1)
+    every = recording.signals.values()
+    differ = np.any([(x[which] != x[which - 1]).any(axis=1) for x in every], axis=0)
     if differ.any():
-        raise InputRejected("T02", f"{int(differ.sum())} time stamps stand twice with different values "
-                            f"({recording.listed(which[differ])})",
-                            where=recording.where, remedy="record time with more digits, or import by rate instead of the column")
-    checks.append(Check.of("T02", "repair", f"{which.size} samples that stand twice dropped ({recording.listed(which)})",
-                           where=recording.where, remedy="let each sample be recorded once"))
+        listed = recording.listed(which[differ])
+        message = f"{int(differ.sum())} time stamps stand twice with different values ({listed})"
+        remedy = "record time with more digits, or import by rate instead of the column"
+        raise InputRejected("T02", message, where=recording.where, remedy=remedy)
+    message = f"{which.size} samples that stand twice dropped ({recording.listed(which)})"
+    remedy = "let each sample be recorded once"
+    checks.append(Check.of("T02", "repair", message, where=recording.where, remedy=remedy))
     return recording.take(~again)
 
 
 def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recording, ...]:
-    """T01: where the clock was set back (or, without a clock, lines are lost) one part ends and another begins."""
+    """T01: split where the clock was set back or, without a clock, lines are lost."""
     back = np.flatnonzero(np.diff(recording.t) < 0.0) + 1
     if back.size > MOST_STEPS:
-        raise InputRejected("T01", f"time runs backwards {back.size} times ({recording.listed(back)})", where=recording.where,
-                            remedy="sort the file by time, or choose another column of time")
+        message = f"time runs backwards {back.size} times ({recording.listed(back)})"
+        remedy = "sort the file by time, or choose another column of time"
+        raise InputRejected("T01", message, where=recording.where, remedy=remedy)
     cuts = sorted({*map(int, back), *(() if recording.clocked else recording.breaks)})
     if not cuts:
         return (_long_enough(recording),)
     kept, into = _cut(recording, cuts)
-    code, why = ("T01", "time steps back") if back.size else ("F09", "lines are lost and no clock says how many")
-    checks.append(Check.of(code, "repair", f"{why} at {recording.listed(np.array(cuts))}: {into}", where=recording.where,
-                           remedy="record without interruption, by one clock"))
+    code, why = "F09", "lines are lost and no clock says how many"
+    if back.size:
+        code, why = "T01", "time steps back"
+    message = f"{why} at {recording.listed(np.array(cuts))}: {into}"
+    remedy = "record without interruption, by one clock"
+    checks.append(Check.of(code, "repair", message, where=recording.where, remedy=remedy))
     if not kept:
         _long_enough(recording.take(slice(0, cuts[0])))
     return kept
 
 
 def _cut(recording: Recording, cuts: Sequence[int]) -> tuple[tuple[Recording, ...], str]:
-    """The parts between the samples `cuts` that are long enough for a log, and what was done in words."""
-    parts = [recording.take(slice(a, b)) for a, b in zip([0, *cuts], [*cuts, recording.t.size], strict=True)]
-    kept = tuple(part for part in parts if part.t.size >= max(FEWEST, _SHORTEST_PART * recording.t.size / len(parts)))
-    dropped = recording.t.size - sum(part.t.size for part in kept)
-    return kept, (f"{'one part is kept' if len(kept) == 1 else f'split into {len(kept)} parts'}"
-                  f"{f', {dropped} samples of short parts left out' if dropped else ''}")
+    """Return the parts between `cuts` that are long enough for a log, and words for it."""
+    size = recording.t.size
+    ends = zip([0, *cuts], [*cuts, size], strict=True)
+    parts = [recording.take(slice(a, b)) for a, b in ends]
+    shortest = max(FEWEST, _SHORTEST_PART * size / len(parts))
+    kept = tuple(part for part in parts if part.t.size >= shortest)
+    words = "one part is kept" if len(kept) == 1 else f"split into {len(kept)} parts"
+    if dropped := size - sum(part.t.size for part in kept):
+        words += f", {dropped} samples of short parts left out"
+    return kept, words
 
 
 def _long_enough(recording: Recording) -> Recording:
     if recording.t.size < FEWEST:
-        raise InputRejected("T08", f"{recording.t.size} samples left; a log needs {FEWEST}", where=recording.where,
-                            remedy="record longer")
+        message = f"{recording.t.size} samples left; a log needs {FEWEST}"
+        raise InputRejected("T08", message, where=recording.where, remedy="record longer")
     return recording
 
 
 def _split_at_gaps(part: Recording, limits: Limits, checks: list[Check]) -> tuple[Recording, ...]:
-    """T04: a gap that no observer predicts through ends one log and begins the next; nothing is interpolated across it."""
+    """T04: split at a gap that no observer predicts through; nothing is interpolated across it."""
     steps = np.diff(part.t)
     longest = GAP_TICKS * float(np.median(steps))
     if limits.longest_gap is not None:  # only resampling can bridge more than an observer does
@@ -205,36 +242,41 @@ def _split_at_gaps(part: Recording, limits: Limits, checks: list[Check]) -> tupl
     if not wide.size:
         return (part,)
     kept, into = _cut(part, (wide + 1).tolist())
-    words = (f"{wide.size} gap{'s' if wide.size != 1 else ''} longer than {longest:.4g} s, the longest {steps.max():.4g} s, "
-             f"after {part.listed(wide)}")
+    gaps = f"{many(wide.size, 'gap')} longer than {longest:.4g} s"
+    words = f"{gaps}, the longest {steps.max():.4g} s, after {part.listed(wide)}"
     if steps[wide].sum() > 0.5 * (part.t[-1] - part.t[0]) or not kept:
-        most = "they make more than half of the recording" if kept else f"no stretch between them has {FEWEST} samples"
-        raise InputRejected("T04", f"{words}: {most}", where=part.where, remedy="record again without interruption")
-    checks.append(Check.of("T04", "repair", f"{words}: {into}", where=part.where,
-                           remedy="look why the recorder stopped there"))
+        most = "they make more than half of the recording"
+        most = most if kept else f"no stretch between them has {FEWEST} samples"
+        remedy = "record again without interruption"
+        raise InputRejected("T04", f"{words}: {most}", where=part.where, remedy=remedy)
+    remedy = "look why the recorder stopped there"
+    checks.append(Check.of("T04", "repair", f"{words}: {into}", where=part.where, remedy=remedy))
     return kept
 
 
 def late_intervals(part: Recording) -> Index:
-    """The samples after which a few are lost, or come late."""
+    """Return the samples after which a few are lost, or come late."""
     ticks = np.diff(part.t) / float(np.median(np.diff(part.t)))
     return common.late(ticks, common.jitter(ticks)[0])
 
 
 def _report_clock(part: Recording, checks: list[Check]) -> None:
-    """T03, T05: lost samples and uneven time are said; they stay as gaps of `t`, for no sample is invented."""
+    """T03, T05: report lost samples and uneven time; they stay as gaps of `t`."""
     steps = np.diff(part.t)
     median = float(np.median(steps))
     rms, worst = common.jitter(steps / median)
     gaps = late_intervals(part)
     lost = int(np.round(steps[gaps] / median - 1.0).sum())
     if lost:
-        checks.append(Check.of("T03", "warn",
-                               f"{lost} sample{'s' if lost != 1 else ''} ({100.0 * lost / (lost + part.t.size):.2g} %) lost in "
-                               f"{gaps.size} gap{'s' if gaps.size != 1 else ''} of at most {GAP_LIMIT}, after {part.listed(gaps)}",
-                               where=part.where, remedy="give the recorder more priority, or record fewer signals"))
+        share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
+        where = f"{many(gaps.size, 'gap')} of at most {GAP_LIMIT}, after {part.listed(gaps)}"
+        message = f"{many(lost, 'sample')} ({share}) lost in {where}"
+        remedy = "give the recorder more priority, or record fewer signals"
+        checks.append(Check.of("T03", "warn", message, where=part.where, remedy=remedy))
     if rms > LARGEST_JITTER:
-        checks.append(Check.of("T05", "warn",
-                               f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms), at most by "
-                               f"{percent(worst)}",
-                               where=part.where, remedy="add [resample] rate = … for an even grid"))
+        vary = (
+            f"steps vary about {median:.6g} s by {percent(rms)} (rms), at most by {percent(worst)}"
+        )
+        remedy = "add [resample] rate = … for an even grid"
+        message = f"time is uneven: {vary}"
+        checks.append(Check.of("T05", "warn", message, where=part.where, remedy=remedy))

@@ -16,7 +16,7 @@ from pipelines.log.files import open_log
 from pipelines.log.recording.column_names import read_name
 from pipelines.log.recording.evidence import rollover, sign_of
 from pipelines.log.recording.guess import guess_recipe
-from pipelines.log.recording.recipe_reader import parse_recipe
+from pipelines.log.recording.recipe import parse_recipe
 from tests.log.recording.good import Array, good, run, text, write
 
 ABC = Arm("abc", ("a", "b", "c"), "zyy", (150, 150, 150))

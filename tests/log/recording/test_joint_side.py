@@ -11,8 +11,7 @@ import pytest
 from pipelines.errors import InputRejected
 from pipelines.log.recording.joint_side import drive_of, joint_side
 from pipelines.log.recording.raw import RawTable, expand
-from pipelines.log.recording.recipe import Recipe
-from pipelines.log.recording.recipe_reader import parse_recipe
+from pipelines.log.recording.recipe import Recipe, parse_recipe
 from pipelines.log.recording.repair import Recording
 from pipelines.log.robot_files import load_robot
 from tests.log.recording.good import RECIPE, Array, recording

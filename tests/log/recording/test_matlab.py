@@ -14,7 +14,7 @@ import pytest
 import scipy.io
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.recording.arrays import read_npy
+from pipelines.log.recording.array_files import read_npy
 from pipelines.log.recording.raw import columns_of_arrays
 from pipelines.log.recording.sources import read_table
 from tests.log.recording.good import good, text

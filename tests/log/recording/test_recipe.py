@@ -8,7 +8,7 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.log.recording import filenames
-from pipelines.log.recording.recipe_reader import find_recipe, parse_recipe
+from pipelines.log.recording.recipe import find_recipe, parse_recipe
 from pipelines.log.shipped import shipped_names
 from tests.log.recording.good import RECIPE
 

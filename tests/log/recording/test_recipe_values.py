@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from pipelines.errors import UsageError
-from pipelines.log.recording.recipe_reader import parse_recipe
+from pipelines.errors import InputRejected, UsageError
+from pipelines.log.recording.recipe import parse_recipe
+from tests.log.recording.good import good, run, text, write
 
 HEAD = """
 [robot]
@@ -43,3 +46,15 @@ def test_integers_without_end(digits: int) -> None:
     """No float holds the one, and Python does not even read the other."""
     with pytest.raises(UsageError, match="RRID-C0[12]"):
         parse_recipe(HEAD.replace("1000.0", "1" + "0" * digits))
+
+
+@pytest.mark.parametrize(("before", "after", "words"), [
+    ('experiment = "free"', 'experiment = "friction"\njoint = 9', "joint is 9, outside 1 … 3"),
+    ('experiment = "free"', 'experiment = "hold"\nposture = [0.1, 0.2]', "posture has 2 values for 3 joints"),
+    ("[time]", '[controller]\nlaw = "unknown"\noutput_limit = [1.0, 2.0]\n[time]', "output_limit has shape"),
+])
+def test_numbers_of_other_joints(tmp_path: Path, before: str, after: str, words: str) -> None:
+    """A joint, a posture or limits that the robot does not have are refused before the doctor judges the log."""
+    folder = write(tmp_path / "data", text(good())).parent
+    with pytest.raises(InputRejected, match=f"RRID-S20 .*{words}"):
+        run(folder, HEAD.replace(before, after))

@@ -188,3 +188,9 @@ def test_a_comment_above_labelled_lines_states_their_units(tmp_path: Path) -> No
     draft = guess_recipe(write(tmp_path, "\n".join(["# simulator, q in degrees, tau in Nm", *rows]) + "\n", "log.txt"))
     assert 'unit = "deg"' in draft.text
     assert draft.blanks == ("robot.use",)
+
+
+def test_a_stated_zero_is_no_ratio() -> None:
+    """A gear of ratio 0 or 0 counts a turn are no numbers to draft with, and no reason to fail."""
+    assert stated_gear(["gear ratio: 0"]) is None
+    assert stated_counts(["0 counts per turn", "1 count = 0 deg"]) is None

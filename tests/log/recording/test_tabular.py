@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected
 from pipelines.log.recording.raw import RawTable, unstacked
-from pipelines.log.recording.tabular import read_text
+from pipelines.log.recording.tables import read_text
 from tests.log.recording.good import good, lines, text
 
 

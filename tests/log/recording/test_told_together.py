@@ -14,7 +14,7 @@ from benchmarks.recorded_arm import TWO, simulate
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.log.files import find_logs, open_log
 from pipelines.log.recording.guess import guess_recipe
-from pipelines.log.recording.recipe_reader import parse_recipe
+from pipelines.log.recording.recipe import parse_recipe
 from pipelines.log.robot_files import load_robot
 from tests.log.recording.good import RECIPE, good, run, text, write
 
