@@ -35,7 +35,7 @@ from pipelines.diagnosis.result import (
     Verdict,
 )
 from pipelines.diagnosis.screening import best_of
-from pipelines.diagnosis.selection import Candidate, Cause
+from pipelines.diagnosis.selection import Cause, Tried
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import Trained, told, train
 from pipelines.diagnosis.words import beside, how_much, taken_in, where
@@ -191,8 +191,8 @@ def _others(first: Finding, found: Found) -> list[str]:
     ]
 
 
-def _like(first: Finding, candidate: Candidate) -> tuple[Acting, Finding]:
-    one = candidate.state.model.effects[-1]
+def _like(first: Finding, candidate: Tried) -> tuple[Acting, Finding]:
+    one = candidate.fit.model.effects[-1]
     other = Acting.of(one.effect, one.values)
     cause, joint = candidate.key
     numbers: dict[str, Value] = told(other)
@@ -227,7 +227,7 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
     rows, out = found.look.later.rows.count, []
     for step, one in enumerate(found.look.selection.rounds, 1):
         power = one.before.cost
-        exact = {trial.key: 1.0 - trial.state.cost / power for trial in one.tried}
+        exact = {trial.key: 1.0 - trial.fit.cost / power for trial in one.tried}
         alike = () if one.cause is None else one.cause.alternatives
         for screened in sorted(one.significant, key=lambda s: -s.gain):
             key, group = screened.group.key, screened.group

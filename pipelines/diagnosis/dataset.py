@@ -73,10 +73,14 @@ class Rows:
     level: NoiseLevel | None = None
 
     @classmethod
-    def of(cls, data: Data, model: Exact) -> Rows:
-        """Return the rows of data, weighted by what the nominal model leaves of them."""
+    def of(cls, data: Data, model: Exact, rms: Array | None = None) -> Rows:
+        """Return the rows of data in units of the residual.
+
+        Args:
+            rms: (joints,) [N m] of the residual; None: what the nominal model leaves.
+        """
         table = rows_of(data, model.columns)
-        weight = 1.0 / fit_columns(data, table).rms[data.joint]
+        weight = 1.0 / (fit_columns(data, table).rms if rms is None else rms)[data.joint]
         nominal = Table.of(table * weight, data.joint, data.n_joints)
         return cls(data, model.columns, weight, nominal)
 

@@ -126,8 +126,11 @@ def decide(
         if explained < config.share:
             reason = f"{causes[0].key[0]} explains {explained:.0%} of the excess residual"
             return Decision("unknown", reason, ())
-        if confused := _confused(later, end, config):
-            return Decision("unknown", confused, ())
+        if wandering := _confused(later, end, config):
+            first = min(wandering)  # what was found before it was found without it
+            rest, causes = wandering[first], causes[:first]
+        if not causes:
+            return Decision("unknown", rest, ())
         if causes[0].alternatives:
             return Decision("unknown", "several causes explain it", causes)
         return Decision("cause", rest, causes)
@@ -244,8 +247,8 @@ def _torque_squared(later: Later) -> Array:
     return np.asarray(np.mean(measured**2, axis=1))
 
 
-def _confused(later: Later, end: State, config: DiagnosisConfig) -> str:
-    """Return why torque that wanders may look like a cause; "" where it cannot.
+def _confused(later: Later, end: State, config: DiagnosisConfig) -> dict[int, str]:
+    """Return the effects, by place, that torque which wanders may look like, and why.
 
     In closed loop the drive answers such a torque a moment later, and so do the motion and its
     record (Ljung 1999, 13.4): only a load is told from it that comes again with the motion, or is
@@ -253,20 +256,22 @@ def _confused(later: Later, end: State, config: DiagnosisConfig) -> str:
     """
     slow = _wandering(later)
     if slow.max() <= config.misfit:
-        return ""
+        return {}
     lasting = slow**2 * _torque_squared(later)  # variance of means over a block
     bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
-    told = np.zeros(len(slow), dtype=np.bool_)
-    for one in end.model.effects:
+    found = {}
+    for place, one in enumerate(end.model.effects):
+        told = np.zeros(len(slow), dtype=np.bool_)
         if one.log is not None:
             motion = later.rows.data.logs[one.log - later.rows.data.first].motion
             size = np.abs(one.effect.torque(motion, end.model.nominal, one.values)).max(axis=0)
             chance = 2.0 * lasting * config.block / one.values["duration"]  # of a half sine
-            told |= np.sum(size**2 / chance) < bound
+            told[:] = np.sum(size**2 / chance) < bound
         elif one.effect.acts_on != "load":
-            told |= (np.arange(len(slow)) + 1 == one.effect.joint) | (one.effect.joint is None)
-    slow = slow * told
-    return _wanders(slow) if slow.max() > config.misfit else ""
+            told = (np.arange(len(slow)) + 1 == one.effect.joint) | (one.effect.joint is None)
+        if (slow * told).max() > config.misfit:
+            found[place] = _wanders(slow * told)
+    return found
 
 
 def _followed(

@@ -13,14 +13,13 @@ from pipelines.diagnosis.compliance import Compliance, compliance, new_causes
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows, load
 from pipelines.diagnosis.decision import Decision, decide
-from pipelines.diagnosis.prior import prior_of
+from pipelines.diagnosis.prior import Prior, prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.selection import Selection, select
 from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
-from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
@@ -46,17 +45,23 @@ class Look:
         dictionary: Dictionary,
         responses: Sequence[Acting],
         config: DiagnosisConfig,
-        before: Look | None = None,
+        found: Selection | None = None,
+        usual: tuple[Prior, Baseline] | None = None,
     ) -> Look:
-        """Return the causes in rows whose noise is known, beside those found before."""
-        found = None if before is None else before.selection
-        if before is not None and dataset.reference is not None:  # it is what it was
-            prior, known = before.later.prior, before.baseline
-        else:
-            prior = prior_of(dataset, dictionary, config)
-            known = baseline(dataset, dictionary, prior, config)
+        """Return the causes in rows whose noise is known, beside those found before.
+
+        Args:
+            usual: what reference logs told before; None: it is to be found.
+        """
+        prior, known = usual or _usual(dataset, dictionary, config)
         later = Later.of(dataset, dictionary, prior, config)
         return cls(later, known, select(later, known, responses, config, found))
+
+    @property
+    def usual(self) -> tuple[Prior, Baseline] | None:
+        """What the reference logs tell, which further looks do not change; None without them."""
+        alone = self.later.dataset.reference is None
+        return None if alone else (self.later.prior, self.baseline)
 
     @property
     def reference(self) -> tuple[Rows, Table] | None:
@@ -65,10 +70,23 @@ class Look:
         return None if rows is None or columns is None else (rows, columns)
 
 
-def _torque(rough: Dataset, model: Exact) -> Array:
-    """Return the torque (rows,) [N m] that the effects of a model add to it."""
-    data = rough.later.data
-    return np.asarray(model.torque(data) - replace(model, effects=()).torque(data))
+def _usual(
+    dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig
+) -> tuple[Prior, Baseline]:
+    prior = prior_of(dataset, dictionary, config)
+    return prior, baseline(dataset, dictionary, prior, config)
+
+
+def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:
+    """Return the torque (rows,) [N m] of the causes, and of all that was fitted with them."""
+    rows, end, prior = rough.later, look.selection.end, look.later.prior
+    whole = end.model.torque(rows.data)
+    small = every.later.take(prior.standing).times(end.theta[prior.n_nominal :])
+    standing = np.empty(rows.count)
+    for j, own in enumerate(small):
+        standing[rows.joint == j] = own
+    cause = whole - replace(end.model, effects=()).torque(rows.data)
+    return cause, whole + standing / rows.weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +134,16 @@ def diagnose_prepared(
     named = _new(responses, rough, prepared, exclude)
     last, known = Look.of(*settle(rough, every, config), named, config), 0
     for _ in range(_LOOKS):  # what the causes leave tells the noise, and what is typical
-        found, causes = last.later.dataset, len(last.selection.causes)
-        if not causes:
+        power, found, usual = last.later.dataset.noise_power, last.selection, last.usual
+        if not found.causes:
             break
-        torque = _torque(rough, last.selection.end.model)
-        dataset, dictionary = settle(rough, every, config, torque, last.reference)
-        change = np.abs(np.log(dataset.noise_power / found.noise_power)).max()
-        if change < _SETTLED and (found.reference is not None or causes == known):
+        torques = _torques(rough, every, last)
+        dataset, dictionary = settle(rough, every, config, *torques, last.reference)
+        change = np.abs(np.log(dataset.noise_power / power)).max()
+        if change < _SETTLED and (usual is not None or len(found.causes) == known):
             break
-        last, known = Look.of(dataset, dictionary, named, config, last), causes
+        del last  # its columns take the memory that the next ones need
+        last, known = Look.of(dataset, dictionary, named, config, found, usual), len(found.causes)
     decision = decide(last.later, last.selection, last.baseline, config)
     return Diagnosis(decision, last, responses, config)
 

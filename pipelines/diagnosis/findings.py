@@ -14,7 +14,7 @@ import numpy as np
 
 from pipelines.diagnosis.compliance import Compliance
 from pipelines.diagnosis.figures import proof
-from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.refit import Fit, Later, State
 from pipelines.diagnosis.result import (
     Alternative,
     Answer,
@@ -213,17 +213,17 @@ def _visibility(later: Later, end: State, place: int) -> float:
 
 def alternatives_of(own: Round) -> tuple[Alternative, ...]:
     """Return the causes that the data do not tell from the one selected in a round."""
-    if own.cause is None or own.state is None:
+    if own.cause is None or own.after is None:
         return ()
 
-    def taken(state: State) -> Array:
-        parts = zip(own.before.residual, state.residual, strict=True)
+    def taken(fit: Fit) -> Array:
+        parts = zip(own.before.residual, fit.residual, strict=True)
         return np.concatenate([a - b for a, b in parts])
 
-    mine, out, probability = taken(own.state), list[Alternative](), own.cause.probability
+    mine, out, probability = taken(own.after), list[Alternative](), own.cause.probability
     for one in own.tried:
         if one.key in own.cause.alternatives:
-            theirs = taken(one.state)
+            theirs = taken(one.fit)
             size = float(np.linalg.norm(mine) * np.linalg.norm(theirs))
             similarity = float(mine @ theirs) / max(size, 1e-300)
             out.append(Alternative(*one.key, similarity, probability[one.key]))

@@ -21,16 +21,28 @@ from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
+from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.families import lay_family
 
-__all__ = ["Later", "State"]
+__all__ = ["Fit", "Later", "State"]
 
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
 _DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
 _HALF = 0.5  # numerics: of the rows
+_PASS_ON = ("drive", "record")  # they act on the torque of all other effects
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """What is kept of a model that was fitted."""
+
+    model: Exact
+    cost: float
+    residual: tuple[Array, ...]  # of each joint, in units of the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +59,11 @@ class State:
         Indices  # of these, numbers that hold for all time; those of an event hold for its moment
     )
     read_off: float = 0.0  # price of rows that effects take from the log itself
+
+    @property
+    def fit(self) -> Fit:
+        """The fit without the columns of all numbers, which take the most memory."""
+        return Fit(self.model, self.cost, self.residual)
 
     @property
     def rss(self) -> float:
@@ -190,6 +207,36 @@ class Later:
         known, price_paid = self._exact(belief, model), self._read_off(model)
         return State(model, theta, belief, known, residual, effects, lasting, price_paid)
 
+    def composed(self, model: Exact) -> Later:
+        """Return the same with the columns of drives and records beside the effects of a model.
+
+        They pass on the torque of the effects as they do that of the nominal model.
+        """
+        both = (self.rows.torque(x) for x in (model, replace(model, effects=())))
+        acting = [1 + j for j, (x, y) in enumerate(zip(*both, strict=True)) if np.any(x != y)]
+        named = (g for g in self.dictionary.groups if g.kind == "named" and g.key[1] in acting)
+        keys = {g.key: None for g in named if self._effect(g).acts_on in _PASS_ON}
+        if not keys:
+            return self
+        parts, candidates, cross = [], self.candidates, self.cross.copy()
+        for key in keys:
+            for laid in lay_family(self.rows.data, self.dictionary.families[key], model.arm):
+                shapes, width, _ = laid.table.shape
+                table = laid.table.reshape(shapes * width, -1)
+                parts.append(self.rows.table(table, laid.rows).compact())
+        own = [g for key in keys for g in self.dictionary.groups if g.key == key]
+        new, at = Table.stacked(parts), np.concatenate([g.columns for g in own])
+        rest = np.setdiff1d(np.arange(candidates.width), at)
+        back = np.argsort(np.r_[rest, at])
+        candidates = Table.stacked([candidates.take(rest), new]).take(back)
+        cross[:, at] = self.base.gram(new)
+        every = zip(self.dictionary.groups, self.squares, strict=True)
+        squares = []
+        for group, square in every:
+            there = candidates.take(group.columns)
+            squares.append(there.gram(there) if group in own else square)
+        return replace(self, candidates=candidates, cross=cross, squares=tuple(squares))
+
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
         cross = self.cross_with(state)
@@ -198,7 +245,21 @@ class Later:
         found = screen(self.dictionary.groups, state.factor, cross, self.squares, moments)
         if self.dataset.reference is not None:  # else base parameters are free anyway
             found = [self._freely(state, one) for one in found]
+        found = [self._at_length(one) for one in found]
         return [self._charged(one) if one.group.reads_torque else one for one in found]
+
+    def _at_length(self, one: Screened) -> Screened:
+        """Return a candidate with the lag that its columns are for, if they are for one.
+
+        The gain T_c = H a² falls by H (a - T)²: a lag of another length has other columns.
+        """
+        effect = self.dictionary.families.get(one.group.key)
+        lag = effect.shapes[one.group.shape] if effect is not None else None
+        if not isinstance(lag, TorqueLag) or lag.looked_for == 0.0 or not one.freedom:
+            return one
+        length = np.array([lag.looked_for])
+        share = 1.0 - (1.0 - lag.looked_for / float(one.amplitudes[0])) ** 2
+        return replace(one, gain=one.gain * share, amplitudes=length)
 
     def cross_with(self, state: State) -> Array:
         """Return the products of the slopes by all numbers of a state with the candidates."""

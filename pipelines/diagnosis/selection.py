@@ -16,7 +16,7 @@ from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.events import Window, push_of
-from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.refit import Fit, Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.table import Array
@@ -25,7 +25,7 @@ from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact
 
-__all__ = ["Candidate", "Cause", "Round", "Selection", "refit", "select"]
+__all__ = ["Candidate", "Cause", "Round", "Selection", "Tried", "refit", "select"]
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,14 @@ class Candidate:
     def event(self) -> bool:
         """True for a cause of one moment in one log."""
         return self.state.model.effects[-1].log is not None
+
+
+@dataclass(frozen=True)
+class Tried:
+    """What is kept of a candidate."""
+
+    key: Key
+    fit: Fit
 
 
 @dataclass(frozen=True)
@@ -76,13 +84,13 @@ class Selection:
 class Round:
     """The outcome of one round of the forward selection."""
 
-    before: State
+    before: Fit
     cause: Cause | None
-    state: State | None
+    after: Fit | None
     stopped: str = ""
     follows: str = ""
     significant: tuple[Screened, ...] = ()
-    tried: tuple[Candidate, ...] = ()
+    tried: tuple[Tried, ...] = ()
     moment: str = ""  # what stands out at one moment, and no event explains
 
 
@@ -107,16 +115,16 @@ def select(
     explained = max(start.cost - state.cost, 0.0)
     rounds = [] if before is None else [one for one in before.rounds if one.cause is not None]
     while len(causes) < config.causes:
-        found = _round(
+        found, after = _round(
             later, state, causes, explained, baseline, responses if not causes else (), config
         )
         rounds.append(found)
         stopped, follows = found.stopped, found.follows
-        if found.cause is None or found.state is None:
+        if found.cause is None or after is None:
             break
         causes.append(found.cause)
-        explained += max(state.cost - found.state.cost, 0.0)
-        state = found.state
+        explained += max(state.cost - after.cost, 0.0)
+        state = after
     cut: tuple[Key, ...] = ()
     if len(causes) >= config.causes:
         taken = [cause.key for cause in causes]
@@ -125,10 +133,24 @@ def select(
         ranked = [one for one in ranked if not _slight(later, _torque(later, one), config)]
         cut = tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
     causes, state = _backward(later, causes, state, config)
+    causes, rounds = _told_apart(causes, rounds)
     moment = rounds[-1].moment if rounds else ""
     return Selection(
         tuple(causes), start, state, explained, stopped, follows, tuple(rounds), cut, moment
     )
+
+
+def _told_apart(
+    causes: Sequence[Cause], rounds: Sequence[Round]
+) -> tuple[list[Cause], list[Round]]:
+    """Return causes and rounds without alternatives that are causes: each is needed beside both."""
+    keys = {one.key for one in causes}
+    new = {
+        id(one): replace(one, alternatives=tuple(k for k in one.alternatives if k not in keys))
+        for one in causes
+    }
+    told = [replace(one, cause=new.get(id(one.cause), one.cause)) for one in rounds]
+    return [new[id(one)] for one in causes], told
 
 
 def _round(
@@ -139,8 +161,12 @@ def _round(
     baseline: Baseline,
     responses: Sequence[Acting],
     config: DiagnosisConfig,
-) -> Round:
-    """Return the cause that explains most of the residual of `state`, or why none is selected."""
+) -> tuple[Round, State | None]:
+    """Return the cause that explains most of the residual of `state`, or why none is selected.
+
+    The second that is returned is the state with it.
+    """
+    later = later.composed(state.model)
     significant = _significant(
         later, state, [cause.key for cause in causes], explained, baseline, config
     )
@@ -152,24 +178,24 @@ def _round(
     ]
     others = _unnamed(later, state, significant, bool(responses))
     seen = Round(
-        state,
+        state.fit,
         None,
         None,
         significant=tuple(significant.values()),
-        tried=tuple(tried),
+        tried=tuple(Tried(one.key, one.state.fit) for one in tried),
         moment=moment,
     )
     if not tried:
-        return replace(seen, follows=_place(next(iter(others))) if others else "")
+        return replace(seen, follows=_place(next(iter(others))) if others else ""), None
     apart = _apart(later, state, significant, others, baseline, config)
     pick, cause, stopped = _contest(later, state, tried, others, apart, config)
     if pick is None:  # perhaps by another law of the same cause
         tried = [_other_form(later, state, one, config) for one in tried]
         pick, cause, stopped = _contest(later, state, tried, others, apart, config)
     if pick is None:
-        return replace(seen, stopped=stopped)
+        return replace(seen, stopped=stopped), None
     chosen = _other_form(later, state, pick, config).state
-    return replace(seen, cause=cause, state=chosen)
+    return replace(seen, cause=cause, after=chosen.fit), chosen
 
 
 def _significant(

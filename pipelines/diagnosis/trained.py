@@ -31,6 +31,7 @@ from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.result import Value
+from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.table import Array, Arrow, Table
 from pipelines.fit.differences import difference
 from pipelines.model.arm import Acting, Arm
@@ -40,7 +41,7 @@ from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact, Named, Which, number_moved, slopes_of
 from pipelines.model.rows.fit import Refined
-from pipelines.model.rows.nominal import rigid_rows, rows_of
+from pipelines.model.rows.nominal import rigid_rows
 from pipelines.model.rows.prepare import Prepared
 
 __all__ = [
@@ -140,12 +141,6 @@ class Standing:
     told: tuple[Told, ...] = ()
     floor: Array | None = None  # (joints,) [N m] rms residual of the reference; None without one
 
-    def rows(self, rows: Rows) -> Rows:
-        """Return whitened rows less the baseline effects, with columns of the nominal model."""
-        data, columns = self.less(rows.data), self.nominal.columns
-        table = Table.of(rows_of(data, columns) * rows.weight, data.joint, data.n_joints)
-        return Rows(data, columns, rows.weight, table, rows.level)
-
     def less(self, data: Data) -> Data:
         """Return rows less the torque of the baseline effects."""
         if not self.effects:
@@ -185,13 +180,19 @@ class Trained:
     def held_out(self, place: int) -> Array:
         """Return the residual (rows,) [N m] of model number `place` on rows it was not fitted to.
 
-        Without validation logs, each block of time is predicted from all others, to first order:
-        θ_-b - θ = -(P - J_b J_bᵀ)⁻¹ J_b r_b. An event keeps its numbers, which no other block
-        tells.
+        Without validation logs, each block of time is predicted from all others.
+        """
+        if self.judge is not None:
+            return np.asarray(self.judge.y - self.models[place].model.torque(self.judge))
+        return self.left_out(place)
+
+    def left_out(self, place: int) -> Array:
+        """Return the residual (rows,) [N m] of the fitted rows, each block predicted from others.
+
+        To first order: θ_-b - θ = -(P - J_b J_bᵀ)⁻¹ J_b r_b. An event keeps its numbers, which no
+        other block tells.
         """
         done, state = self.models[place], self.states[place]
-        if self.judge is not None:
-            return np.asarray(self.judge.y - done.model.torque(self.judge))
         first, size = len(done.model.beta), self._sizes(state)
         lasting = np.r_[np.arange(first), first + state.lasting]
         columns = Table.stacked([state.known.base, state.effects]).take(lasting)
@@ -206,6 +207,14 @@ class Trained:
             step = np.linalg.solve(info - columns.gram(columns, here), gradient)
             left[block == b] -= np.asarray(step @ slopes[:, block == b])
         return left
+
+    def scores(self) -> Array:
+        """Return the predictive scores (blocks,) of the torque of the last model."""
+        data = self.models[-1].data
+        left = (self.left_out(-1) / data.rms(data.y)[data.joint])[data.counts]
+        _, block = np.unique(data.blocks(self.blocks)[data.counts], return_inverse=True)
+        losses, rows = (np.bincount(block, x).astype(np.float64) for x in (left**2, None))
+        return log_scores(losses, rows)
 
     def _sizes(self, state: State) -> Array:
         """(numbers,) by which each number is scaled."""
@@ -223,24 +232,37 @@ def train(
 ) -> Trained:
     """Return the nominal model and those with causes, in their order, without the held-out rows.
 
+    The rows are fitted as they are, and whitened by what is left of them so. Whitened rows give
+    the numbers their least deviations (Aitken 1935) where the residual is noise; where it is what
+    the model lacks they fit bands in which there is little torque. The models of the rows as they
+    are, are taken where they predict surely better the torque of blocks of time left out.
+
     Args:
         standing: effects that the models have beside the causes, as the reference has them.
     """
-    rows, logs = later.rows, len(prepared.data.logs)
-    some = replace(rows.data, logs=rows.data.logs[:logs])
-    known = rows.weight[rows.data.log_of < logs]
-    first = standing.rows(Rows(some, rows.columns, known, rows.nominal, rows.level))
-    own, data = _beside(later, first, standing), standing.less(prepared.data)
-    if causes:  # the noise was found beside their torque, as far as the dictionary left it
-        rough = Rows.of(data, standing.nominal)
-        left = data.y - _chain(own, causes)[-1].model.torque(data)
-        white, _ = rough.whitened(rough.signal(left), DiagnosisConfig().noise_bins)
-        own = _beside(later, white, standing)
-    states = _chain(own, causes)
+    data = standing.less(prepared.data)
     judge = None if prepared.judge is None else standing.less(prepared.judge)
-    weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
-    models = tuple(_refined(own, state, data, weight) for state in states)
-    return Trained(models, judge, tuple(states), own, blocks, standing.effects)
+    config, rows = DiagnosisConfig(), Rows.of(data, standing.nominal)
+
+    def fitted(rows: Rows) -> Trained:
+        own = _beside(later, rows, standing)
+        states = _chain(own, causes)
+        weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
+        models = tuple(_refined(own, state, data, weight) for state in states)
+        return Trained(models, judge, tuple(states), own, blocks, standing.effects)
+
+    left = data.y - _together(_beside(later, rows, standing), causes).torque(data)
+    plain = fitted(Rows.of(data, standing.nominal, data.rms(left)))
+    white = fitted(rows.whitened(rows.signal(left), config.noise_bins)[0])
+    scores = {one: one.scores() for one in (plain, white)}
+    return white if white in confidence_set(scores, config) else plain
+
+
+def _together(own: Later, causes: Sequence[Named]) -> Exact:
+    """Return the model with all causes, fitted at once."""
+    start = own.start()
+    model = replace(start.model, effects=tuple(causes))
+    return own.fit(model, start.theta, own.belief_of(model)).model
 
 
 def _chain(own: Later, causes: Sequence[Named]) -> list[State]:

@@ -106,6 +106,7 @@ def settle(
     dictionary: Dictionary,
     config: DiagnosisConfig,
     cause: Array | None = None,
+    fit: Array | None = None,
     reference: tuple[Rows, Table] | None = None,
 ) -> tuple[Dataset, Dictionary]:
     """Return the rows of each session whitened, in units of its own noise, and their columns.
@@ -116,14 +117,15 @@ def settle(
 
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
+        fit: (rows,) [N m] torque of all that was fitted with them, of which the noise is the rest.
         reference: rows and columns of the reference that were settled before.
     """
 
     alone = dataset.reference is None
     first = tuple(group for group in dictionary.groups if group.shape == 0)
 
-    def settled(rows: Rows, table: Table) -> tuple[Rows, Table]:
-        white, columns = rows, table
+    def settled(rows: Rows, table: Table) -> tuple[list[Array], Table]:
+        white, columns, left = rows, table, list(rows.y)
         for _ in range(_ROUNDS if alone else 1):
             groups = _best_shapes(white, columns, dictionary.groups) if alone else first
             numbers = _imitated(white, columns, groups, config)
@@ -132,13 +134,17 @@ def settle(
             left = _less_events(rows, dictionary, dataset.arm, left) if alone else left
             white, through = rows.whitened(left, config.noise_bins)
             columns = through(table).compact()
-        return white, columns
+        return left, columns
 
-    cleared, table = settled(dataset.later.less(cause), dictionary.later)
+    noise, table = settled(dataset.later.less(fit), dictionary.later)
+    cleared, _ = dataset.later.less(cause).whitened(noise, config.noise_bins)
     dataset = replace(dataset, later=cleared.less(None), cleared=cleared)
     if dataset.reference is None or dictionary.reference is None:
         return dataset, replace(dictionary, later=table)
-    before, known = reference or settled(dataset.reference, dictionary.reference)
+    if reference is None:
+        noise, known = settled(dataset.reference, dictionary.reference)
+        reference = dataset.reference.whitened(noise, config.noise_bins)[0], known
+    before, known = reference
     return (
         replace(dataset, reference=before),
         replace(dictionary, later=table, reference=known),

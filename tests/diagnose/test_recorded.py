@@ -74,7 +74,8 @@ def test_a_joint_that_creeps_out_of_its_rest_was_not_touched(shared: Path) -> No
 
 @pytest.fixture(scope="module")
 def odrive(shared: Path) -> tuple[Selection, list[Judged]]:
-    return judged_odrive(shared / "real")
+    look, judged = judged_odrive(shared / "real")
+    return look.selection, judged
 
 
 @pytest.mark.slow

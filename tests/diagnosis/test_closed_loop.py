@@ -96,3 +96,9 @@ def test_a_drift_is_a_share_of_all_the_viscous_friction() -> None:
 def test_no_link_mends_what_a_law_of_friction_leaves() -> None:
     """A link .4 mm longer saved at joint 2 less than its load friction is inexact, and made joint 1 worse."""
     assert causes(diagnosed(*drawn(6, 44)[-1].logs())) == [("load_friction", 2)]
+
+
+@pytest.mark.slow
+def test_a_lag_is_no_lag_of_another_length() -> None:
+    """Columns of a lag of 10 ms, times a fifth, are none of 2 ms: a loop that answers coarse encoders looks like that."""
+    assert causes(diagnosed(*drawn(10, 45)[-1].logs())) == []

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
@@ -13,11 +15,14 @@ from pipelines.signal.first_order import held_mean, lagging, rate_of_change
 __all__ = ["TorqueLag"]
 
 _LONG = 4.0  # samples
+_LOOKED_FOR = (0.0, 0.01, 0.03, 0.1)  # [s]
 
 
 @dataclass(frozen=True)
 class TorqueLag(Effect):
     """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once."""
+
+    looked_for: float = 0.0  # [s] the lag whose columns a search compares; 0: their limit for a small one
 
     name = "torque_lag"
     parameters = Parameters(
@@ -31,7 +36,17 @@ class TorqueLag(Effect):
     acts_on = "record"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, -rate_of_change(self.own(predicted(arm, motion)), motion.t))
+        """(H_T τ - τ) / T, at T = 0 -dτ/dt."""
+        tau, time = self.own(predicted(arm, motion)), self.looked_for
+        change = -rate_of_change(tau, motion.t)
+        if time > 0.0:
+            change = (lagging(tau, motion.t, time, None, motion.since) - tau) / time
+        return self.on_own_row(arm, change)
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """The limit, and long lags: a torque that turns within one of these is no longer its Taylor series."""
+        for time in _LOOKED_FOR:
+            yield replace(self, looked_for=time)
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque goes through the low-pass H, other effects included: y = H τ = τ - T H dτ/dt.

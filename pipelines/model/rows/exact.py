@@ -384,19 +384,25 @@ def _slopes_through(
     arm = model.arm
 
     def alone(one: Named) -> Array:
-        return data.lay_each(lambda log, motion: recorded(
-            arm, one.effect.at(one.values).columns(motion, model.nominal) @ np.array(one.amplitudes), motion)
-            if one.log in (None, log) else np.zeros_like(motion.q))
+        """(k, rows) of each of its amplitudes."""
+        def columns(motion: Motion) -> Array:
+            return recorded(arm, one.effect.at(one.values).columns(motion, model.nominal), motion)
+
+        return model._of_log(data, one, data.lay(columns))
 
     here = model.torque(data)
     as_read = not any(one.effect.acts_on in ("encoder", "drive") for one in model.effects)
     more = [_of_law(model, data, here, one) for one in names]
     for place, one in enumerate(model.effects):
-        for name, size in _steps(one):
-            names.append((1, place, name))
+        steps = _steps(one)
+        names += [(1, place, name) for name, _ in steps]
+        own = alone(one) if adds(one.effect) and as_read else None
+        for name, size in steps:
             there = number_moved(one, name, size)
-            if adds(one.effect) and as_read:
-                more.append((alone(there) - alone(one))[None] / size)
+            if own is not None and name.isdigit():  # it is linear in its amplitudes
+                more.append(own[int(name)][None])
+            elif own is not None:
+                more.append((np.array(there.amplitudes) @ alone(there) - np.array(one.amplitudes) @ own)[None] / size)
             else:
                 effects = (*model.effects[:place], there, *model.effects[place + 1:])
                 more.append((replace(model, effects=effects).torque(data) - here)[None] / size)

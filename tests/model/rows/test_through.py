@@ -7,6 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.diagnosis.config import DiagnosisConfig
+from pipelines.diagnosis.engine import pose
+from pipelines.diagnosis.screening import best_of
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
@@ -58,6 +61,18 @@ def test_slopes_of_a_model_behind_a_lag_are_those_of_its_torque() -> None:
     by_nominal = nominal_slopes(model)  # what a diagnosis steps along
     assert by_nominal is not None
     assert np.allclose(data.lay(by_nominal), done.slopes[:len(model.beta)], rtol=0.0, atol=1e-12)
+
+
+def test_a_lag_shows_in_the_ripple_that_it_delays() -> None:
+    """Ripple is most of this torque: beside it the lag explains ten times what it does beside the nominal model, at its length."""
+    prepared = prepare(Logs((turned(1), turned(2))), Recipe(cutoff_hz=40.0))
+    later = pose(prepared, DiagnosisConfig())
+    ripple = later.dataset.model.with_effect(Cogging(joint=1, order=ORDER, harmonics=1), np.array([0.04, 0.0]))
+    state = later.start(ripple)
+    before, beside = (next(one for key, one in best_of(some.screened(state)).items() if key == ("torque_lag", 1))
+                      for some in (later, later.composed(state.model)))
+    assert beside.gain > 10.0 * max(before.gain, 0.0)
+    assert beside.amplitudes == pytest.approx([LAG])
 
 
 def test_sharpness_of_each_joint_is_found_behind_a_lag() -> None:
