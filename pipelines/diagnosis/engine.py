@@ -15,7 +15,7 @@ from pipelines.diagnosis.dataset import Dataset, Rows, load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.prior import Prior, prior_of
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.selection import Selection, select
+from pipelines.diagnosis.selection import Found, Selection, select
 from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
@@ -45,7 +45,7 @@ class Look:
         dictionary: Dictionary,
         responses: Sequence[Acting],
         config: DiagnosisConfig,
-        found: Selection | None = None,
+        found: Found | None = None,
         usual: tuple[Prior, Baseline] | None = None,
     ) -> Look:
         """Return the causes in rows whose noise is known, beside those found before.
@@ -134,7 +134,7 @@ def diagnose_prepared(
     named = _new(responses, rough, prepared, exclude)
     last, known = Look.of(*settle(rough, every, config), named, config), 0
     for _ in range(_LOOKS):  # what the causes leave tells the noise, and what is typical
-        power, found, usual = last.later.dataset.noise_power, last.selection, last.usual
+        power, found, usual = last.later.dataset.noise_power, last.selection.found, last.usual
         if not found.causes:
             break
         torques = _torques(rough, every, last)

@@ -25,7 +25,7 @@ from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact
 
-__all__ = ["Candidate", "Cause", "Round", "Selection", "Tried", "refit", "select"]
+__all__ = ["Candidate", "Cause", "Found", "Round", "Selection", "Tried", "refit", "select"]
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,11 @@ class Selection:
     cut: tuple[Key, ...] = ()  # causes still significant when the largest number was reached
     moment: str = ""  # what stands out at one moment, and no event explains
 
+    @property
+    def found(self) -> Found:
+        rounds = tuple(one for one in self.rounds if one.cause is not None)
+        return Found(self.causes, self.end.model, rounds)
+
 
 @dataclass(frozen=True, eq=False)
 class Round:
@@ -94,12 +99,21 @@ class Round:
     moment: str = ""  # what stands out at one moment, and no event explains
 
 
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a further search begins with."""
+
+    causes: tuple[Cause, ...]
+    model: Exact
+    rounds: tuple[Round, ...]  # in which a cause was selected
+
+
 def select(
     later: Later,
     baseline: Baseline,
     responses: Sequence[Acting],
     config: DiagnosisConfig,
-    before: Selection | None = None,
+    before: Found | None = None,
 ) -> Selection:
     """Return the causes that explain the later rows.
 
@@ -110,10 +124,10 @@ def select(
     start = state = later.start()
     causes: list[Cause] = []
     if before is not None:
-        causes, state = list(before.causes), later.start(before.end.model)
+        causes, state = list(before.causes), later.start(before.model)
     stopped = follows = ""
     explained = max(start.cost - state.cost, 0.0)
-    rounds = [] if before is None else [one for one in before.rounds if one.cause is not None]
+    rounds = [] if before is None else list(before.rounds)
     while len(causes) < config.causes:
         found, after = _round(
             later, state, causes, explained, baseline, responses if not causes else (), config
