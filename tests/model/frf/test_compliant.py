@@ -14,7 +14,7 @@ from pipelines.model.frf.compliant import explain, predicted
 from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
 from pipelines.model.frf.modes import Modes, Pair
 
-_NONE = Rational(np.zeros(2), np.zeros((2, 2)), 1.0, 0, 0, 0, 0.0, 1.0, (4.0, 250.0), 1.0, 0.0)
+_NONE = Rational(np.zeros(2), np.zeros((2, 2)), 0, 0, 0, 0.0, 1.0, (4.0, 250.0), 1.0, 0.0)
 
 
 def two_masses(motor: float, link: float, stiffness: float) -> tuple[float, float]:
