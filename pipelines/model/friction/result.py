@@ -19,6 +19,7 @@ from pipelines.model.friction.laws import gravity_names
 from pipelines.model.friction.model_selection import Ladder, Missing, undecided
 from pipelines.model.friction.ripple import Ripple
 from pipelines.model.friction.several import SeveralFit
+from pipelines.model.friction.sliding import DriftConfig
 from pipelines.model.friction.weak_form import moved
 
 __all__ = ["CandidateLaw", "Drift", "JointResult", "Posture", "Result", "Series",
@@ -168,7 +169,7 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
         error = driven.error(simulated)
         errors.append(error if np.isfinite(error) else None)
     drift, open_ = _drift(joint), joint.unseen
-    if drift is not None and joint.course is not None and not joint.course.named:
+    if drift is not None and not (_shown(drift) and joint.course is not None and joint.course.named):
         open_ = (*open_, _not_excluded(drift))
         drift = None
     return JointResult(
@@ -207,6 +208,12 @@ def _drift(joint: JointFit) -> Drift | None:
     change = Value(share * float(fit.found.beta[last]), abs(share) * float(fit.std[last]), "1")
     return Drift(course.kind, course.form, course.time, change, speed, course.holds,
                  joint.stretches[course.part].name, when_std)
+
+
+def _shown(drift: Drift) -> bool:
+    """Return whether the law that was chosen shows the change that rows showed without a law."""
+    change = drift.change
+    return change.std is None or abs(change.value) > DriftConfig().sure * change.std
 
 
 def _not_excluded(drift: Drift) -> Missing:

@@ -74,7 +74,7 @@ class DriftConfig:
     ends: float = 0.08  # of all rows, that lie before and after a step
     times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)  # over the duration; 5: straight
     least: float = 0.03  # of friction: a smaller change is within what a law is good for
-    sure: float = 2.0  # std beyond which a larger change is excluded: two-sided .05
+    sure: float = 2.0  # std by which a change is known, or a larger one excluded: two-sided .05
     rounds: int = 4  # of scanning for a course and fitting the curve that changes
 
 
