@@ -83,7 +83,7 @@ class Modes:
     """Of one response."""
 
     modes: tuple[Mode, ...]  # distinct ones, by frequency
-    traces: tuple[Mode, ...]  # of pairs that nearly cancel: seen, but no grouping rests on them
+    traces: tuple[Mode, ...]  # of pairs that nearly cancel: alone they name nothing
     pairs: tuple[Pair, ...]
     single: tuple[Mode, ...]  # that have no partner
     level: Known  # of the rigid body above friction and below the modes, beside the model's: 1 where its inertia is right
@@ -97,6 +97,11 @@ class Modes:
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
     slack: float = _CONFIG.held_still  # relative deviation of a frequency that masses and springs are granted
+
+    @property
+    def faint(self) -> tuple[Pair, ...]:
+        """Pairs of the traces."""
+        return _paired(self.traces)[0]
 
 
 def relative_acceleration(measured: Measured) -> FrequencyResponse:

@@ -161,6 +161,19 @@ def test_delay_and_rigid() -> None:
         assert ("26.8 Hz" in traced[0].evidence) == said
 
 
+def test_a_pair_that_nearly_cancels_in_one_posture_belongs_to_that_of_another() -> None:
+    """Of a base that a geared rotor hardly feels: a spring's motor would outweigh the joint in the first posture."""
+    rotor, base = 0.92, (42.0, 6.0)
+    seen = [modes_of([(float(low[0]), float(high[0]))], j, std=5e-4)
+            for j in (1.2, 2.5) for low, high in [predicted(j, base, None, rotor)]]
+    faint = replace(seen[0], modes=(), pairs=(), traces=seen[0].modes)
+    found, left = group_joint(1, [faint, seen[1]], 1e-3)
+    assert [one.kind for one in found] == ["base"]
+    assert left == []
+    alone, _ = group_joint(1, [faint, modes_of([], 2.5)], 1e-3)
+    assert [one.kind for one in alone] == ["rigid"]
+
+
 def test_modes_that_do_not_explain_are_not_believed() -> None:
     """A fit that leaves far more than noise names nothing, however well its modes would suit a base."""
     poor = [replace(modes_of([base_under_arm(28.0, 8.0, j)], j), misfit=30.0, left=0.1) for j in (1.0, 1.2)]
