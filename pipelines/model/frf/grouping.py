@@ -135,7 +135,7 @@ def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: b
                          f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. "
                          "A gap that is crossed, or friction that turns its sign, does so.",
                          "another strength of excitation and a faster turn; else longer")]
-    if not count and 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % within two deviations
+    if not count and 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:
         return [], [_scattered(joint, modes, left, config)]
     if (early := advance(modes, sample_time, held, config)) is not None:
         return [], [_early(joint, modes, early, config)]

@@ -93,7 +93,7 @@ class Modes:
     inertia: Known | None  # [kg m^2] that the torque moves below the modes
     friction_below: float  # [Hz] below which friction and load change the magnitude by more than a tenth; 0: nowhere
     misfit: float  # 1 where the rational function explains all but the noise
-    left: float  # rms of what it leaves, as a share of the response
+    left: float  # two of it hold 95 % of the bins about the fit, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
     slack: float = _CONFIG.held_still  # relative deviation of a frequency that masses and springs are granted
@@ -166,8 +166,11 @@ def _fitted(part: FrequencyResponse) -> Rational:
 
 
 def _left(fit: Rational, part: FrequencyResponse) -> float:
+    """Half of the deviation that 95 % of bins have at most, by what the fit leaves or by their noise."""
     inside = part.within(*_CONFIG.straight)
-    return float(np.sqrt(np.mean(np.abs(inside.response / fit.response(inside.frequency) - 1.0) ** 2)))
+    model = fit.response(inside.frequency)
+    off = np.maximum(np.abs(inside.response - model), np.sqrt(inside.variance)) / np.abs(model)
+    return 0.5 * float(np.quantile(off, 0.95))
 
 
 def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:
