@@ -151,7 +151,7 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     smooth = np.arange(_CONFIG.straight[0], min(_CONFIG.straight[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
-                 inertia, _friction_below(relative, level), fit.misfit, _left(fit, part),
+                 inertia, _friction_below(relative, level), fit.misfit, _left(fit, part, measured.plant),
                  (float(part.frequency[0]), float(part.frequency[-1])), fit)
 
 
@@ -165,12 +165,17 @@ def _fitted(part: FrequencyResponse) -> Rational:
     return first if first.misfit < _CONFIG.stuck else min(first, fit(False), key=lambda one: one.description)
 
 
-def _left(fit: Rational, part: FrequencyResponse) -> float:
-    """Half of the deviation that 95 % of bins have at most, by what the fit leaves or by their noise."""
+def _left(fit: Rational, part: FrequencyResponse, plant: FrequencyResponse) -> float:
+    """Half of the deviation that 95 % of bins have at most, by what the fit leaves or by their noise.
+
+    The noise is that of the `plant` as measured: taking out other joints also takes what shakes all,
+    the impacts of a gap, from what is known of the rest.
+    """
     inside = part.within(*_CONFIG.straight)
-    model = fit.response(inside.frequency)
-    off = np.maximum(np.abs(inside.response - model), np.sqrt(inside.variance)) / np.abs(model)
-    return 0.5 * float(np.quantile(off, 0.95))
+    measured = plant.where(np.isin(plant.frequency, inside.frequency))
+    rest = np.abs(inside.response / fit.response(inside.frequency) - 1.0)
+    noise = np.sqrt(measured.variance) / np.abs(measured.response)
+    return 0.5 * float(np.quantile(np.maximum(rest, noise), 0.95))
 
 
 def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:
