@@ -38,6 +38,8 @@ class HeldConfig:
         weighings: times that the variance of the rest is renewed.
         draws: of the response within what is known of the coupling.
         fewest: bins.
+        moves: mean square of the motion of a joint over that of its noise, beyond which most of it is motion: of what is noise
+            alone, D_jk would be any number.
     """
 
     modes: int = 3
@@ -48,6 +50,7 @@ class HeldConfig:
     weighings: int = 4
     draws: int = 24
     fewest: int = 20
+    moves: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +140,9 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     """
     config = config or HeldConfig()
     bound = np.full(len(others), np.inf) if most is None else most
-    moves = np.array([bool(np.any(responses.response[:, k])) for k in others], dtype=bool)
+    noise = np.diagonal(responses.covariance, axis1=1, axis2=2).real
+    power = (np.abs(responses.response) ** 2 / np.maximum(noise, 1e-300)).mean(axis=0)
+    moves = power[list(others)] > config.moves
     others, bound = tuple(k for k, does in zip(others, moves, strict=True) if does), bound[moves]
     if not others or len(responses.frequency) < config.fewest:
         return None
