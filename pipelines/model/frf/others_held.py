@@ -140,11 +140,13 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     """
     config = config or HeldConfig()
     bound = np.full(len(others), np.inf) if most is None else most
+    if len(responses.frequency) < config.fewest:
+        return None
     noise = np.diagonal(responses.covariance, axis1=1, axis2=2).real
     power = (np.abs(responses.response) ** 2 / np.maximum(noise, 1e-300)).mean(axis=0)
     moves = power[list(others)] > config.moves
     others, bound = tuple(k for k, does in zip(others, moves, strict=True) if does), bound[moves]
-    if not others or len(responses.frequency) < config.fewest:
+    if not others:
         return None
     kept = [torque, position, *others]
     scale = np.stack([np.ones_like(rigid), *(1.0 / rigid for _ in kept[1:])], axis=1)
