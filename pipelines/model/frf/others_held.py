@@ -82,7 +82,8 @@ class _Modes:
     """What is known of b_jm b_km: of a base and of a spring less has to be found.
 
     A base turns as the joint does, b_k / b_j = D_jk / D_jj. The link on the spring of joint j is all
-    that couples to the others, b_j b_k = D_jk: above its mode the motor feels none of them.
+    that couples to the others, b_j b_k = D_jk: above its mode the motor feels none of them. It is
+    the only mode then: beside a base none is that of the link alone.
     """
 
     kinds: tuple[str, ...]  # of each mode: "base", "spring" or "free"
@@ -191,8 +192,7 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
     if known_shape is not None:
         count = len(known_shape) // 2
         free = _linear(rows, known_shape, plain, _Modes(("free",) * count, none.turned))
-        ways = [tuple("spring" if k == spring else "base" for k in range(count))
-                for spring in range(-1, count)]
+        ways = [("base",) * count, ("spring",)][:1 + (count == 1)]
         tried = [free, *(_linear(rows, known_shape, plain, _Modes(way, _turned(free))) for way in ways)]
         begun += [_refined(rows, start, config) for start in tried]
     known = begun[0]
@@ -203,7 +203,7 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
         starts = []
         kinds, turned = known.modes.kinds, _turned(known)
         for kind in ("base", "spring", "free") if len(turned) else ("free",):
-            if kind == "spring" and kind in kinds:
+            if kind == "spring" and kinds:
                 continue
             now = _Modes((*kinds, kind), turned)
             for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known))):
@@ -214,9 +214,11 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
         found = [one for one in (_refined(rows, start, config) for start in starts if start is not None) if one.passive(most)]
         if not found:
             break
+        best = min((best, *found), key=lambda one: one.description(rows.independent))
+        found = [one for one in found if "spring" not in one.modes.kinds]
+        if not found:
+            break
         known = min(found, key=lambda one: one.description(rows.independent))
-        if known.description(rows.independent) < best.description(rows.independent):
-            best = known
     return best
 
 
