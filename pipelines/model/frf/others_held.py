@@ -106,8 +106,14 @@ class _Fit:
         return max(float(self.rest @ self.rest), 1e-300)
 
     def passive(self, most: Array) -> bool:
-        """Whether every mode is found and could exist: b_jm² is positive, and no b_km² is more than D_kk, `most` (others,)."""
+        """Whether every mode is found and masses could be so: b_jm² is positive, no b_km² is more than D_kk, `most` (others,).
+
+        D is positive definite: D_jk² is less than D_jj D_kk. A column that is mostly noise would have it grow
+        until the noise of τ_j - Σ Z_jk a_k covers what the modes leave.
+        """
         joints, place = len(most) + 1, len(most) + 1
+        if (self.gains[1:joints] ** 2 > most * self.gains[0]).any():
+            return False
         for kind in self.modes.kinds:
             size, at = (joints, place) if kind == "free" else (1, 0)
             own, others = self.gains[place], self.gains[at + 1:at + joints]
