@@ -160,3 +160,17 @@ def test_a_bin_at_the_end_of_the_band_does_not_hide_a_rigid_joint() -> None:
     """A flat response whose last bin, at the edge of v, is off by as much as it is long."""
     found = frf_findings([Noise(rigid(1.0), strength=2.0, encoder=3e-6, seconds=24.0, seed=0).log()])
     assert [one.kind for one in found.classification] == ["rigid"]
+
+
+def test_noise_of_the_encoder_hides_no_rigid_joint() -> None:
+    """Either scatters the response by a tenth. What the position is read with is white up to half the rate; a gap is not."""
+    log = Loop(rigid(1.0), disturbance=0.02).log()
+    noise = 2e-6 * np.random.default_rng(5).standard_normal(log.q.shape)
+    noisy = replace(log, signals={**log.signals, "q": Signal(log.q + noise, "rad", "position")})
+    (measured,) = measured_responses([noisy])
+    inside = (measured.plant.frequency > 50.0) & (measured.plant.frequency < 200.0)
+    seen = (measured.plant.variance / np.abs(measured.plant.response) ** 2)[inside]
+    assert np.mean(measured.by_sensor[inside]) == pytest.approx(np.mean(seen), rel=0.3)
+    assert np.quantile(seen, 0.95) > 0.1**2
+    assert [one.kind for one in frf_findings([noisy]).classification] == ["rigid"]
+    assert frf_findings([Loop(rigid(1.0), disturbance=4.0).log()]).undecided

@@ -49,3 +49,22 @@ def test_a_link_on_a_spring_stays_one_mode_where_its_neighbour_swings_freely() -
     assert found is not None
     mode = link * s**2 / (s**2 + damping / link * s + stiffness / link)
     np.testing.assert_allclose(found.response.response * s**2 * (motor + link - mode), 1.0, atol=0.2)
+
+
+def test_a_neighbour_that_is_mostly_noise_does_not_stand_in_for_modes() -> None:
+    """Four modes, one more than are sought: as large a D_jk as masses cannot have would hide the fourth in noise."""
+    f = np.arange(8.0, 120.0, 0.5)
+    s = np.asarray(2j * np.pi * f, dtype=np.complex128)
+    impedance = 1.2 + np.zeros_like(s)
+    for share, hertz, damping in ((0.6, 26.0, 0.03), (0.3, 33.0, 0.04), (0.1, 60.0, 0.05), (0.05, 90.0, 0.05)):
+        omega = 2.0 * np.pi * hertz
+        impedance -= share * s**2 / (s**2 + 2.0 * damping * omega * s + omega**2)
+    values = np.stack([np.ones_like(s), 1.0 / (impedance * s**2), 0.03 / s**2], axis=1)
+    std = np.stack([np.full(len(f), 4e-3), 1e-3 * np.abs(values[:, 1]), np.full(len(f), 1e-6)], axis=1)
+    noise = np.random.default_rng(0).standard_normal((2, *values.shape)) / np.sqrt(2.0)
+    values = values + std * (noise[0] + 1j * noise[1])
+    covariance = np.einsum("bk,kl->bkl", std**2, np.eye(3)).astype(complex)
+    responses = Responses(f, values, covariance, np.ones(values.shape), "welch", 1.0, 10.0, 1.0)
+    found = others_held(responses, np.asarray(1.0 / s**2), 0, 1, (2,), np.array([1.2]))
+    assert found is not None
+    np.testing.assert_allclose(found.response.response * s**2 * impedance, 1.0, atol=0.5)
