@@ -8,7 +8,7 @@
     found.delay                         [s], beside the hold
 
 Products of sections, with s in units of the middle of the band, keep the fit well conditioned at any order, and every section is
-a mode: ω = 1/√a, ζ = b / (2√a). Both a and b are positive: poles are stable and every damping is positive, as of a passive
+a mode: ω = 1/√a, ζ = b / (2√a). g, a and b are positive: poles are stable and every damping is positive, as of a passive
 structure that is moved and measured at one place (all zeros of such a response are minimum phase, too). Maximum likelihood: the
 sum of |Ĝ - H|² / variance is smallest (Pintelon, Schoukens 2012, System Identification, §9.11); the number of sections is that
 of the shortest description (ibid. §11.3; Rissanen 1978, Automatica 14).
@@ -51,11 +51,10 @@ class Mode:
 
 @dataclass(frozen=True, eq=False)
 class Rational:
-    """A fitted function. `parameters`: log |g|, delay · unit, log b, log a of each zero section, then of each pole section."""
+    """A fitted function. `parameters`: log g, delay · unit, log b, log a of each zero section, then of each pole section."""
 
     parameters: Array  # (2 + 2 zeros + 2 poles,), s in `unit`
     covariance: Array  # of them; zero rows for what was held
-    sign: float  # of g
     zeros: int  # sections
     poles: int
     integrators: int
@@ -68,14 +67,14 @@ class Rational:
     def response(self, frequency: Array) -> Complex:
         """H at these frequencies [Hz]."""
         s = np.asarray(2j * np.pi * frequency, dtype=np.complex128)
-        value, _ = product(self.parameters, np.asarray(s / self.unit), self.zeros, self.sign)
+        value, _ = product(self.parameters, np.asarray(s / self.unit), self.zeros)
         return np.asarray(value * known_part(s, self.integrators, self.hold))
 
     @property
     def low(self) -> Known:
         """g: the plateau below all modes, of H sⁱ."""
-        value = self.sign * float(np.exp(self.parameters[0]))
-        return Known(value, abs(value) * float(np.sqrt(self.covariance[0, 0])))
+        value = float(np.exp(self.parameters[0]))
+        return Known(value, value * float(np.sqrt(self.covariance[0, 0])))
 
     @property
     def high(self) -> Known:
@@ -85,8 +84,8 @@ class Rational:
         sign = np.repeat([1.0, -1.0], [self.zeros, self.poles])
         gradient = np.zeros(len(self.parameters))
         gradient[0], gradient[3::2] = 1.0, sign
-        value = self.sign * float(np.exp(gradient @ self.parameters))
-        return Known(value, abs(value) * float(np.sqrt(gradient @ self.covariance @ gradient)))
+        value = float(np.exp(gradient @ self.parameters))
+        return Known(value, value * float(np.sqrt(gradient @ self.covariance @ gradient)))
 
     @property
     def delay(self) -> Known:
@@ -131,10 +130,10 @@ def known_part(s: Complex, integrators: int, hold: float) -> Complex:
     return np.asarray(-np.expm1(-s * hold) / (s * hold) * s ** -float(integrators))
 
 
-def product(parameters: Array, s: Complex, zeros: int, sign: float) -> tuple[Complex, Complex]:
+def product(parameters: Array, s: Complex, zeros: int) -> tuple[Complex, Complex]:
     """Everything that is fitted, at s in units of the fit (bins,), and each 1 + b s + a s² (sections, bins)."""
     sections = 1.0 + np.exp(parameters[2::2, None]) * s + np.exp(parameters[3::2, None]) * s**2
-    value = sign * np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0) / np.prod(sections[zeros:], axis=0)
+    value = np.exp(parameters[0] - s * parameters[1]) * np.prod(sections[:zeros], axis=0) / np.prod(sections[zeros:], axis=0)
     return np.asarray(value), np.asarray(sections)
 
 

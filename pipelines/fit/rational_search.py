@@ -41,7 +41,6 @@ class _Data:
     weight: Array  # 1 / std of one of its two parts (bins,)
     unit: float  # [rad/s]
     with_delay: bool
-    sign: float
     correlated: float  # neighbouring bins that carry one independent estimate
     freedom: float  # of the variance; infinite where it is known
 
@@ -72,7 +71,7 @@ def fit_rational(frequency: Array, response: Complex, variance: Array, *, integr
         InputRejected: T08, fewer than 18 bins, too few for gain, delay and one mode; D09, not one bin with a finite variance.
     """
     frequency, data = _prepare(frequency, response, variance, integrators, hold, with_delay, correlated, freedom, floor)
-    shell = Rational(np.zeros(2), np.zeros((2, 2)), data.sign, 0, 0, integrators, hold, data.unit,
+    shell = Rational(np.zeros(2), np.zeros((2, 2)), 0, 0, integrators, hold, data.unit,
                      (float(frequency[0]), float(frequency[-1])), np.inf, np.inf)
     current = _rigid(data, shell)
     best, waited = current, 0
@@ -124,9 +123,7 @@ def _prepare(frequency: Array, response: Complex, variance: Array, integrators: 
     target = response[good] / known
     spread = variance[good] / np.abs(known) ** 2 + (floor**2 + _EXACT) * np.abs(target) ** 2
     unit = float(2.0 * np.pi * np.sqrt(frequency[0] * frequency[-1]))
-    lowest = target[:max(3, len(target) // 20)]
-    sign = 1.0 if (lowest.real / np.abs(lowest)).sum() >= 0.0 else -1.0
-    return frequency, _Data(s / unit, target, np.sqrt(2.0 / spread), unit, with_delay, sign, correlated, freedom)
+    return frequency, _Data(s / unit, target, np.sqrt(2.0 / spread), unit, with_delay, correlated, freedom)
 
 
 def _rigid(data: _Data, shell: Rational) -> Rational:
@@ -134,7 +131,7 @@ def _rigid(data: _Data, shell: Rational) -> Rational:
     gain = float(np.median(np.log(np.abs(data.target))))
     delays = [0.0]
     if data.with_delay:
-        omega, turned = data.s.imag, data.sign * data.target / np.abs(data.target)
+        omega, turned = data.s.imag, data.target / np.abs(data.target)
         grid = np.arange(-_DELAYS, _DELAYS + 1) * (0.25 * np.pi / omega[-1])
         delays.append(float(grid[np.argmax((np.exp(1j * np.outer(grid, omega)) @ turned).real)]))
     starts = [replace(shell, parameters=np.array([gain, delay])) for delay in delays]
@@ -145,7 +142,7 @@ def _rigid(data: _Data, shell: Rational) -> Rational:
 
 def _residual(data: _Data, parameters: Array, zeros: int) -> tuple[Complex, Complex]:
     """Residual (bins,) and Jacobian (parameters, bins), weighted. ∂H/∂log b = ± H b s / section, ∂H/∂log a = ± H a s² / section."""
-    value, sections = product(parameters, data.s, zeros, data.sign)
+    value, sections = product(parameters, data.s, zeros)
     sign = np.where(np.arange(len(sections)) < zeros, 1.0, -1.0)[:, None]
     slope = np.empty((len(parameters), len(data.s)), dtype=np.complex128)
     slope[0], slope[1] = value, -data.s * value if data.with_delay else 0.0
@@ -230,7 +227,7 @@ def _judged(data: _Data, model: Rational) -> Rational:
 
 def _grow(data: _Data, model: Rational, with_zeros: bool) -> Rational:
     """One more pair of poles, and one of zeros or none: the best of the trials, refined."""
-    value, _ = product(model.parameters, data.s, model.zeros, data.sign)
+    value, _ = product(model.parameters, data.s, model.zeros)
     weight, ratio = (data.weight * np.abs(value)) ** 2, data.target / value
     frequencies = np.abs(data.s[::max(1, len(data.s) // _FREQUENCIES)])
     a = np.repeat(1.0 / frequencies**2, len(_DAMPINGS))

@@ -127,7 +127,7 @@ def _modes(postures: Sequence[Posture], methods: Sequence[Mapping[str, Method]])
 
     tables = [Table(columns, found, caption) for found, caption in (
         (rows("modes"), "Value ± std."),
-        (rows("traces"), "Traces: an antiresonance and a resonance that nearly cancel. No grouping rests on them.")) if found]
+        (rows("traces"), "Traces: an antiresonance and a resonance that nearly cancel. Alone they name nothing.")) if found]
     text = "From a rational function fitted to the default response, weighted with its variance." if tables else \
         "No response has a mode that noise does not explain."
     return Section("Modes", (text,), tuple(tables))

@@ -92,10 +92,19 @@ def test_a_resonance_without_its_antiresonance() -> None:
 
 
 def test_the_fit_says_what_its_response_is() -> None:
-    """`response` gives the truth back where it was not fitted, and a negative gain stays negative."""
-    found = fit_rational(FREQUENCY[::2], -_truth()[::2], (0.001 * np.abs(_truth()[::2])) ** 2, integrators=2)
-    np.testing.assert_allclose(found.response(FREQUENCY), -_truth(), rtol=1e-3)
-    assert found.low.value == pytest.approx(-0.8, rel=1e-3)
+    """`response` gives the truth back where it was not fitted."""
+    found = fit_rational(FREQUENCY[::2], _truth()[::2], (0.001 * np.abs(_truth()[::2])) ** 2, integrators=2)
+    np.testing.assert_allclose(found.response(FREQUENCY), _truth(), rtol=1e-3)
+    assert found.low.value == pytest.approx(0.8, rel=1e-3)
+
+
+def test_a_band_may_begin_between_an_antiresonance_and_its_resonance() -> None:
+    """There the response is turned round: it is not of the other sign, and the resonance above is found."""
+    f, w = np.arange(25.0, 325.0), 2.0 * np.pi * np.array([24.0, 40.0])
+    _, truth = signal.freqs([1.0 / w[0]**2, 0.06 / w[0], 1.0], [1.0 / w[1]**2, 0.08 / w[1], 1.0], 2.0 * np.pi * f)
+    found = fit_rational(f, truth, (0.01 * np.abs(truth)) ** 2)
+    mode, = found.modes()
+    assert (mode.kind, mode.frequency.value) == ("resonance", pytest.approx(40.0, rel=1e-3))
 
 
 def test_a_variance_that_is_estimated_adds_no_modes() -> None:

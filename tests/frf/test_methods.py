@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.experiment import Signal
+from pipelines.log.experiment import Array, Signal
 from pipelines.model.frf.findings import frf_findings
 from pipelines.model.frf.modes import fitted_modes
 from pipelines.model.frf.responses import How, Measured, measured_responses
 from pipelines.signal.frequency_response import FrequencyResponse
-from tests.frf.loops import Loop, elastic, rigid
+from tests.frf.loops import Loop, T, elastic, rigid
 from tests.seeds import rarely
 
 LINK = Loop(elastic(0.2, 0.8, 8000.0, 4.0))
@@ -145,3 +145,32 @@ def test_a_mode_that_moves_along_the_turn_is_as_uncertain() -> None:
         (one,) = measured_responses([log])
         for mode in fitted_modes(one).modes:
             assert low <= mode.frequency.std / mode.frequency.value <= high
+
+
+class Noise(Loop):
+    """v is noise from 3 to 80 Hz."""
+
+    def _excitation(self, rng: np.random.Generator, samples: int) -> Array:
+        f = np.fft.rfftfreq(samples, T)
+        spectrum = np.where((f >= 3.0) & (f <= 80.0), np.fft.rfft(rng.standard_normal(samples)), 0.0)
+        return np.asarray(3.0 * self.strength * np.fft.irfft(spectrum, samples))
+
+
+def test_a_bin_at_the_end_of_the_band_does_not_hide_a_rigid_joint() -> None:
+    """A flat response whose last bin, at the edge of v, is off by as much as it is long."""
+    found = frf_findings([Noise(rigid(1.0), strength=2.0, encoder=3e-6, seconds=24.0, seed=0).log()])
+    assert [one.kind for one in found.classification] == ["rigid"]
+
+
+def test_noise_of_the_encoder_hides_no_rigid_joint() -> None:
+    """Either scatters the response by a tenth. What the position is read with is white up to half the rate; a gap is not."""
+    log = Loop(rigid(1.0), disturbance=0.02).log()
+    noise = 2e-6 * np.random.default_rng(5).standard_normal(log.q.shape)
+    noisy = replace(log, signals={**log.signals, "q": Signal(log.q + noise, "rad", "position")})
+    (measured,) = measured_responses([noisy])
+    inside = (measured.plant.frequency > 50.0) & (measured.plant.frequency < 200.0)
+    seen = (measured.plant.variance / np.abs(measured.plant.response) ** 2)[inside]
+    assert np.mean(measured.by_sensor[inside]) == pytest.approx(np.mean(seen), rel=0.3)
+    assert np.quantile(seen, 0.95) > 0.1**2
+    assert [one.kind for one in frf_findings([noisy]).classification] == ["rigid"]
+    assert frf_findings([Loop(rigid(1.0), disturbance=4.0).log()]).undecided

@@ -128,13 +128,14 @@ def _loaded(found: list[Finding], left: list[Open], loads: Sequence[float],
 
 def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: bool, held: bool,
              config: GroupingConfig) -> tuple[list[Finding], list[Open]]:
-    count = min(len(m.pairs) for m in modes)
+    most = max(len(m.pairs) for m in modes)
+    count = min(len(_strongest(m, most)) for m in modes)
     if (worst := max((m.misfit for m in modes if m.left > config.left), default=0.0)) > config.misfit:
         return [], [Open(joint, None, ("backlash", "joint_elasticity", "base_resonance"),
                          f"No linear plant explains the response: what it leaves has {worst:.3g} times the variance of noise. "
                          "A gap that is crossed, or friction that turns its sign, does so.",
                          "another strength of excitation and a faster turn; else longer")]
-    if not count and 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:  # 95 % within two deviations
+    if not count and 2.0 * (left := max(m.left for m in modes)) > config.flat - 1.0:
         return [], [_scattered(joint, modes, left, config)]
     if (early := advance(modes, sample_time, held, config)) is not None:
         return [], [_early(joint, modes, early, config)]
@@ -149,7 +150,9 @@ def _grouped(joint: int, modes: Sequence[Modes], sample_time: float, revolute: b
 
 
 def _strongest(modes: Modes, count: int) -> list[Pair]:
-    kept = sorted(modes.pairs, key=lambda p: -p.rise)[:count]
+    """As many pairs: those that nearly cancel too, where distinct ones are fewer than in another posture."""
+    several = (*modes.pairs, *modes.faint) if len(modes.pairs) < count else modes.pairs
+    kept = sorted(several, key=lambda p: -p.rise)[:count]
     return sorted(kept, key=lambda p: p.antiresonance.frequency.value)
 
 

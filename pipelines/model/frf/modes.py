@@ -46,6 +46,7 @@ class ModesConfig:
         friction: of the magnitude, what friction has to change to be said
         held_still: relative deviation of a frequency that masses and springs are granted: held joints give way a little, and J is
             averaged over a turn
+        seen_over: share of the frequency over which noise of the reading is averaged
     """
 
     of_rate: float = 0.3
@@ -60,6 +61,7 @@ class ModesConfig:
     longest: float = 0.05
     friction: float = 0.1
     held_still: float = 0.008
+    seen_over: float = 0.15
 
 
 _CONFIG = ModesConfig()
@@ -83,7 +85,7 @@ class Modes:
     """Of one response."""
 
     modes: tuple[Mode, ...]  # distinct ones, by frequency
-    traces: tuple[Mode, ...]  # of pairs that nearly cancel: seen, but no grouping rests on them
+    traces: tuple[Mode, ...]  # of pairs that nearly cancel: alone they name nothing
     pairs: tuple[Pair, ...]
     single: tuple[Mode, ...]  # that have no partner
     level: Known  # of the rigid body above friction and below the modes, beside the model's: 1 where its inertia is right
@@ -93,10 +95,15 @@ class Modes:
     inertia: Known | None  # [kg m^2] that the torque moves below the modes
     friction_below: float  # [Hz] below which friction and load change the magnitude by more than a tenth; 0: nowhere
     misfit: float  # 1 where the rational function explains all but the noise
-    left: float  # rms of what it leaves, as a share of the response
+    left: float  # two of it hold 95 % of the bins about the fit, as a share of the response
     band: tuple[float, float]  # [Hz] of the fit
     fit: Rational
     slack: float = _CONFIG.held_still  # relative deviation of a frequency that masses and springs are granted
+
+    @property
+    def faint(self) -> tuple[Pair, ...]:
+        """Pairs of the traces."""
+        return _paired(self.traces)[0]
 
 
 def relative_acceleration(measured: Measured) -> FrequencyResponse:
@@ -146,7 +153,7 @@ def fitted_modes(measured: Measured, band: tuple[float, float] = BAND) -> Modes:
     smooth = np.arange(_CONFIG.straight[0], min(_CONFIG.straight[1], part.frequency[-1]), 1.0)
     size = np.abs(fit.response(smooth) / _carried(modes, smooth)) / level.value
     return Modes(modes, traces, pairs, single, level, above, delay, float(max(size.max(), 1.0 / size.min())),
-                 inertia, _friction_below(relative, level), fit.misfit, _left(fit, part),
+                 inertia, _friction_below(relative, level), fit.misfit, _left(fit, part, measured),
                  (float(part.frequency[0]), float(part.frequency[-1])), fit)
 
 
@@ -160,9 +167,21 @@ def _fitted(part: FrequencyResponse) -> Rational:
     return first if first.misfit < _CONFIG.stuck else min(first, fit(False), key=lambda one: one.description)
 
 
-def _left(fit: Rational, part: FrequencyResponse) -> float:
+def _left(fit: Rational, part: FrequencyResponse, measured: Measured) -> float:
+    """Half of the deviation that 95 % of bins have at most, by what the fit leaves or by their noise.
+
+    The noise is that of the plant as measured: taking out other joints also takes what shakes all,
+    the impacts of a gap, from what is known of the rest. What the reading of the position alone
+    explains hides no mode that is as wide as `seen_over`: of that noise counts what its mean has.
+    """
     inside = part.within(*_CONFIG.straight)
-    return float(np.sqrt(np.mean(np.abs(inside.response / fit.response(inside.frequency) - 1.0) ** 2)))
+    same = np.isin(measured.plant.frequency, inside.frequency)
+    plant, read = measured.plant.where(same), measured.by_sensor[same]
+    rest = np.abs(inside.response / fit.response(inside.frequency) - 1.0)
+    off = np.maximum(rest**2, plant.variance / np.abs(plant.response) ** 2)
+    alike = _CONFIG.seen_over * inside.frequency / (part.correlated * float(np.median(np.diff(part.frequency))))
+    by_reading = -np.log(0.05) * read  # 95 % of |n|² of complex Gaussian noise
+    return 0.5 * float(np.sqrt(np.quantile(np.maximum(off - by_reading, 0.0) + by_reading / np.maximum(alike, 1.0), 0.95)))
 
 
 def _carried(modes: tuple[Mode, ...], frequency: Array) -> Complex:

@@ -38,6 +38,8 @@ class HeldConfig:
         weighings: times that the variance of the rest is renewed.
         draws: of the response within what is known of the coupling.
         fewest: bins.
+        moves: mean square of the motion of a joint over that of its noise, beyond which most of it is motion: of what is noise
+            alone, D_jk would be any number.
     """
 
     modes: int = 3
@@ -48,6 +50,7 @@ class HeldConfig:
     weighings: int = 4
     draws: int = 24
     fewest: int = 20
+    moves: float = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +78,27 @@ class _Rows:
 
 
 @dataclass(frozen=True, eq=False)
+class _Modes:
+    """What is known of b_jm b_km: of a base and of a spring less has to be found.
+
+    A base turns as the joint does, b_k / b_j = D_jk / D_jj. The link on the spring of joint j is all
+    that couples to the others, b_j b_k = D_jk: above its mode the motor feels none of them. It is
+    the only mode then: beside a base none is that of the link alone.
+    """
+
+    kinds: tuple[str, ...]  # of each mode: "base", "spring" or "free"
+    turned: Array  # D_jk / D_jj (others,)
+
+
+@dataclass(frozen=True, eq=False)
 class _Fit:
     """Z with some modes."""
 
     shape: Array  # δ [s], then log ω [rad/s] and log ζ of each mode (1 + 2 modes,)
-    gains: Array  # D_jk, b_jm b_km of each mode, friction and gravity of joint j (joints (1 + modes) + 2,)
+    gains: Array  # D_jk, b_jm b_km of each mode (b_jm² alone unless free), friction and gravity of j
     rest: Array  # real and imaginary parts over their std (2 bins,)
     spread: Array  # that std (bins,)
-    ratios: tuple[Array | None, ...] = ()  # b_km / b_jm of each mode (others,); None: found freely
+    modes: _Modes
     inside: bool = True  # every frequency and damping lies within its bounds: at one, it is not found
 
     @property
@@ -90,21 +106,30 @@ class _Fit:
         return max(float(self.rest @ self.rest), 1e-300)
 
     def passive(self, most: Array) -> bool:
-        """Whether every mode is found and could exist: b_jm² is positive, and no b_km² is more than D_kk, `most` (others,)."""
+        """Whether every mode is found and masses could be so: b_jm² is positive, no b_km² is more than D_kk, `most` (others,).
+
+        D is positive definite: D_jk² is less than D_jj D_kk. A column that is mostly noise would have it grow
+        until the noise of τ_j - Σ Z_jk a_k covers what the modes leave.
+        """
         joints, place = len(most) + 1, len(most) + 1
-        for ratio in self.ratios:
-            size = joints if ratio is None else 1
-            own, others = self.gains[place], self.gains[place + 1:place + size]
-            if own <= 0.0 or (others**2 > most[:len(others)] * own).any():
+        if (self.gains[1:joints] ** 2 > most * self.gains[0]).any():
+            return False
+        for kind in self.modes.kinds:
+            size, at = (joints, place) if kind == "free" else (1, 0)
+            own, others = self.gains[place], self.gains[at + 1:at + joints]
+            if own <= 0.0 or (kind != "base" and (others**2 > most * own).any()):
                 return False
             place += size
         return self.inside
 
     def description(self, independent: float) -> float:
-        """-2 log-likelihood + p log n (Rissanen 1978, Automatica 14)."""
+        """-2 log-likelihood + p log n (Rissanen 1978, Automatica 14).
+
+        The errors are those of the measured torque and accelerations, whose variance no fit changes:
+        that of the rest weighs, but no logarithm of it counts (Pintelon, Schoukens 2012, §9.11).
+        """
         share = 2.0 * independent / len(self.rest)
-        return float(share * (self.cost + 4.0 * np.log(self.spread).sum())
-                     + (len(self.shape) + len(self.gains)) * np.log(2.0 * independent))
+        return share * self.cost + (len(self.shape) + len(self.gains)) * float(np.log(2.0 * independent))
 
 
 def others_held(responses: Responses, rigid: Complex, torque: int, position: int, others: tuple[int, ...],
@@ -122,9 +147,13 @@ def others_held(responses: Responses, rigid: Complex, torque: int, position: int
     """
     config = config or HeldConfig()
     bound = np.full(len(others), np.inf) if most is None else most
-    moves = np.array([bool(np.any(responses.response[:, k])) for k in others], dtype=bool)
+    if len(responses.frequency) < config.fewest:
+        return None
+    noise = np.diagonal(responses.covariance, axis1=1, axis2=2).real
+    power = (np.abs(responses.response) ** 2 / np.maximum(noise, 1e-300)).mean(axis=0)
+    moves = power[list(others)] > config.moves
     others, bound = tuple(k for k, does in zip(others, moves, strict=True) if does), bound[moves]
-    if not others or len(responses.frequency) < config.fewest:
+    if not others:
         return None
     kept = [torque, position, *others]
     scale = np.stack([np.ones_like(rigid), *(1.0 / rigid for _ in kept[1:])], axis=1)
@@ -163,32 +192,39 @@ def _with_modes(rows: _Rows, most: Array, config: HeldConfig, known_shape: Array
     """
     plain = np.sqrt(0.5 * (rows.covariance[:, 0, 0].real + rows.floor**2))
     delays = np.arange(-config.delay, config.delay, np.pi / 4.0 / abs(rows.s[-1]))
-    rigid = [_linear(rows, np.array([delay]), plain) for delay in (0.0, *delays)]
+    none = _Modes((), np.zeros(rows.acceleration.shape[1] - 1))
+    rigid = [_linear(rows, np.array([delay]), plain, none) for delay in (0.0, *delays)]
     begun = [_refined(rows, min(rigid, key=lambda one: one.cost), config)]
     if known_shape is not None:
-        free = _linear(rows, known_shape, plain, (None,) * (len(known_shape) // 2))
-        ratio = free.gains[1:rows.acceleration.shape[1]] / free.gains[0]
-        begun += [_refined(rows, start, config) for start in
-                  (free, _linear(rows, known_shape, plain, (ratio,) * (len(known_shape) // 2)))]
+        count = len(known_shape) // 2
+        free = _linear(rows, known_shape, plain, _Modes(("free",) * count, none.turned))
+        ways = [("base",) * count, ("spring",)][:1 + (count == 1)]
+        tried = [free, *(_linear(rows, known_shape, plain, _Modes(way, _turned(free))) for way in ways)]
+        begun += [_refined(rows, start, config) for start in tried]
     known = begun[0]
     best = min((one for one in begun if one.passive(most)), key=lambda one: one.description(rows.independent), default=known)
     low, high = np.log(np.abs(rows.s[[0, -1]]))  # a mode is 2 ζ ω wide: as close as that frequencies are tried
     shapes = np.array([(w, np.log(z)) for z in config.dampings for w in np.arange(low + z, high, 2.0 * z)]).reshape(-1, 2)
     for _ in range(config.modes):
         starts = []
-        turned = known.gains[1:rows.acceleration.shape[1]] / known.gains[0]
-        for kind in (turned, None) if len(turned) else (None,):
+        kinds, turned = known.modes.kinds, _turned(known)
+        for kind in ("base", "spring", "free") if len(turned) else ("free",):
+            if kind == "spring" and kinds:
+                continue
+            now = _Modes((*kinds, kind), turned)
             for delay, spread in ((0.0, plain), (known.shape[0], _spread(rows, known))):
                 before = np.concatenate([[delay], known.shape[1:]])
-                cheapest = np.argsort(_costs(rows, before, shapes, spread, (*known.ratios, kind)), kind="stable")
-                trials = (_linear(rows, np.concatenate([before, shapes[k]]), spread, (*known.ratios, kind)) for k in cheapest)
+                cheapest = np.argsort(_costs(rows, before, shapes, spread, now), kind="stable")
+                trials = (_linear(rows, np.concatenate([before, shapes[k]]), spread, now) for k in cheapest)
                 starts.append(next((one for one in trials if one.passive(most)), None))
         found = [one for one in (_refined(rows, start, config) for start in starts if start is not None) if one.passive(most)]
         if not found:
             break
+        best = min((best, *found), key=lambda one: one.description(rows.independent))
+        found = [one for one in found if "spring" not in one.modes.kinds]
+        if not found:
+            break
         known = min(found, key=lambda one: one.description(rows.independent))
-        if known.description(rows.independent) < best.description(rows.independent):
-            best = known
     return best
 
 
@@ -202,24 +238,23 @@ def _refined(rows: _Rows, start: _Fit, config: HeldConfig) -> _Fit:
     high = np.array([config.delay, *np.tile(np.log([abs(rows.s[-1]), 1.01 * config.dampings[-1]]), modes)])
     fit, mask = start, np.zeros(len(low), dtype=bool)
     for _ in range(config.weighings):
-        spread, ratios = _spread(rows, fit), _renewed(rows, fit)
+        spread, known = _spread(rows, fit), replace(fit.modes, turned=_turned(fit))
 
-        def rest(x: Array, spread: Array = spread, ratios: tuple[Array | None, ...] = ratios) -> Array:
-            return _linear(rows, x, spread, ratios).rest
+        def rest(x: Array, spread: Array = spread, known: _Modes = known) -> Array:
+            return _linear(rows, x, spread, known).rest
 
         try:
             found = least_squares(rest, np.clip(fit.shape, low + 1e-9, high - 1e-9), low, high,
                                   np.array([1e-4, *np.full(2 * modes, 0.1)]), 10)
         except np.linalg.LinAlgError:  # the start as it is, which the description then judges
             break
-        fit, mask = _linear(rows, found.x, spread, ratios), found.at_bound
+        fit, mask = _linear(rows, found.x, spread, known), found.at_bound
     return replace(fit, inside=not mask[1:].any())
 
 
-def _renewed(rows: _Rows, fit: _Fit) -> tuple[Array | None, ...]:
-    """Of a base that turns as the joint does, b_k / b_j = D_jk / D_jj."""
-    own = fit.gains[1:rows.acceleration.shape[1]] / fit.gains[0]
-    return tuple(None if one is None else own for one in fit.ratios)
+def _turned(fit: _Fit) -> Array:
+    """D_jk / D_jj (others,)."""
+    return np.asarray(fit.gains[1:1 + len(fit.modes.turned)] / fit.gains[0])
 
 
 def _spread(rows: _Rows, fit: _Fit) -> Array:
@@ -229,18 +264,19 @@ def _spread(rows: _Rows, fit: _Fit) -> Array:
     return np.asarray(np.sqrt(0.5 * (variance + rows.floor**2)))
 
 
-def _linear(rows: _Rows, shape: Array, spread: Array, ratios: tuple[Array | None, ...] = ()) -> _Fit:
+def _linear(rows: _Rows, shape: Array, spread: Array, modes: _Modes) -> _Fit:
     """Least squares of the gains, `spread` (bins,) given."""
-    stacked, size = _scaled(_columns(rows, shape, ratios) / spread)
+    stacked, size = _scaled(_columns(rows, shape, modes) / spread)
     right = _parts(rows.torque / spread)
     gains = np.linalg.pinv(stacked @ stacked.T, rcond=1e-10, hermitian=True) @ (stacked @ right)
-    return _Fit(shape, gains / size, right - gains @ stacked, spread, ratios)
+    return _Fit(shape, gains / size, right - gains @ stacked, spread, modes)
 
 
-def _costs(rows: _Rows, before: Array, shapes: Array, spread: Array, ratios: tuple[Array | None, ...]) -> Array:
+def _costs(rows: _Rows, before: Array, shapes: Array, spread: Array, modes: _Modes) -> Array:
     """The cost (trials,) of `_linear` with delay and modes `before` and one more of each of the `shapes` (trials, 2)."""
-    known, _ = _scaled(_columns(rows, before, ratios[:-1]) / spread)
-    moved = _directions(rows, ratios[-1]) @ (rows.acceleration.T * np.exp(before[0] * rows.s) / spread)
+    known, _ = _scaled(_columns(rows, before, replace(modes, kinds=modes.kinds[:-1])) / spread)
+    kind = "free" if modes.kinds[-1] == "spring" else modes.kinds[-1]
+    moved = _directions(modes, kind) @ (rows.acceleration.T * np.exp(before[0] * rows.s) / spread)
     new, _ = _scaled(np.stack([_mode(rows.s, w, z) * moved for w, z in shapes]))  # (trials, columns of a mode, 2 bins)
     right, count = _parts(rows.torque / spread), len(known)
     normal = np.empty((len(shapes), count + len(moved), count + len(moved)))
@@ -270,7 +306,7 @@ def _unattenuated(rows: _Rows, fit: _Fit) -> _Fit:
 
     Expected normal equations hold the covariance of the noise; it is known, and taken out (Söderström 2007, Automatica 43, §5.1).
     """
-    shapes, w = _shapes(rows, fit.shape, fit.ratios), 0.5 / fit.spread**2
+    shapes, w = _shapes(rows, fit.shape, fit.modes), 0.5 / fit.spread**2
     columns = np.einsum("gbk,bk->gb", shapes, rows.acceleration)
     normal = ((columns * w) @ np.conj(columns.T)).real
     noise = np.einsum("gbk,bkl,hbl,b->gh", shapes, rows.covariance[:, 1:, 1:], np.conj(shapes), w, optimize=True).real
@@ -287,7 +323,7 @@ def _drawn(rows: _Rows, fit: _Fit, draws: int) -> list[Complex]:
     steps = step * np.array([1e-3, *np.ones(count - 1)])
     found = _impedance(rows, fit)
     moved = [(_impedance(rows, replace(fit, shape=fit.shape + one)) - found) / one.sum() for one in np.diag(steps)]
-    every = (*moved, *_shapes(rows, fit.shape, fit.ratios))
+    every = (*moved, *_shapes(rows, fit.shape, fit.modes))
     columns = (np.stack(every) * rows.acceleration).sum(axis=2) / fit.spread
     covariance = _inverse((columns @ np.conj(columns.T)).real)
     size = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
@@ -303,36 +339,45 @@ def _inverse(normal: Array) -> Array:
 
 def _impedance(rows: _Rows, fit: _Fit) -> Complex:
     """Z_jk e^(sδ) (bins, joints)."""
-    factors, directions = _factors(rows, fit.shape, fit.ratios)
+    factors, directions = _factors(rows, fit.shape, fit.modes)
     return np.asarray((fit.gains[:, None] * factors).T @ directions)
 
 
-def _columns(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> Complex:
+def _columns(rows: _Rows, shape: Array, modes: _Modes) -> Complex:
     """The torque of each gain (gains, bins)."""
-    factors, directions = _factors(rows, shape, ratios)
+    factors, directions = _factors(rows, shape, modes)
     return np.asarray(factors * (directions @ rows.acceleration.T))
 
 
-def _shapes(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> Complex:
+def _shapes(rows: _Rows, shape: Array, modes: _Modes) -> Complex:
     """What each gain multiplies in Z e^(sδ) (gains, bins, joints)."""
-    factors, directions = _factors(rows, shape, ratios)
+    factors, directions = _factors(rows, shape, modes)
     return np.asarray(factors[:, :, None] * directions[:, None, :])
 
 
-def _factors(rows: _Rows, shape: Array, ratios: tuple[Array | None, ...]) -> tuple[Complex, Array]:
+def _factors(rows: _Rows, shape: Array, modes: _Modes) -> tuple[Complex, Array]:
     """The same as a factor (gains, bins) and a direction (gains, joints) each."""
     s, unit = rows.s, np.eye(rows.acceleration.shape[1])
-    factors, directions = [np.ones_like(s)] * len(unit), [*unit]
-    for (w, z), ratio in zip(shape[1:].reshape(-1, 2), ratios, strict=True):
-        along = _directions(rows, ratio)
-        factors += [_mode(s, w, z)] * len(along)
+    factors, directions, coupled = [np.ones_like(s)], [unit[0]], np.ones_like(s)
+    for (w, z), kind in zip(shape[1:].reshape(-1, 2), modes.kinds, strict=True):
+        own = _mode(s, w, z)
+        if kind == "spring":
+            coupled = coupled + own
+        along = _directions(modes, kind)
+        factors += [own] * len(along)
         directions += [*along]
+    factors[1:1], directions[1:1] = [coupled] * (len(unit) - 1), [*unit[1:]]
     return np.stack([*factors, 1.0 / s, 1.0 / s**2]) * np.exp(shape[0] * s), np.stack([*directions, unit[0], unit[0]])
 
 
-def _directions(rows: _Rows, ratio: Array | None) -> Array:
-    """b_k / b_j of a mode (columns, joints): each joint by itself where it is not known."""
-    return np.eye(rows.acceleration.shape[1]) if ratio is None else np.concatenate([[1.0], ratio])[None]
+def _directions(modes: _Modes, kind: str) -> Array:
+    """b_k / b_j of a mode (columns, joints): each joint by itself where it is free.
+
+    Of a spring that of joint j alone: the others are in the column of D_jk.
+    """
+    if kind == "free":
+        return np.eye(1 + len(modes.turned))
+    return np.concatenate([[1.0], modes.turned if kind == "base" else 0.0 * modes.turned])[None]
 
 
 def _mode(s: Complex, w: float, z: float) -> Complex:

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +53,8 @@ class ResponseConfig:
         postures: times that the inertia about a joint grows from one posture to another, at most: it bounds the coupled modes
         density: [s] of the segments that show where v has power, to half a hertz: Hann's window leaks into two bins
         smooth: lines over which distortion is compared with noise
+        white: of the rate, bounds of bands below its half: of white noise they are equally dense
+        level: of the densest of these bands over the least dense, at most
     """
 
     same_posture: float = 0.02
@@ -66,6 +69,8 @@ class ResponseConfig:
     postures: float = 3.0
     density: float = 4.0
     smooth: int = 25
+    white: tuple[float, ...] = (0.35, 0.4, 0.45, 0.5)
+    level: float = 1.5
 
 
 _CONFIG = ResponseConfig()
@@ -104,6 +109,7 @@ class Measured:
     compliance: FrequencyResponse  # τ → q [rad/N m]
     with_reversal: FrequencyResponse | None  # u → q from the whole log, None where it is too short
     distortion: float | None  # what differs between realisations over what noise explains, median of variances; None of one
+    by_sensor: Array  # relative variance of `plant` by the noise with which the position is read (bins,)
     detected: tuple[float | None, float | None]  # power of the position at even and odd lines that v leaves out, over the noise's
 
     @property
@@ -184,20 +190,56 @@ def _measured(turned: tuple[Turned, ...], how: How, inertia: dict[int, float]) -
     density, top = _density(several.frequency, stretches, first.rate)
     band = excited_band(_outputs(several, (INPUT - 1, POSITION - 1)), density)
     inside = density[band.holds(several.frequency)]
-    aliased = not first.held and bool(len(inside)) and top > _CONFIG.folded * float(np.median(inside))
+    to_the_top = bool(len(inside)) and top > _CONFIG.folded * float(np.median(inside))
+    aliased = not first.held and to_the_top
     compliance = closed_loop(several, POSITION - 1, TORQUE - 1)
     ratio = _torque_per_input(plant, compliance, band)
     return Measured(turned, plant, _held(several, first, band, ratio, inertia), ratio, aliased, band,
                     _direct([s.signals for s in stretches], turned, how), both[0], both[1],
-                    compliance, _with_reversal(turned, how), distortion, detected)
+                    compliance, _with_reversal(turned, how), distortion,
+                    np.zeros(len(plant.frequency)) if to_the_top else _by_sensor(several, turned, stretches, how), detected)
+
+
+def _by_sensor(several: Responses, turned: tuple[Turned, ...], stretches: Sequence[Stretch], how: How) -> Array:
+    """Relative variance (bins,) by the noise with which the position is read; 0 where it does not show by itself.
+
+    It is white: as dense as the position near half the rate, if that is level. Motion is not level there: by a force it
+    falls with the square of the frequency at least. White noise is taken through the same spectra: q = P u + n whatever the
+    controller makes of n, and P̂ is off by Φ_vn / Φ_vu.
+    """
+    rate = turned[0].rate
+    frequency, density = _spectrum(stretches, rate, POSITION)
+    sizes = [float(np.median(density[(frequency > low * rate) & (frequency < high * rate)]))
+             for low, high in pairwise(_CONFIG.white)]
+    if max(sizes) > _CONFIG.level * min(sizes):
+        return np.zeros(len(several.frequency))
+    rng = np.random.default_rng(0)
+    read = [replace(one, signals=np.column_stack([one.signals[:, V], rng.standard_normal((len(one.signals), POSITION))]))
+            for one in stretches]
+    noise, _, _ = _excited(turned, read, how, distorted=False)
+    variance = np.interp(several.frequency, noise.frequency, noise.covariance[:, POSITION - 1, POSITION - 1].real)
+    size = np.maximum(np.abs(several.response[:, POSITION - 1]) ** 2, 1e-300)
+    return np.asarray(0.5 * sizes[-1] * rate * _smooth(variance) / size)
+
+
+def _smooth(values: Array) -> Array:
+    """The mean over neighbouring lines."""
+    width = min(_CONFIG.smooth, len(values))
+    padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
+    return np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
 
 
 def _density(frequency: Array, stretches: Sequence[Stretch], rate: float) -> tuple[Array, float]:
     """Of v [unit²/Hz] at these frequencies, and its median over the last tenth below half the rate."""
+    f, density = _spectrum(stretches, rate, V)
+    return np.interp(frequency, f, density), float(np.median(density[f > 0.45 * rate]))
+
+
+def _spectrum(stretches: Sequence[Stretch], rate: float, channel: int) -> tuple[Array, Array]:
+    """Frequencies [Hz] and the density [unit²/Hz] of a channel."""
     segment = min(round(_CONFIG.density * rate), *(len(s.signals) for s in stretches))
-    spectra = cross_spectra([s.signals[:, [V]] for s in stretches], rate, segment)
-    density = spectra.density[:, 0, 0].real
-    return np.interp(frequency, spectra.frequency, density), float(np.median(density[spectra.frequency > 0.45 * rate]))
+    spectra = cross_spectra([s.signals[:, [channel]] for s in stretches], rate, segment)
+    return spectra.frequency, spectra.density[:, 0, 0].real
 
 
 def _held(several: Responses, first: Turned, band: ExcitedBand, ratio: float | None,
@@ -237,8 +279,8 @@ def _outputs(several: Responses, which: tuple[int, ...]) -> Responses:
 
 
 def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch],
-             how: How) -> tuple[Responses, float | None, tuple[float | None, float | None]]:
-    """v → (u, q, τ), the distortion where there are realisations, and what detection lines show."""
+             how: How, distorted: bool = True) -> tuple[Responses, float | None, tuple[float | None, float | None]]:
+    """v → (u, q, τ), the distortion where there are realisations, and what detection lines show; else noise alone."""
     first, signals = turned[0], [s.signals for s in stretches]
     outputs = range(1, signals[0].shape[1])
     periods = {one.period for one in turned}
@@ -251,7 +293,7 @@ def _excited(turned: tuple[Turned, ...], stretches: Sequence[Stretch],
     if how.estimator == "multisine" or (how.estimator == "auto" and periodic and first.period is not None):
         assert first.period is not None
         found = multisine_responses(whole, first.rate, first.period, V, outputs)
-        return *_of_multisine(found), _detected(found.detection)
+        return (*_of_multisine(found), _detected(found.detection)) if distorted else (found.noise, None, (None, None))
     if how.estimator == "welch":
         return _welch(signals, turned, how, V, outputs), None, (None, None)
     spacing = how.resolution or 0.25
@@ -280,10 +322,7 @@ def _of_multisine(found: MultisineResponses) -> tuple[Responses, float | None]:
         return noise, None
     position = POSITION - 1
     own, total = (np.maximum(r.covariance[:, position, position].real, 1e-300) for r in (noise, found.total))
-    ratio = total / own
-    width = min(_CONFIG.smooth, len(ratio))
-    padded = np.pad(ratio, (width // 2, width - 1 - width // 2), mode="edge")
-    local = np.convolve(padded, np.full(width, 1.0 / width), mode="valid")
+    local = _smooth(total / own)
     raised = np.maximum(local, 1.0)
     return replace(noise, covariance=noise.covariance * raised[:, None, None]), float(np.median(local))
 

@@ -14,7 +14,7 @@ from pipelines.model.frf.compliant import explain, predicted
 from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
 from pipelines.model.frf.modes import Modes, Pair
 
-_NONE = Rational(np.zeros(2), np.zeros((2, 2)), 1.0, 0, 0, 0, 0.0, 1.0, (4.0, 250.0), 1.0, 0.0)
+_NONE = Rational(np.zeros(2), np.zeros((2, 2)), 0, 0, 0, 0.0, 1.0, (4.0, 250.0), 1.0, 0.0)
 
 
 def two_masses(motor: float, link: float, stiffness: float) -> tuple[float, float]:
@@ -159,6 +159,19 @@ def test_delay_and_rigid() -> None:
         traced, _ = group_joint(2, postures, 1e-3)
         assert [one.kind for one in traced] == ["rigid"]
         assert ("26.8 Hz" in traced[0].evidence) == said
+
+
+def test_a_pair_that_nearly_cancels_in_one_posture_belongs_to_that_of_another() -> None:
+    """Of a base that a geared rotor hardly feels: a spring's motor would outweigh the joint in the first posture."""
+    rotor, base = 0.92, (42.0, 6.0)
+    seen = [modes_of([(float(low[0]), float(high[0]))], j, std=5e-4)
+            for j in (1.2, 2.5) for low, high in [predicted(j, base, None, rotor)]]
+    faint = replace(seen[0], modes=(), pairs=(), traces=seen[0].modes)
+    found, left = group_joint(1, [faint, seen[1]], 1e-3)
+    assert [one.kind for one in found] == ["base"]
+    assert left == []
+    alone, _ = group_joint(1, [faint, modes_of([], 2.5)], 1e-3)
+    assert [one.kind for one in alone] == ["rigid"]
 
 
 def test_modes_that_do_not_explain_are_not_believed() -> None:
