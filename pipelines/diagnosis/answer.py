@@ -35,7 +35,7 @@ from pipelines.diagnosis.result import (
     Verdict,
 )
 from pipelines.diagnosis.screening import best_of
-from pipelines.diagnosis.selection import Cause, Tried
+from pipelines.diagnosis.selection import CandidateFit, Cause
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import Trained, told, train
 from pipelines.diagnosis.words import beside, how_much, taken_in, where
@@ -142,7 +142,7 @@ def _worth(
     causes = found.decision.causes
     standing = standing_of(prepared.reference, found.look.later, found.config)
     effects = found.look.selection.end.model.effects if causes else ()
-    trained = train(prepared, found.look.later, effects, blocks, standing)
+    trained = train(prepared, found.look.later, effects, blocks, standing, found.config)
     worth, why = weigh(prepared, trained, standing, whole), ""
     while causes:
         worse = worse_log(trained.data, worth.left[0], worth.left[len(causes)])
@@ -191,7 +191,7 @@ def _others(first: Finding, found: Found) -> list[str]:
     ]
 
 
-def _like(first: Finding, candidate: Tried) -> tuple[Acting, Finding]:
+def _like(first: Finding, candidate: CandidateFit) -> tuple[Acting, Finding]:
     one = candidate.fit.model.effects[-1]
     other = Acting.of(one.effect, one.values)
     cause, joint = candidate.key
@@ -213,12 +213,15 @@ def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Reject
         worse: why some that were found are none.
     """
     named = {one.key for one in causes}
+    doubtful = {one.key for one in found.look.selection.causes} - named
     alike = {key for one in causes for key in one.alternatives}
     out: dict[Key, Rejected] = {}
     for one in found.look.selection.rounds:
         for trial in one.tried:
             if trial.key not in named | alike:
-                out[trial.key] = Rejected(*trial.key, _plain(one.stopped) or worse or _WORSE)
+                doubt = found.decision.reason if trial.key in doubtful else ""
+                why = _plain(one.stopped) or worse or _plain(doubt) or _WORSE
+                out[trial.key] = Rejected(*trial.key, why)
     return tuple(out.values())
 
 
@@ -233,7 +236,7 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
             key, group = screened.group.key, screened.group
             if group.kind == "unnamed":
                 continue
-            accepted = one.cause is not None and one.cause.key == key
+            accepted = one.cause in found.decision.causes and one.cause.key == key
             reason = (
                 _ACCEPTED
                 if accepted

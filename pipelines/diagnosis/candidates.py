@@ -24,7 +24,8 @@ from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
-from pipelines.model.effects.base import everywhere
+from pipelines.model.effects.base import Effect, everywhere
+from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.families import Family, families, lay_family, whole_motion
 
@@ -51,6 +52,7 @@ class Group:
     standing: bool  # healthy machines have it in small
     kind: Kind
     reads_torque: bool = False  # its columns hold the logged torque itself
+    length: float | None = None  # [s] of the lag that its columns are of; None: they hold for any
 
     @property
     def family(self) -> str:
@@ -153,9 +155,15 @@ def _lay(
                     kind,
                     family.shapes[0].parameters.reads_torque
                     and rows.data.logs[0].motion.tau is not None,
+                    _length(family.shapes[number]),
                 )
             )
             seen += width
+
+
+def _length(shape: Effect) -> float | None:
+    """Return the amplitude that the columns of a shape are exact for; None: they are its slope."""
+    return shape.looked_for or None if isinstance(shape, TorqueLag) else None
 
 
 def _standing(family: Family, dataset: Dataset) -> set[int]:

@@ -44,6 +44,10 @@ class NoiseLevel:
         edges, std = [], []
         for j in range(int(joint.max()) + 1):
             own = (joint == j) & counts
+            if not own.any():  # its rows are zero in everything
+                edges.append(np.zeros(bins - 1))
+                std.append(np.ones(bins))
+                continue
             inner = np.quantile(speed[own], np.arange(1, bins) / bins)
             at = np.searchsorted(inner, speed[own])
             power = np.bincount(at, noise[own] ** 2, bins) / np.maximum(
@@ -80,7 +84,8 @@ class Rows:
             rms: (joints,) [N m] of the residual; None: what the nominal model leaves.
         """
         table = rows_of(data, model.columns)
-        weight = 1.0 / (fit_columns(data, table).rms if rms is None else rms)[data.joint]
+        size = fit_columns(data, table).rms if rms is None else np.where(rms > 0.0, rms, 1.0)
+        weight = 1.0 / size[data.joint]
         nominal = Table.of(table * weight, data.joint, data.n_joints)
         return cls(data, model.columns, weight, nominal)
 

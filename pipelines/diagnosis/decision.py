@@ -127,7 +127,7 @@ def decide(
             reason = f"{causes[0].key[0]} explains {explained:.0%} of the excess residual"
             return Decision("unknown", reason, ())
         if wandering := _confused(later, end, config):
-            first = min(wandering)  # what was found before it was found without it
+            first = min(wandering)  # effects that were selected earlier do not depend on it
             rest, causes = wandering[first], causes[:first]
         if not causes:
             return Decision("unknown", rest, ())
@@ -248,7 +248,7 @@ def _torque_squared(later: Later) -> Array:
 
 
 def _confused(later: Later, end: State, config: DiagnosisConfig) -> dict[int, str]:
-    """Return the effects, by place, that torque which wanders may look like, and why.
+    """Return {index of the effect: reason} of effects that wandering torque may look like.
 
     In closed loop the drive answers such a torque a moment later, and so do the motion and its
     record (Ljung 1999, 13.4): only a load is told from it that comes again with the motion, or is
@@ -266,7 +266,7 @@ def _confused(later: Later, end: State, config: DiagnosisConfig) -> dict[int, st
             motion = later.rows.data.logs[one.log - later.rows.data.first].motion
             size = np.abs(one.effect.torque(motion, end.model.nominal, one.values)).max(axis=0)
             chance = 2.0 * lasting * config.block / one.values["duration"]  # of a half sine
-            told[:] = np.sum(size**2 / chance) < bound
+            told = np.full(len(slow), np.sum(size**2 / chance) < bound)
         elif one.effect.acts_on != "load":
             told = (np.arange(len(slow)) + 1 == one.effect.joint) | (one.effect.joint is None)
         if (slow * told).max() > config.misfit:

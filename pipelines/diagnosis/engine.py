@@ -15,7 +15,7 @@ from pipelines.diagnosis.dataset import Dataset, Rows, load
 from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.prior import Prior, prior_of
 from pipelines.diagnosis.refit import Later
-from pipelines.diagnosis.selection import Found, Selection, select
+from pipelines.diagnosis.selection import SearchStart, Selection, select
 from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
 from pipelines.log.experiment import ExperimentLog
@@ -45,7 +45,7 @@ class Look:
         dictionary: Dictionary,
         responses: Sequence[Acting],
         config: DiagnosisConfig,
-        found: Found | None = None,
+        found: SearchStart | None = None,
         usual: tuple[Prior, Baseline] | None = None,
     ) -> Look:
         """Return the causes in rows whose noise is known, beside those found before.
@@ -144,6 +144,7 @@ def diagnose_prepared(
             break
         del last  # its columns take the memory that the next ones need
         last, known = Look.of(dataset, dictionary, named, config, found, usual), len(found.causes)
+    last = replace(last, selection=last.selection.told_apart)
     decision = decide(last.later, last.selection, last.baseline, config)
     return Diagnosis(decision, last, responses, config)
 

@@ -62,7 +62,7 @@ def extend(
         state, taken, impossible = _fitted(later, left, named, config)
         refused += impossible
         left = taken
-        trained = train(prepared, later, state.model.effects, blocks, standing)
+        trained = train(prepared, later, state.model.effects, blocks, standing, config)
         worth = weigh(prepared, trained, standing, whole=True)
         doubts = [_doubt(worth, place) for place in range(len(left))]
         if not any(doubts):

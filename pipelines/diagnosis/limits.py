@@ -87,7 +87,7 @@ def limits_of(later: Later, state: State, baseline: Baseline, config: DiagnosisC
     solved = state.factor.solve(cross)
     for group, square in zip(later.dictionary.groups, later.squares, strict=True):
         at, family = group.columns, later.dictionary.families.get(group.key)
-        if group.kind != "named" or family is None:
+        if group.kind != "named" or family is None or group.length is not None:
             continue
         length = np.sqrt(np.maximum(np.diag(square), 0.0))
         part = np.abs(solved[:, at]) * norms[:, None] / np.maximum(length, 1e-300)

@@ -7,7 +7,7 @@ state = later.fit(state.with_effect(...))
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,7 +21,6 @@ from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.families import lay_family
@@ -212,10 +211,10 @@ class Later:
 
         They pass on the torque of the effects as they do that of the nominal model.
         """
-        both = (self.rows.torque(x) for x in (model, replace(model, effects=())))
-        acting = [1 + j for j, (x, y) in enumerate(zip(*both, strict=True)) if np.any(x != y)]
-        named = (g for g in self.dictionary.groups if g.kind == "named" and g.key[1] in acting)
-        keys = {g.key: None for g in named if self._effect(g).acts_on in _PASS_ON}
+        lasting = tuple(one for one in model.effects if one.log is None)
+        both = (self.rows.torque(replace(model, effects=x)) for x in (lasting, ()))
+        acting = {1 + j for j, (x, y) in enumerate(zip(*both, strict=True)) if np.any(x != y)}
+        keys = [k for k, f in self.dictionary.families.items() if _passes_on(f.shapes, acting)]
         if not keys:
             return self
         parts, candidates, cross = [], self.candidates, self.cross.copy()
@@ -233,8 +232,10 @@ class Later:
         every = zip(self.dictionary.groups, self.squares, strict=True)
         squares = []
         for group, square in every:
-            there = candidates.take(group.columns)
-            squares.append(there.gram(there) if group in own else square)
+            if group in own:
+                there = candidates.take(group.columns)
+                square = there.gram(there)
+            squares.append(square)
         return replace(self, candidates=candidates, cross=cross, squares=tuple(squares))
 
     def screened(self, state: State) -> list[Screened]:
@@ -245,21 +246,7 @@ class Later:
         found = screen(self.dictionary.groups, state.factor, cross, self.squares, moments)
         if self.dataset.reference is not None:  # else base parameters are free anyway
             found = [self._freely(state, one) for one in found]
-        found = [self._at_length(one) for one in found]
         return [self._charged(one) if one.group.reads_torque else one for one in found]
-
-    def _at_length(self, one: Screened) -> Screened:
-        """Return a candidate with the lag that its columns are for, if they are for one.
-
-        The gain T_c = H a² falls by H (a - T)²: a lag of another length has other columns.
-        """
-        effect = self.dictionary.families.get(one.group.key)
-        lag = effect.shapes[one.group.shape] if effect is not None else None
-        if not isinstance(lag, TorqueLag) or lag.looked_for == 0.0 or not one.freedom:
-            return one
-        length = np.array([lag.looked_for])
-        share = 1.0 - (1.0 - lag.looked_for / float(one.amplitudes[0])) ** 2
-        return replace(one, gain=one.gain * share, amplitudes=length)
 
     def cross_with(self, state: State) -> Array:
         """Return the products of the slopes by all numbers of a state with the candidates."""
@@ -526,6 +513,15 @@ class Later:
         return tuple(
             y - t - s for y, t, s in zip(self.y, torque, self.base.times(standing), strict=True)
         )
+
+
+def _passes_on(shapes: Sequence[Effect], acting: Collection[int]) -> bool:
+    """Return whether a cause passes on, to the drive or the record, torque of some joints."""
+    one = shapes[0]
+    if one.acts_on not in _PASS_ON:
+        return False
+    others = (getattr(shape, q.name) for shape in shapes for q in one.parameters if q.joint)
+    return one.joint in acting or any(int(joint) in acting for joint in others)
 
 
 def _unit(lengths: Array) -> Array:

@@ -9,7 +9,7 @@ candidate and the residual r (Frisch & Waugh 1933, Lovell 1963, with a prior).
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,8 +52,20 @@ def screen(
         seen = values > _VISIBLE
         z = vectors[:, seen].T @ (moments[part] / unit)
         amplitudes = (vectors[:, seen] @ (z / values[seen])) / unit
-        out.append(Screened(group, float(np.sum(z**2 / values[seen])), int(seen.sum()), amplitudes))
+        gain = float(np.sum(z**2 / values[seen]))
+        found = Screened(group, gain, int(seen.sum()), amplitudes)
+        out.append(found if group.length is None else _at_length(found, group.length))
     return out
+
+
+def _at_length(one: Screened, length: float) -> Screened:
+    """Return a lag with the length T that its columns are of.
+
+    The gain T_c = H a² falls by H (a - T)²: a lag of another length has other columns.
+    """
+    best = float(one.amplitudes[0])
+    share = 1.0 - (1.0 - length / best) ** 2 if best > 0.0 else 0.0
+    return replace(one, gain=max(one.gain * share, 0.0), amplitudes=np.array([length]))
 
 
 def price(x: Array) -> float:

@@ -25,7 +25,16 @@ from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact
 
-__all__ = ["Candidate", "Cause", "Found", "Round", "Selection", "Tried", "refit", "select"]
+__all__ = [
+    "Candidate",
+    "CandidateFit",
+    "Cause",
+    "Round",
+    "SearchStart",
+    "Selection",
+    "refit",
+    "select",
+]
 
 
 @dataclass(frozen=True)
@@ -49,7 +58,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Tried:
+class CandidateFit:
     """What is kept of a candidate."""
 
     key: Key
@@ -80,9 +89,21 @@ class Selection:
     moment: str = ""  # what stands out at one moment, and no event explains
 
     @property
-    def found(self) -> Found:
+    def told_apart(self) -> Selection:
+        """The same without alternatives that are causes: backward elimination kept both."""
+        keys = {one.key for one in self.causes}
+        new = {
+            id(one): replace(one, alternatives=tuple(k for k in one.alternatives if k not in keys))
+            for one in self.causes
+        }
+        rounds = (replace(one, cause=new.get(id(one.cause), one.cause)) for one in self.rounds)
+        causes = tuple(new[id(one)] for one in self.causes)
+        return replace(self, causes=causes, rounds=tuple(rounds))
+
+    @property
+    def found(self) -> SearchStart:
         rounds = tuple(one for one in self.rounds if one.cause is not None)
-        return Found(self.causes, self.end.model, rounds)
+        return SearchStart(self.causes, self.end.model, rounds)
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +116,12 @@ class Round:
     stopped: str = ""
     follows: str = ""
     significant: tuple[Screened, ...] = ()
-    tried: tuple[Tried, ...] = ()
+    tried: tuple[CandidateFit, ...] = ()
     moment: str = ""  # what stands out at one moment, and no event explains
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class SearchStart:
     """What a further search begins with."""
 
     causes: tuple[Cause, ...]
@@ -113,7 +134,7 @@ def select(
     baseline: Baseline,
     responses: Sequence[Acting],
     config: DiagnosisConfig,
-    before: Found | None = None,
+    before: SearchStart | None = None,
 ) -> Selection:
     """Return the causes that explain the later rows.
 
@@ -142,29 +163,16 @@ def select(
     cut: tuple[Key, ...] = ()
     if len(causes) >= config.causes:
         taken = [cause.key for cause in causes]
-        more = _significant(later, state, taken, explained, baseline, config).values()
+        composed = later.composed(state.model)
+        more = _significant(composed, state, taken, explained, baseline, config).values()
         ranked = sorted(more, key=lambda one: -one.gain)
-        ranked = [one for one in ranked if not _slight(later, _torque(later, one), config)]
+        ranked = [one for one in ranked if not _slight(composed, _torque(composed, one), config)]
         cut = tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
     causes, state = _backward(later, causes, state, config)
-    causes, rounds = _told_apart(causes, rounds)
     moment = rounds[-1].moment if rounds else ""
     return Selection(
         tuple(causes), start, state, explained, stopped, follows, tuple(rounds), cut, moment
     )
-
-
-def _told_apart(
-    causes: Sequence[Cause], rounds: Sequence[Round]
-) -> tuple[list[Cause], list[Round]]:
-    """Return causes and rounds without alternatives that are causes: each is needed beside both."""
-    keys = {one.key for one in causes}
-    new = {
-        id(one): replace(one, alternatives=tuple(k for k in one.alternatives if k not in keys))
-        for one in causes
-    }
-    told = [replace(one, cause=new.get(id(one.cause), one.cause)) for one in rounds]
-    return [new[id(one)] for one in causes], told
 
 
 def _round(
@@ -176,9 +184,9 @@ def _round(
     responses: Sequence[Acting],
     config: DiagnosisConfig,
 ) -> tuple[Round, State | None]:
-    """Return the cause that explains most of the residual of `state`, or why none is selected.
+    """Return the cause that explains most of the residual of `state`, and the state fitted with it.
 
-    The second that is returned is the state with it.
+    Where none is selected, the round says why, and there is no state.
     """
     later = later.composed(state.model)
     significant = _significant(
@@ -196,7 +204,7 @@ def _round(
         None,
         None,
         significant=tuple(significant.values()),
-        tried=tuple(Tried(one.key, one.state.fit) for one in tried),
+        tried=tuple(CandidateFit(one.key, one.state.fit) for one in tried),
         moment=moment,
     )
     if not tried:

@@ -209,12 +209,17 @@ class Trained:
         return left
 
     def scores(self) -> Array:
-        """Return the predictive scores (blocks,) of the torque of the last model."""
-        data = self.models[-1].data
-        left = (self.left_out(-1) / data.rms(data.y)[data.joint])[data.counts]
-        _, block = np.unique(data.blocks(self.blocks)[data.counts], return_inverse=True)
-        losses, rows = (np.bincount(block, x).astype(np.float64) for x in (left**2, None))
-        return log_scores(losses, rows)
+        """Return the predictive scores (blocks,) of the torque of the last model, of all joints."""
+        data, left = self.models[-1].data, self.left_out(-1)
+        block = data.blocks(self.blocks)
+        out = np.zeros(int(block.max()) + 1)
+        for j in range(data.n_joints):
+            own = data.counts & (data.joint == j)
+            count = np.bincount(block[own], minlength=len(out)).astype(np.float64)
+            losses = np.bincount(block[own], left[own] ** 2, len(out)).astype(np.float64)
+            some = count > 0.0
+            out[some] += log_scores(losses[some], count[some])
+        return out
 
     def _sizes(self, state: State) -> Array:
         """(numbers,) by which each number is scaled."""
@@ -229,33 +234,43 @@ def train(
     causes: Sequence[Named],
     blocks: int,
     standing: Standing,
+    config: DiagnosisConfig,
 ) -> Trained:
     """Return the nominal model and those with causes, in their order, without the held-out rows.
 
-    The rows are fitted as they are, and whitened by what is left of them so. Whitened rows give
-    the numbers their least deviations (Aitken 1935) where the residual is noise; where it is what
-    the model lacks they fit bands in which there is little torque. The models of the rows as they
-    are, are taken where they predict surely better the torque of blocks of time left out.
+    They are fitted to plain rows and to rows that their residual whitens. Whitened rows give the
+    numbers the least deviations where the residual is noise (Aitken 1935); where it is what the
+    model lacks, they fit bands with little torque. The models of plain rows are returned where
+    these predict the torque of left-out blocks of time significantly better.
 
     Args:
         standing: effects that the models have beside the causes, as the reference has them.
     """
     data = standing.less(prepared.data)
     judge = None if prepared.judge is None else standing.less(prepared.judge)
-    config, rows = DiagnosisConfig(), Rows.of(data, standing.nominal)
+    rough = Rows.of(data, standing.nominal)
 
     def fitted(rows: Rows) -> Trained:
-        own = _beside(later, rows, standing)
+        own = _beside(later, rows, standing, config)
         states = _chain(own, causes)
         weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
         models = tuple(_refined(own, state, data, weight) for state in states)
         return Trained(models, judge, tuple(states), own, blocks, standing.effects)
 
-    left = data.y - _together(_beside(later, rows, standing), causes).torque(data)
+    left = data.y - _together(_beside(later, rough, standing, config), causes).torque(data)
     plain = fitted(Rows.of(data, standing.nominal, data.rms(left)))
-    white = fitted(rows.whitened(rows.signal(left), config.noise_bins)[0])
-    scores = {one: one.scores() for one in (plain, white)}
-    return white if white in confidence_set(scores, config) else plain
+    white = fitted(rough.whitened(rough.signal(left), config.noise_bins)[0])
+    return plain if _predicts_better(plain, white, config) else white
+
+
+def _predicts_better(one: Trained, other: Trained, config: DiagnosisConfig) -> bool:
+    """Return whether models predict left-out blocks of time significantly better than others."""
+    try:
+        scores = {"one": one.scores(), "other": other.scores()}
+    except np.linalg.LinAlgError:  # one block alone tells a number
+        return False
+    known = all(len(own) > 1 and np.isfinite(own).all() for own in scores.values())
+    return known and "other" not in confidence_set(scores, config)
 
 
 def _together(own: Later, causes: Sequence[Named]) -> Exact:
@@ -276,12 +291,12 @@ def _chain(own: Later, causes: Sequence[Named]) -> list[State]:
     return states
 
 
-def _beside(later: Later, rows: Rows, standing: Standing) -> Later:
+def _beside(later: Later, rows: Rows, standing: Standing, config: DiagnosisConfig) -> Later:
     """Return rows beside the prior of nominal numbers."""
     dataset = replace(later.dataset, later=rows, model=standing.nominal)
     none = rows.nominal.take(np.zeros(0, dtype=np.intp))
     dictionary = Dictionary((), {}, none, None)
-    return Later.of(dataset, dictionary, _nominal(later.prior), DiagnosisConfig())
+    return Later.of(dataset, dictionary, _nominal(later.prior), config)
 
 
 def _nominal(prior: Prior) -> Prior:
@@ -313,7 +328,8 @@ def _fitted(later: Later, state: State, names: Sequence[Which]) -> list[int]:
 def covariance(later: Later, state: State) -> Array:
     """Return the covariance of the nominal numbers and those of the effects, in their own units.
 
-    That of white noise of unit variance, P⁻¹; of a number that blocks of time together tell worse,
+    That of white noise of unit variance, P⁻¹, which the residual of plain rows is not; of a number
+    that blocks of time together tell worse,
     by the scores of the blocks, P⁻¹ Σ_b J_b r_b r_bᵀ J_bᵀ P⁻¹ (White 1980; Liang & Zeger 1986).
     Numbers that the rows do not tell have the variance 0.
     """

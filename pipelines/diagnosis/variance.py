@@ -117,7 +117,7 @@ def settle(
 
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
-        fit: (rows,) [N m] torque of all that was fitted with them, of which the noise is the rest.
+        fit: (rows,) [N m] torque of all that was fitted; the noise is what it leaves of the rows.
         reference: rows and columns of the reference that were settled before.
     """
 

@@ -100,5 +100,5 @@ def test_no_link_mends_what_a_law_of_friction_leaves() -> None:
 
 @pytest.mark.slow
 def test_a_lag_is_no_lag_of_another_length() -> None:
-    """Columns of a lag of 10 ms, times a fifth, are none of 2 ms: a loop that answers coarse encoders looks like that."""
+    """A fifth of the columns of a lag of 10 ms explained what a loop with coarse encoders does; it is no lag of 2 ms."""
     assert causes(diagnosed(*drawn(10, 45)[-1].logs())) == []

@@ -40,13 +40,21 @@ class TorqueLag(Effect):
         tau, time = self.own(predicted(arm, motion)), self.looked_for
         change = -rate_of_change(tau, motion.t)
         if time > 0.0:
-            change = (lagging(tau, motion.t, time, None, motion.since) - tau) / time
+            change = (lagging(tau, motion.t, time, self._start(motion), motion.since) - tau) / time
         return self.on_own_row(arm, change)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """The limit, and long lags: a torque that turns within one of these is no longer its Taylor series."""
         for time in _LOOKED_FOR:
             yield replace(self, looked_for=time)
+
+    def forms(self) -> tuple[Self, ...]:
+        """Return the lag of any length."""
+        return (replace(self, looked_for=0.0),)
+
+    def _start(self, motion: Motion) -> float | None:
+        """The torque [N m] that the log shows first, where it was measured."""
+        return None if motion.logged is None else float(self.own(motion.logged))
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque goes through the low-pass H, other effects included: y = H τ = τ - T H dτ/dt.
@@ -57,9 +65,10 @@ class TorqueLag(Effect):
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
         time, own, t = values["time_constant"], self.own(tau), motion.t
         long = len(t) > 1 and time > _LONG * float(np.median(np.diff(t)))
-        start = None if motion.logged is None else float(self.own(motion.logged))
-        late = lagging(own, t, time, start, motion.since) if long else own - time * lagging(rate_of_change(own, t), t, time)
-        tau[:, self._index] = late
+        if long:
+            tau[:, self._index] = lagging(own, t, time, self._start(motion), motion.since)
+        else:
+            tau[:, self._index] = own - time * lagging(rate_of_change(own, t), t, time)
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
