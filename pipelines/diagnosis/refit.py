@@ -305,10 +305,10 @@ class Later:
     def possible(self, state: State, explained: float, config: DiagnosisConfig) -> bool:
         """Return whether the last effect can be a cause with its numbers and their deviations.
 
-        An amplitude outside its range may be within it by its standard deviation, and one that
-        surely is as slight as in any arm is no cause; a number of a shape that is held at the end
-        of its range has its best value outside. What it costs to be in its range,
-        (distance / std)², may be a share of what the effect explains, for no law is exact.
+        An amplitude outside its range may be within it by its standard deviation, but not by the
+        other sign, and one that surely is as slight as in any arm is no cause; a number of a shape
+        that is held at the end of its range has its best value outside. What it costs to be in its
+        range, (distance / std)², may be a share of what the effect explains, for no law is exact.
 
         Args:
             explained: cost that the effect saves.
@@ -334,7 +334,8 @@ class Later:
             for way in np.outer((-reach, reach), _TRIED).ravel():
                 amplitudes = np.array(last.amplitudes)
                 amplitudes[int(name)] += way
-                within |= last.effect.possible(last.effect.values(amplitudes))
+                if amplitudes[int(name)] * last.amplitudes[int(name)] > 0.0:
+                    within |= last.effect.possible(last.effect.values(amplitudes))
         return within
 
     def _mostly_acting(self, effect: Effect) -> bool:

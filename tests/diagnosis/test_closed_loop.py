@@ -99,6 +99,13 @@ def test_no_link_mends_what_a_law_of_friction_leaves() -> None:
 
 
 @pytest.mark.slow
+def test_no_record_is_ahead_of_its_drive() -> None:
+    """A drive that is 5.9 ms late was one of 3.1 ms, and its log 3.1 ms early, which no log is."""
+    found = diagnosed(*drawn(13, 46)[-1].logs())
+    assert causes(found) == [("drive_lag", 1)]
+
+
+@pytest.mark.slow
 def test_a_lag_is_no_lag_of_another_length() -> None:
     """A fifth of the columns of a lag of 10 ms explained what a loop with coarse encoders does; it is no lag of 2 ms."""
     assert causes(diagnosed(*drawn(10, 45)[-1].logs())) == []
