@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from benchmarks.other_plants.drawn import drawn
 from benchmarks.torque_boundary import KINDS, judged
+from pipelines.estimation.checks.boundary import torque_boundary
 from tests.seeds import rarely, usually
 
 SEEDS = (pytest.param(103, marks=pytest.mark.slow), 108)
@@ -38,3 +40,11 @@ def test_no_field_is_wrong_and_what_is_told_is_what_was_logged(seed: int, kind: 
 )
 def test_a_fault_of_the_arm_is_no_mistake_of_its_description(fault: str) -> None:
     assert judged(108, "whole", fault)["alarms"] == []
+
+
+@pytest.mark.slow
+def test_a_torque_that_dithers_is_no_magnitude() -> None:
+    """A drive at 2 kHz answers its coarse encoder by a fifth of a torque that is rarely negative."""
+    found = torque_boundary(list(drawn(6, 46)[-1].logs()))
+    assert found is not None
+    assert found.sign == "signed"

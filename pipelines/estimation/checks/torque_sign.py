@@ -25,8 +25,9 @@ _STANDING = 0.05  # of its RMS: a joint that is slower may stand, held by its br
 
 
 def touches_of_zero(logs: Sequence[Usable], config: BoundaryConfig) -> tuple[int | None, ...]:
-    """Return how often each joint's torque comes down to zero from above; None where it is negative
-    as well.
+    """Return how often each joint's torque comes down to zero from above.
+
+    None where it is negative as well, or its noise hides whether it is.
     """
     joints = logs[0].log.n_joints
     return tuple(
@@ -49,6 +50,8 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
         # of white noise the second difference has six times the variance
         noise = 1.4826 * _finite_median(np.abs(np.diff(tau, 2))) / np.sqrt(6.0)
         level = config.no_negative * noise
+        if level > _FAR * size and np.nanmin(tau) < 0.0:  # such noise would hide a sign
+            return None
         if np.nansum(tau < -max(level, 1e-6 * size)) > max(2.0, 1e-3 * tau.size):
             return None
         # a magnitude is reflected at zero: it arrives there within one step of its own
