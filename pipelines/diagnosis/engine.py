@@ -51,7 +51,7 @@ class Look:
         """Return the causes in rows whose noise is known, beside those found before.
 
         Args:
-            usual: what reference logs told before; None: it is to be found.
+            usual: prior and baseline, where reference logs have given them; None: compute them.
         """
         prior, known = usual or _usual(dataset, dictionary, config)
         later = Later.of(dataset, dictionary, prior, config)
@@ -59,7 +59,7 @@ class Look:
 
     @property
     def usual(self) -> tuple[Prior, Baseline] | None:
-        """What the reference logs tell, which further looks do not change; None without them."""
+        """Prior and baseline of the reference logs, equal in all looks; None without these."""
         alone = self.later.dataset.reference is None
         return None if alone else (self.later.prior, self.baseline)
 
@@ -144,7 +144,7 @@ def diagnose_prepared(
             break
         del last  # its columns take the memory that the next ones need
         last, known = Look.of(dataset, dictionary, named, config, found, usual), len(found.causes)
-    last = replace(last, selection=last.selection.told_apart)
+    last = replace(last, selection=last.selection.without_selected_alternatives)
     decision = decide(last.later, last.selection, last.baseline, config)
     return Diagnosis(decision, last, responses, config)
 

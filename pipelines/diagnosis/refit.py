@@ -37,7 +37,7 @@ _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has se
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """What is kept of a model that was fitted."""
+    """A fitted model, its cost and its residual."""
 
     model: Exact
     cost: float
@@ -217,14 +217,9 @@ class Later:
         keys = [k for k, f in self.dictionary.families.items() if _passes_on(f.shapes, acting)]
         if not keys:
             return self
-        parts, candidates, cross = [], self.candidates, self.cross.copy()
-        for key in keys:
-            for laid in lay_family(self.rows.data, self.dictionary.families[key], model.arm):
-                shapes, width, _ = laid.table.shape
-                table = laid.table.reshape(shapes * width, -1)
-                parts.append(self.rows.table(table, laid.rows).compact())
+        candidates, cross = self.candidates, self.cross.copy()
         own = [g for key in keys for g in self.dictionary.groups if g.key == key]
-        new, at = Table.stacked(parts), np.concatenate([g.columns for g in own])
+        new, at = self._laid(keys, model), np.concatenate([g.columns for g in own])
         rest = np.setdiff1d(np.arange(candidates.width), at)
         back = np.argsort(np.r_[rest, at])
         candidates = Table.stacked([candidates.take(rest), new]).take(back)
@@ -237,6 +232,16 @@ class Later:
                 square = there.gram(there)
             squares.append(square)
         return replace(self, candidates=candidates, cross=cross, squares=tuple(squares))
+
+    def _laid(self, keys: Sequence[Key], model: Exact) -> Table:
+        """Return the columns of every shape of some causes, beside the effects of a model."""
+        parts = []
+        for key in keys:
+            for laid in lay_family(self.rows.data, self.dictionary.families[key], model.arm):
+                shapes, width, _ = laid.table.shape
+                table = laid.table.reshape(shapes * width, -1)
+                parts.append(self.rows.table(table, laid.rows).compact())
+        return Table.stacked(parts)
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""
@@ -467,8 +472,9 @@ class Later:
     def beside(self, belief: Belief, effect: Effect) -> Belief:
         """Return the belief for a model that contains an effect.
 
-        Without reference logs a friction law, or a drift of friction, cannot be told from the form
-        of friction at its joint, which is free: that and the other laws are held at their mean.
+        Without reference logs a friction law, or a drift of friction, cannot be distinguished from
+        the form of friction at its joint, which is free: that and the other laws are held at their
+        mean.
         """
         law = isinstance(effect, FrictionLaw) or effect.clock == "session"
         if law and self.dataset.reference is None:

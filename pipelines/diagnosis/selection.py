@@ -59,7 +59,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class CandidateFit:
-    """What is kept of a candidate."""
+    """A candidate and its fit."""
 
     key: Key
     fit: Fit
@@ -89,7 +89,7 @@ class Selection:
     moment: str = ""  # what stands out at one moment, and no event explains
 
     @property
-    def told_apart(self) -> Selection:
+    def without_selected_alternatives(self) -> Selection:
         """The same without alternatives that are causes: backward elimination kept both."""
         keys = {one.key for one in self.causes}
         new = {
@@ -102,6 +102,7 @@ class Selection:
 
     @property
     def found(self) -> SearchStart:
+        """The selected causes, for a further search."""
         rounds = tuple(one for one in self.rounds if one.cause is not None)
         return SearchStart(self.causes, self.end.model, rounds)
 
@@ -122,7 +123,7 @@ class Round:
 
 @dataclass(frozen=True, eq=False)
 class SearchStart:
-    """What a further search begins with."""
+    """The causes and the model from which a further search starts."""
 
     causes: tuple[Cause, ...]
     model: Exact

@@ -117,7 +117,7 @@ def settle(
 
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
-        fit: (rows,) [N m] torque of all that was fitted; the noise is what it leaves of the rows.
+        fit: (rows,) [N m] torque of the whole fitted model; the residual of the rows is the noise.
         reference: rows and columns of the reference that were settled before.
     """
 

@@ -141,7 +141,7 @@ def test_a_place_that_is_taken_is_refused_before_the_arm_is_simulated(tmp_path: 
 
 
 def test_nothing_is_told_after_a_simulation_that_failed(tmp_path: Path) -> None:
-    """The clock that tells of a long step ends with the command."""
+    """The thread that reports a long step ends with the command."""
     before = set(threading.enumerate())
     done = rrrid("demo", *QUICK, "--fault", "joint_elasticity:2:stiffness=2000", cwd=tmp_path)
     assert done.returncode != 0
