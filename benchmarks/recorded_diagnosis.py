@@ -91,7 +91,7 @@ def searched(prepared: Prepared, most: int, exclude: Sequence[str] = ()) -> Look
 def judged(what: str, prepared: Prepared, look: Look, judge: Data, seconds: float) -> Judged:
     """Return what the models of a search, without its standing dictionary, leave of `judge`."""
     effects, standing = look.selection.end.model.effects, Standing(look.later.dataset.model)
-    trained = train(replace(prepared, judge=judge), look.later, effects, _FOLDS, standing, DiagnosisConfig())
+    trained = train(replace(prepared, judge=judge), look.later, effects, _FOLDS, standing)
     names = ["nominal", *(place(one.effect.name, one.effect.joint) for one in effects)]
     steps = []
     for k, name in enumerate(names):

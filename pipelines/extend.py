@@ -154,9 +154,9 @@ def _kept(arm: Arm | None) -> list[Wanted]:
 
 
 def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
-    """What `diagnose` named, within `run`; what happened once has no place in a model, nor what did harm there."""
+    """What `diagnose` named, within `run`; what happened once has no place in a model."""
     named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings
-             if diagnosed.verdict == "cause" and not one.doubt and not _once(find_effect(one.cause))]
+             if diagnosed.verdict == "cause" and not _once(find_effect(one.cause))]
     if not named:
         raise NothingMatched("C06", f"{_found_instead(diagnosed)}: there is nothing to extend the model by", where=label,
                              remedy="to try a cause all the same, name it: rrrid extend LOGS --with CAUSE:JOINT")
@@ -170,7 +170,7 @@ def _found_instead(diagnosed: Diagnosed) -> str:
     if diagnosed.verdict == "cannot-judge":
         return "diagnose cannot judge these logs"
     if diagnosed.findings:
-        return "what diagnose found happens once, or is in doubt, and has no place in a model"
+        return "what diagnose found happens once, and has no place in a model"
     changed = diagnosed.question == "what has changed"
     return f"diagnose found nothing {'that has changed since the reference logs' if changed else 'wrong'}"
 

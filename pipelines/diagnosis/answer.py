@@ -11,18 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import Key
 from pipelines.diagnosis.compliance import gaps_untold, untold
 from pipelines.diagnosis.decision import limited_by_estimate
 from pipelines.diagnosis.engine import Diagnosis as Found
 from pipelines.diagnosis.figures import evidence, with_simulation
-from pipelines.diagnosis.findings import (
-    Worth,
-    alternatives_of,
-    extension_of,
-    findings_of,
-    weigh,
-)
+from pipelines.diagnosis.findings import Worth, alternatives_of, extension_of, findings_of, weigh
 from pipelines.diagnosis.limits import Limits, limits_of, without_limit
 from pipelines.diagnosis.result import (
     Diagnosis,
@@ -35,7 +28,7 @@ from pipelines.diagnosis.result import (
     Verdict,
 )
 from pipelines.diagnosis.screening import best_of
-from pipelines.diagnosis.selection import CandidateFit, Cause
+from pipelines.diagnosis.selection import Cause
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import Trained, told, train
 from pipelines.diagnosis.words import beside, how_much, taken_in, where
@@ -47,11 +40,6 @@ from pipelines.model.words import within
 
 __all__ = ["WEAKER", "answer"]
 
-_VERDICTS: dict[str, Verdict] = {
-    "cause": "cause",
-    "no-fault-found": "no-fault-found",
-    "unknown": "unknown",
-}
 _UNNAMED = {
     r"ripple (\d+):(\d+)": r"a torque ripple of joint \2, \1 a turn,",
     r"spline of q:(\d+)": r"a curve over the position of joint \1",
@@ -82,26 +70,15 @@ def answer(
         exclude: causes that were not considered.
     """
     tell("weighing what was found, and what these logs would have shown")
-    end = found.look.selection.end
+    look, reference = found.look, prepared.reference is not None
     causes, worth, worse = _worth(prepared, found, blocks, whole)
-    trained, last, floor = worth.trained, len(causes), worth.floor
-    rounds = found.look.selection.rounds
-    own = [next(one for one in rounds if one.cause is cause) for cause in causes]
-    named_causes = [
-        (cause.probability[cause.key], alternatives_of(one))
-        for cause, one in zip(causes, own, strict=True)
-    ]
-    findings = findings_of(worth, found.look.later, end, named_causes, found.responses)
-    limits = (
-        limits_of(found.look.later, end, found.look.baseline, found.config)
-        if whole
-        else Limits((), ())
-    )
-    open_to = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
-    named = {one.cause for one in findings}
-    reference = prepared.reference is not None
-    verdict = "unknown" if worse and not causes else _VERDICTS[found.decision.verdict]
+    own = {id(one.cause): alternatives_of(one) for one in look.selection.rounds}
+    named = [(one.probability[one.key], own[id(one)]) for one in causes]
+    findings = findings_of(worth, look.later, look.selection.end, named, found.responses)
+    verdict = "unknown" if worse and not causes else found.decision.verdict
     reason = "; ".join(one for one in (worse, _plain(found.decision.reason)) if one)
+    limits = _limits(found, findings, exclude) if whole else Limits((), ())
+    trained, last = worth.trained, len(causes)
     told_of = Diagnosis(
         verdict,
         _sentence(verdict, reason, findings, trained, found),
@@ -109,7 +86,7 @@ def answer(
         worth.standing,
         _rejected(found, causes, worse),
         limits.detection_limits,
-        (*limits.not_identifiable, *(one for one in open_to if whole and one.cause not in named)),
+        limits.not_identifiable,
         worth.rms(0),
         "what has changed" if reference else "what is wrong",
         "blocks" if prepared.judge is None else "logs",
@@ -118,7 +95,7 @@ def answer(
         worth.rms(last),
         _ledger(found),
         _thresholds(found, f"parts of {'the reference' if reference else 'these'} logs"),
-        (evidence(trained.models[0], floor),) if whole else (),
+        (evidence(trained.models[0], worth.floor),) if whole else (),
         trained.arm(0),
         trained.arm(last),
         fewer_terms=prepared.fewer,
@@ -131,6 +108,15 @@ def answer(
     return told_of, extension_of(prepared, worth, findings) if verdict == "cause" else None
 
 
+def _limits(found: Found, findings: Sequence[Finding], exclude: Sequence[str]) -> Limits:
+    """Return the limits of the causes without a finding, and what responses leave open."""
+    look, named = found.look, {one.cause for one in findings}
+    limits = limits_of(look.later, look.selection.end, look.baseline)
+    left = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
+    more = (one for one in left if one.cause not in named)
+    return replace(limits, not_identifiable=(*limits.not_identifiable, *more))
+
+
 def _worth(
     prepared: Prepared, found: Found, blocks: int, whole: bool
 ) -> tuple[tuple[Cause, ...], Worth, str]:
@@ -140,9 +126,9 @@ def _worth(
     held-out log is predicted worse than by the nominal model has no name.
     """
     causes = found.decision.causes
-    standing = standing_of(prepared.reference, found.look.later, found.config)
+    standing = standing_of(prepared.reference, found.look.later)
     effects = found.look.selection.end.model.effects if causes else ()
-    trained = train(prepared, found.look.later, effects, blocks, standing, found.config)
+    trained = train(prepared, found.look.later, effects, blocks, standing)
     worth, why = weigh(prepared, trained, standing, whole), ""
     while causes:
         worse = worse_log(trained.data, worth.left[0], worth.left[len(causes)])
@@ -180,23 +166,16 @@ def _sentence(
 def _others(first: Finding, found: Found) -> list[str]:
     """Return the alternatives of a finding, each with its number."""
     keys = {(one.cause, one.joint) for one in first.alternatives}
-    own = [one for one in found.look.selection.rounds if one.cause is not None]
-    same = [one for one in own if one.cause and one.cause.key == (first.cause, first.joint)]
-    return [
-        f"{within(effect.effect.words.title)}{how_much(like)}{where(like)}"
-        for one in same[:1]
-        for candidate in one.tried
-        if candidate.key in keys
-        for effect, like in [_like(first, candidate)]
-    ]
-
-
-def _like(first: Finding, candidate: CandidateFit) -> tuple[Acting, Finding]:
-    one = candidate.fit.model.effects[-1]
-    other = Acting.of(one.effect, one.values)
-    cause, joint = candidate.key
-    numbers: dict[str, Value] = told(other)
-    return other, replace(first, cause=cause, joint=joint, parameters=numbers, log=None)
+    every = (one for one in found.look.selection.rounds if one.cause is not None)
+    own = next((r for r in every if r.cause and r.cause.key == (first.cause, first.joint)), None)
+    out = []
+    for (cause, joint), fit in ({} if own is None else own.tried).items():
+        if (cause, joint) in keys:
+            one = fit.model.effects[-1]
+            numbers: dict[str, Value] = told(Acting.of(one.effect, one.values))
+            like = replace(first, cause=cause, joint=joint, parameters=numbers, log=None)
+            out.append(f"{within(one.effect.words.title)}{how_much(like)}{where(like)}")
+    return out
 
 
 def _plain(reason: str) -> str:
@@ -215,14 +194,18 @@ def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Reject
     named = {one.key for one in causes}
     doubtful = {one.key for one in found.look.selection.causes} - named
     alike = {key for one in causes for key in one.alternatives}
-    out: dict[Key, Rejected] = {}
-    for one in found.look.selection.rounds:
-        for trial in one.tried:
-            if trial.key not in named | alike:
-                doubt = found.decision.reason if trial.key in doubtful else ""
-                why = _plain(one.stopped) or worse or _plain(doubt) or _WORSE
-                out[trial.key] = Rejected(*trial.key, why)
-    return tuple(out.values())
+    why = {
+        key: worse or (_plain(found.decision.reason) if key in doubtful else "") or _WORSE
+        for one in found.look.selection.rounds
+        for key in one.tried
+    }
+    why |= {
+        key: _plain(one.stopped)
+        for one in found.look.selection.rounds
+        if one.stopped
+        for key in one.tried
+    }
+    return tuple(Rejected(*key, said) for key, said in why.items() if key not in named | alike)
 
 
 def _ledger(found: Found) -> tuple[Trial, ...]:
@@ -230,35 +213,20 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
     rows, out = found.look.later.rows.count, []
     for step, one in enumerate(found.look.selection.rounds, 1):
         power = one.before.cost
-        exact = {trial.key: 1.0 - trial.fit.cost / power for trial in one.tried}
-        alike = () if one.cause is None else one.cause.alternatives
+        exact = {key: 1.0 - fit.cost / power for key, fit in one.tried.items()}
+        reasons = dict.fromkeys(exact, _plain(one.stopped) or _WORSE)
+        if one.cause is not None:
+            reasons |= dict.fromkeys(one.cause.alternatives, _ALIKE)
+        if one.cause is not None and one.cause in found.decision.causes:
+            reasons[one.cause.key] = _ACCEPTED
         for screened in sorted(one.significant, key=lambda s: -s.gain):
             key, group = screened.group.key, screened.group
             if group.kind == "unnamed":
                 continue
-            accepted = one.cause in found.decision.causes and one.cause.key == key
-            reason = (
-                _ACCEPTED
-                if accepted
-                else _ALIKE
-                if key in alike
-                else WEAKER
-                if key not in exact
-                else _plain(one.stopped) or _WORSE
-            )
             bound = found.look.baseline.threshold(group, screened.freedom, rows)
-            out.append(
-                Trial(
-                    step,
-                    *key,
-                    screened.gain / power,
-                    bound / power,
-                    np.nan,
-                    exact.get(key, np.nan),
-                    accepted,
-                    reason,
-                )
-            )
+            gains = (screened.gain / power, bound / power, exact.get(key, np.nan))
+            reason = reasons.get(key, WEAKER)
+            out.append(Trial(step, *key, *gains, reason == _ACCEPTED, reason))
     return tuple(out)
 
 

@@ -150,11 +150,7 @@ class _Parts:
         cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
         squares = [own[after].sum(axis=0) for own in self.squares]
         found = screen(
-            self.groups,
-            known,
-            cross,
-            squares,
-            self.moments[after].sum(axis=0) - cross.T @ mean,
+            self.groups, known, cross, squares, self.moments[after].sum(axis=0) - cross.T @ mean
         )
         cost = self.powers[after].sum() - (moment + own) @ mean
         cost += expected @ moment

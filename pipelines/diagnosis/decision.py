@@ -1,6 +1,6 @@
 """Decide: a cause, none, unknown, or that the logs cannot show it.
 
-    decision = decide(later, selection, baseline, config)
+    decision = decide(later, selection, baseline)
     result = limited_by_estimate(result, prepared)         the verdict "cannot-judge"
     common, differing = Repeated.of(data).parts(left)      what is noise, and what is not
 
@@ -23,12 +23,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.diagnosis.baseline import Baseline
-from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.events import DIRECTIONS
 from pipelines.diagnosis.refit import Later, State
-from pipelines.diagnosis.result import Diagnosis
+from pipelines.diagnosis.result import Diagnosis, Verdict
 from pipelines.diagnosis.score import chi2_bound
-from pipelines.diagnosis.selection import Cause, Selection
+from pipelines.diagnosis.selection import Cause, Round, Selection
 from pipelines.diagnosis.table import Array
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.estimate import Estimate, estimate
@@ -99,24 +98,22 @@ class Repeated:
 class Decision:
     """The verdict, and why."""
 
-    verdict: str  # "cause" | "no-fault-found" | "unknown"
+    verdict: Verdict  # "cause", "no-fault-found" or "unknown"
     reason: str
     causes: tuple[Cause, ...]
 
 
-def decide(
-    later: Later, selection: Selection, baseline: Baseline, config: DiagnosisConfig
-) -> Decision:
+def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
     """Return the verdict by significance and goodness of fit.
 
     Causes lose their names where they explain less than half of what is more than noise at the
     joints on which they act. What is left at others is told beside them.
     """
-    causes, end = selection.causes, selection.end
+    causes, end, config = selection.causes, selection.end, later.config
     left = end.mean_squares * later.dataset.noise_ratio
     bound = max(config.excess * max(1.0, baseline.usual_fit), baseline.worst_fit)
-    missing, (followed, shapes) = _missing(later, end, config), _followed(later, selection, config)
-    rest = _rest(later, selection, missing, shapes, left, bound, config)
+    missing, (followed, shapes) = _missing(later, end), _followed(later, selection)
+    rest = _rest(later, selection.rounds[-1], missing, shapes, left, bound)
     if causes:
         power = np.array([float(y @ y) for y in later.rows.y])
         too_much = np.where(left < bound, 0.0, left - baseline.usual_fit) * _counts(end)
@@ -126,7 +123,7 @@ def decide(
         if explained < config.share:
             reason = f"{causes[0].key[0]} explains {explained:.0%} of the excess residual"
             return Decision("unknown", reason, ())
-        if wandering := _confused(later, end, config):
+        if wandering := _confused(later, end):
             first = min(wandering)  # effects that were selected earlier do not depend on it
             rest, causes = wandering[first], causes[:first]
         if not causes:
@@ -137,7 +134,7 @@ def decide(
     fits = max(float(left.max()), end.cost / later.rows.count) < bound
     if not rest and fits:
         return Decision("no-fault-found", "", ())
-    told = (rest or _too_large(left, bound), selection.stopped)
+    told = (rest or _too_large(left, bound), selection.rounds[-1].stopped)
     return Decision("unknown", "; ".join(one for one in told if one), ())
 
 
@@ -164,16 +161,10 @@ def _explained(later: Later, selection: Selection, beyond: Array, strained: bool
 
 
 def _rest(
-    later: Later,
-    selection: Selection,
-    missing: Array,
-    shapes: Sequence[str],
-    left: Array,
-    bound: float,
-    config: DiagnosisConfig,
+    later: Later, last: Round, missing: Array, shapes: Sequence[str], left: Array, bound: float
 ) -> str:
     """Return what the model leaves that is more than noise; "" where it is none."""
-    more = f"; it follows {selection.follows}" if selection.follows else ""
+    more = f"; it follows {last.follows}" if last.follows else ""
     if missing.any():
         return (
             f"{missing.max():.1%} of the torque of joint {int(missing.argmax()) + 1} comes again "
@@ -183,10 +174,10 @@ def _rest(
         return shapes[0]
     if left.max() >= bound:
         return _too_large(left, bound) + more
-    if selection.moment:
-        return selection.moment
+    if last.moment:
+        return last.moment
     slow = _wandering(later)
-    return _wanders(slow) if slow.max() > config.misfit else ""
+    return _wanders(slow) if slow.max() > later.config.misfit else ""
 
 
 def _wanders(slow: Array) -> str:
@@ -203,7 +194,7 @@ def _too_large(left: Array, bound: float) -> str:
     )
 
 
-def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
+def _missing(later: Later, state: State) -> Array:
     """Return the share of each joint's torque (joints,) that no noise is and the model leaves.
 
     With reference logs it may have been there before, and their residual is what is usual. Without
@@ -212,7 +203,7 @@ def _missing(later: Later, state: State, config: DiagnosisConfig) -> Array:
     """
     from scipy.stats import f as f_law
 
-    rows = later.rows
+    rows, config = later.rows, later.config
     if later.dataset.reference is not None:
         return np.zeros(rows.n_joints)
     left = np.empty(rows.count)
@@ -247,14 +238,14 @@ def _torque_squared(later: Later) -> Array:
     return np.asarray(np.mean(measured**2, axis=1))
 
 
-def _confused(later: Later, end: State, config: DiagnosisConfig) -> dict[int, str]:
+def _confused(later: Later, end: State) -> dict[int, str]:
     """Return {index of the effect: reason} of effects that wandering torque may look like.
 
     In closed loop the drive answers such a torque a moment later, and so do the motion and its
     record (Ljung 1999, 13.4): only a load is told from it that comes again with the motion, or is
     larger, at its moment, than chance makes it.
     """
-    slow = _wandering(later)
+    slow, config = _wandering(later), later.config
     if slow.max() <= config.misfit:
         return {}
     lasting = slow**2 * _torque_squared(later)  # variance of means over a block
@@ -274,16 +265,14 @@ def _confused(later: Later, end: State, config: DiagnosisConfig) -> dict[int, st
     return found
 
 
-def _followed(
-    later: Later, selection: Selection, config: DiagnosisConfig
-) -> tuple[Array, tuple[str, ...]]:
+def _followed(later: Later, selection: Selection) -> tuple[Array, tuple[str, ...]]:
     """Return what shapes without a name would take off each joint (joints,), and which they are.
 
     Without reference logs, and of a relevant part of a joint's torque; with them it may have been
     there before.
     """
     taken = np.zeros(later.rows.n_joints)
-    if later.dataset.reference is not None or not selection.rounds:
+    if later.dataset.reference is not None:
         return taken, ()
     power, told = [float(y @ y) for y in later.rows.y], []
     for one in sorted(selection.rounds[-1].significant, key=lambda s: -s.gain):
@@ -291,7 +280,7 @@ def _followed(
         if one.group.kind != "unnamed" or joint is None or taken[joint - 1]:
             continue
         share = np.sqrt(one.gain / power[joint - 1])
-        if share > config.misfit:
+        if share > later.config.misfit:
             taken[joint - 1] = one.gain
             told.append(f"{share:.1%} of the torque of joint {joint} follows {name}:{joint}")
     return taken, tuple(told)

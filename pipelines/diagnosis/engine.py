@@ -55,7 +55,7 @@ class Look:
         """
         prior, known = usual or _usual(dataset, dictionary, config)
         later = Later.of(dataset, dictionary, prior, config)
-        return cls(later, known, select(later, known, responses, config, found))
+        return cls(later, known, select(later, known, responses, found))
 
     @property
     def usual(self) -> tuple[Prior, Baseline] | None:
@@ -96,7 +96,6 @@ class Diagnosis:
     decision: Decision
     look: Look
     responses: Compliance | None  # None: there are no frequency responses
-    config: DiagnosisConfig
 
 
 def diagnose(
@@ -145,8 +144,8 @@ def diagnose_prepared(
         del last  # its columns take the memory that the next ones need
         last, known = Look.of(dataset, dictionary, named, config, found, usual), len(found.causes)
     last = replace(last, selection=last.selection.without_selected_alternatives)
-    decision = decide(last.later, last.selection, last.baseline, config)
-    return Diagnosis(decision, last, responses, config)
+    decision = decide(last.later, last.selection, last.baseline)
+    return Diagnosis(decision, last, responses)
 
 
 def _new(

@@ -40,11 +40,7 @@ class Window:
 
 
 def _standing_out(
-    rows: Rows,
-    dictionary: Dictionary,
-    arm: Arm,
-    residual: Sequence[Array],
-    config: DiagnosisConfig,
+    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], config: DiagnosisConfig
 ) -> Window | None:
     """Return the best window on a residual (rows of each joint), None where it may be noise.
 
@@ -75,11 +71,7 @@ def _standing_out(
 
 
 def push_of(
-    rows: Rows,
-    dictionary: Dictionary,
-    arm: Arm,
-    residual: Sequence[Array],
-    config: DiagnosisConfig,
+    rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], config: DiagnosisConfig
 ) -> tuple[Window | None, str]:
     """Return the push that stands out, or what does and is none.
 

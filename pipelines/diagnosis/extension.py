@@ -55,14 +55,14 @@ def extend(
         usable(later.dictionary.families.get(key), one, model.columns.laws, revolute)
     responses = compliance(prepared.logs.frf, model.nominal)
     named = {one.place: one for one in (responses.named if responses else ())}
-    standing = standing_of(prepared.reference, later, config)
+    standing = standing_of(prepared.reference, later)
     refused: list[Rejected] = []
     left = list(wanted)
     while True:
-        state, taken, impossible = _fitted(later, left, named, config)
+        state, taken, impossible = _fitted(later, left, named)
         refused += impossible
         left = taken
-        trained = train(prepared, later, state.model.effects, blocks, standing, config)
+        trained = train(prepared, later, state.model.effects, blocks, standing)
         worth = weigh(prepared, trained, standing, whole=True)
         doubts = [_doubt(worth, place) for place in range(len(left))]
         if not any(doubts):
@@ -76,17 +76,14 @@ def extend(
 
 
 def _fitted(
-    later: Later,
-    wanted: Sequence[Wanted],
-    responses: dict[str, Acting],
-    config: DiagnosisConfig,
+    later: Later, wanted: Sequence[Wanted], responses: dict[str, Acting]
 ) -> tuple[State, list[Wanted], list[Rejected]]:
     """Return the model with the causes fitted, the greatest first, those in order, and the rest."""
     state, left = later.start(), list(wanted)
     taken: list[Wanted] = []
     impossible: list[Rejected] = []
     while left:
-        tried = [(one, _tried(later, state, one, responses.get(one.place), config)) for one in left]
+        tried = [(one, _tried(later, state, one, responses.get(one.place))) for one in left]
         good = [(one, done) for one, done in tried if done is not None and done.possible]
         for one, done in tried:
             if done is None or not done.possible:
@@ -100,18 +97,14 @@ def _fitted(
     return state, taken, impossible
 
 
-def _tried(
-    later: Later, state: State, one: Wanted, known: Acting | None, config: DiagnosisConfig
-) -> Candidate | None:
+def _tried(later: Later, state: State, one: Wanted, known: Acting | None) -> Candidate | None:
     """Return a cause fitted from its best shape, or from the numbers that responses give it."""
-    key = (one.effect.name, one.effect.joint)
     if known is not None:
         effect = known.effect.at(known.values)
-        return refit(later, state, key, effect, effect.amplitudes(known.values), config)
-    best = best_of(later.screened(state))[key]
+        return refit(later, state, effect, effect.amplitudes(known.values))
+    best = best_of(later.screened(state))[one.effect.name, one.effect.joint]
     start: dict[str, Any] = dict(one.start)
-    effect = later.dictionary.families[key].shapes[best.group.shape].forms()[0]
-    return refit(later, state, key, replace(effect, **start), best.amplitudes, config)
+    return refit(later, state, replace(later.form(best.group), **start), best.amplitudes)
 
 
 def _doubt(worth: Worth, place: int) -> str:

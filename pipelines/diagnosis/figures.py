@@ -167,11 +167,6 @@ def evidence(done: Refined, floor: Array) -> Evidence:
             curves.append(Curve(joint + 1, one.name, one.unit, *curve))
         spectra += _spectra(data, left, joint)
     every = max(1, -(-len(measured) // _SERIES))
-    joints = [data.joint == j for j in range(n)]
-    r, y, torque = (np.array([x[own] for own in joints]) for x in (left, data.y, predicted))
-    with np.errstate(invalid="ignore"):
-        correlation = np.nan_to_num(np.corrcoef(r, y)[:n, n:])
-    mixed = np.linalg.lstsq(torque.T, y.T, rcond=None)[0].T
     return Evidence(
         data.logs[0].log.name,
         data.logs[0].t[::every],
@@ -184,8 +179,6 @@ def evidence(done: Refined, floor: Array) -> Evidence:
         tuple(spectra),
         np.clip(1.0 - np.square(floor / done.rms), 0.0, 1.0),
         _bands(spectra, n),
-        correlation,
-        mixed,
     )
 
 

@@ -33,10 +33,7 @@ from pipelines.diagnosis.trained import Standing, Trained, covariance, parameter
 from pipelines.model.arm import Acting
 from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared
-from pipelines.model.simulation.comparison import (
-    Simulation,
-    simulation_errors,
-)
+from pipelines.model.simulation.comparison import Simulation, simulation_errors
 
 __all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "gain_of", "weigh"]
 
@@ -114,7 +111,7 @@ def findings_of(
     """
     if not causes:
         return ()
-    _, names = later.slopes(end)
+    _, names = later.slopes(end.model)
     every = Refined(
         end.model,
         later.rows.data,
@@ -221,12 +218,11 @@ def alternatives_of(own: Round) -> tuple[Alternative, ...]:
         return np.concatenate([a - b for a, b in parts])
 
     mine, out, probability = taken(own.after), list[Alternative](), own.cause.probability
-    for one in own.tried:
-        if one.key in own.cause.alternatives:
-            theirs = taken(one.fit)
-            size = float(np.linalg.norm(mine) * np.linalg.norm(theirs))
-            similarity = float(mine @ theirs) / max(size, 1e-300)
-            out.append(Alternative(*one.key, similarity, probability[one.key]))
+    for key in own.cause.alternatives:
+        theirs = taken(own.tried[key])
+        size = float(np.linalg.norm(mine) * np.linalg.norm(theirs))
+        similarity = float(mine @ theirs) / max(size, 1e-300)
+        out.append(Alternative(*key, similarity, probability[key]))
     return tuple(sorted(out, key=lambda one: -one.probability))
 
 

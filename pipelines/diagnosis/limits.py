@@ -1,6 +1,6 @@
 """Compute detection limits in closed form, and list causes that are not identifiable.
 
-    limits = limits_of(later, state, baseline, config)
+    limits = limits_of(later, state, baseline)
     causes = without_limit(result, frf)            those that no list of the result has
 
 A cause of amplitude a adds a² h to T_c, h its share of H_c (`screening`). It is found with
@@ -23,7 +23,6 @@ import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group, Key
-from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import (
     DetectionLimit,
@@ -79,7 +78,7 @@ class _Shape:
         return float(np.sqrt(max(self.hidden[0, 0], 0.0)) / max(self.length[0], 1e-300))
 
 
-def limits_of(later: Later, state: State, baseline: Baseline, config: DiagnosisConfig) -> Limits:
+def limits_of(later: Later, state: State, baseline: Baseline) -> Limits:
     """Return the limits beside the model that was found."""
     shapes: dict[Key, list[_Shape]] = {}
     norms = np.r_[state.known.base.norms, state.effects.norms]
@@ -96,7 +95,7 @@ def limits_of(later: Later, state: State, baseline: Baseline, config: DiagnosisC
             _Shape(family.shapes[group.shape], hidden, length, part, group)
         )
     there = {(one.effect.name, one.effect.joint) for one in state.model.effects}
-    told = [_limit(later, own, baseline, config) for key, own in shapes.items() if key not in there]
+    told = [_limit(later, own, baseline) for key, own in shapes.items() if key not in there]
     return Limits(
         tuple(one for one in told if isinstance(one, DetectionLimit)),
         tuple(one for one in told if isinstance(one, NotIdentifiable)),
@@ -104,7 +103,7 @@ def limits_of(later: Later, state: State, baseline: Baseline, config: DiagnosisC
 
 
 def _limit(
-    later: Later, shapes: Sequence[_Shape], baseline: Baseline, config: DiagnosisConfig
+    later: Later, shapes: Sequence[_Shape], baseline: Baseline
 ) -> DetectionLimit | NotIdentifiable:
     """Return the smallest of a cause that would have been found, or why none would."""
     visible = max(one.identifiability for one in shapes)
@@ -122,7 +121,7 @@ def _limit(
         least = needed[one.freedom] / np.sqrt(max(one.hidden[0, 0], 1e-300))
         share = later.shares[later.dictionary.groups.index(one.group)]
         acting = one.length[0] * np.sqrt(share)  # (joints,) length of its column
-        usual = later.usual(config) / np.maximum(acting, 1e-300)
+        usual = later.usual / np.maximum(acting, 1e-300)
         least = max(least, float(usual.min()))
         return _told(later, one, least * np.eye(one.freedom)[0], visible)
     amplitudes = np.array(first.parameters.fixed)
@@ -147,7 +146,7 @@ def _told(
         q = next(q for q in effect.parameters if q.name == effect.words.size)
         size = Value(values[q.name], None, q.unit_at(turning))
         less = effect.words.falling
-        return DetectionLimit(effect.name, joint, q.name, size, {}, "analytic", visible, less)
+        return DetectionLimit(effect.name, joint, q.name, size, {}, visible, less)
     main = _main(effect, values)
     if main is None:
         return beyond
@@ -163,7 +162,7 @@ def _told(
         for q in effect.parameters
         if q.shape and q.name in shown and np.isfinite(values.get(q.name, np.nan))
     }
-    return DetectionLimit(effect.name, joint, main.name, size, at, "analytic", visible)
+    return DetectionLimit(effect.name, joint, main.name, size, at, visible)
 
 
 def _main(effect: Effect, values: dict[str, float]) -> Quantity | None:

@@ -246,11 +246,7 @@ def _lower_median(values: Iterable[float]) -> float:
 
 
 def _drift(
-    dataset: Dataset,
-    scale: Array,
-    found: Components,
-    of: Sequence[Group],
-    config: DiagnosisConfig,
+    dataset: Dataset, scale: Array, found: Components, of: Sequence[Group], config: DiagnosisConfig
 ) -> Array:
     """Return the variance between sessions of each scaled number.
 

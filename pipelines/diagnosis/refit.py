@@ -21,6 +21,7 @@ from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
+from pipelines.model.rigid.body import Motion
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.families import lay_family
@@ -108,6 +109,7 @@ class Later:
     dictionary: Dictionary
     prior: Prior
     dataset: Dataset
+    config: DiagnosisConfig
     base: Table  # B = [N D]
     candidates: Table  # C
     gram: Array  # B Bᵀ
@@ -131,6 +133,7 @@ class Later:
             dictionary,
             prior,
             dataset,
+            config,
             base,
             table,
             base.gram(base),
@@ -175,7 +178,9 @@ class Later:
         residual = self._residual(model, theta)
         now = belief.cost(theta, residual) + self._read_off(model)
         for k in range(1 + steps):
-            slopes, names = self._slopes(model) if k else self._none  # linear numbers first
+            slopes, names = self.slopes(
+                model if k else replace(model, effects=())
+            )  # linear numbers first
             size = _unit(slopes.norms)
             unit = slopes.scaled(1.0 / size)
             known = self._exact(belief, model)
@@ -198,7 +203,7 @@ class Later:
             gained = before - now
             if k and gained < 2.0 + _SETTLED * now:
                 break
-        slopes, names = self._slopes(model)
+        slopes, names = self.slopes(model)
         effects = slopes.scaled(1.0 / _unit(slopes.norms))
         lasting = np.flatnonzero(
             [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
@@ -307,7 +312,7 @@ class Later:
         both = (self.rows.torque(one) for one in (model, replace(model, effects=effects)))
         return sum(price(a - b) for a, b in zip(*both, strict=True))
 
-    def possible(self, state: State, explained: float, config: DiagnosisConfig) -> bool:
+    def possible(self, state: State, explained: float) -> bool:
         """Return whether the last effect can be a cause with its numbers and their deviations.
 
         An amplitude outside its range may be within it by its standard deviation, but not by the
@@ -318,11 +323,11 @@ class Later:
         Args:
             explained: cost that the effect saves.
         """
-        slopes, names = self._slopes(state.model)
+        slopes, names = self.slopes(state.model)
         factor, first = state.factor, self.base.width
         std = np.sqrt(factor.inverse_diagonal[first:]) / _unit(slopes.norms)
         step = factor.solve(state.slope)[first:] / _unit(slopes.norms)
-        deviations = np.sqrt(max(config.deviations**2, config.relevance * explained))
+        deviations = np.sqrt(max(self.config.deviations**2, self.config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within = last.possible
         if last.effect.parameters.reads_torque and self._mostly_acting(last.effect):
@@ -353,15 +358,9 @@ class Later:
 
     def amplitudes_of(self, effect: Effect) -> int:
         """Return how many amplitudes the effect has, in the form that is refitted."""
-        first = self.rows.data.logs[0].motion
-        some = replace(
-            first,
-            t=first.t[:8],
-            q=first.q[:8],
-            dq=first.dq[:8],
-            ddq=first.ddq[:8],
-            tau=None if first.tau is None else first.tau[:8],
-        )
+        one = self.rows.data.logs[0].motion
+        tau = None if one.tau is None else one.tau[:8]
+        some = Motion(one.t[:8], one.q[:8], one.dq[:8], one.ddq[:8], tau)
         return int(effect.columns(some, self.dataset.arm).shape[2])
 
     def acting(self, state: State) -> Array:
@@ -382,14 +381,23 @@ class Later:
         )
         return np.asarray(power / max(float(total.sum()), 1e-300))
 
-    def usual(self, config: DiagnosisConfig) -> Array:
-        """Return the length (joints,) of a torque, in units of the noise, that any machine has.
+    @property
+    def usual(self) -> Array:
+        """Length (joints,) of a torque, in units of the noise, that any machine has.
 
         It is nothing with reference logs, which tell what this machine has.
         """
-        if self.dataset.reference is not None:
-            return np.zeros(self.rows.n_joints)
-        return config.healthy_share * np.array([float(np.linalg.norm(y)) for y in self.rows.y])
+        share = self.config.healthy_share if self.dataset.reference is None else 0.0
+        return share * np.array([float(np.linalg.norm(y)) for y in self.y])
+
+    def slight(self, torque: Sequence[Array]) -> bool:
+        """Return whether torque is as small as healthy machines have some, at every joint."""
+        each = zip(torque, self.usual, strict=True)
+        return all(float(np.linalg.norm(x)) <= own for x, own in each)
+
+    def form(self, group: Group) -> Effect:
+        """Return the first law of a candidate, in the shape that was screened."""
+        return self._effect(group).forms()[0]
 
     @cached_property
     def standing(self) -> Array:
@@ -493,10 +501,6 @@ class Later:
         along = along[:, np.linalg.norm(along, axis=0) > 0.0]
         return belief.freed(along / np.linalg.norm(along, axis=0))
 
-    def slopes(self, state: State) -> tuple[Table, list[tuple[int, int, str]]]:
-        """Return the slopes by the numbers of the effects in their own units, and their names."""
-        return self._slopes(state.model)
-
     def _exact(self, belief: Belief, model: Exact) -> Belief:
         """Return the belief with the slopes by nominal numbers beside the effects of a model."""
         nominal = self.rows.mixed(model)
@@ -504,13 +508,10 @@ class Later:
             return belief
         return belief.exactly(nominal.scaled(1.0 / self.prior.scale))
 
-    @property
-    def _none(self) -> tuple[Table, list[tuple[int, int, str]]]:
-        return self.base.take(np.zeros(0, dtype=np.intp)), []
-
-    def _slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
+    def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
+        """Return the slopes by the numbers of the effects in their own units, and their names."""
         if not model.effects:
-            return self._none
+            return self.base.take(np.zeros(0, dtype=np.intp)), []
         return self.rows.slopes(model)
 
     def _residual(self, model: Exact, theta: Array) -> tuple[Array, ...]:

@@ -151,7 +151,6 @@ class Finding:
     torque_rms: float  # [N m] of its torque on its own joint, or of the largest joint
     of_rated: float  # the same as a share of the rated torque; NaN where the description gives none
     proof: Proof | None
-    doubt: str = ""  # why the extended model is without it; empty where the model has it
     answers: tuple[Answer, ...] = ()  # the responses that name it, one a posture
     probability: float | None = None  # None: a user named it
     log: str | None = None  # of an event, the log it happened in
@@ -185,7 +184,6 @@ class DetectionLimit:
     parameter: str  # whose value it is
     minimum: Value
     at: dict[str, Value] = field(default_factory=dict)  # non-linear numbers for which it is: order
-    way: Literal["injected", "analytic"] = "analytic"  # hidden in logs and found, or worked out
     identifiability: float = float("nan")  # part of its columns that the model cannot absorb
     or_less: bool = False  # the smaller the parameter, the larger the cause: of a saturation, say
 
@@ -226,7 +224,6 @@ class Trial:
     joint: int | None
     gain: float  # share of the squared weighted residual that it takes away
     threshold: float  # that it had to exceed
-    identifiability: float
     exact_gain: float  # the same after the exact refit; NaN where it was not refitted
     accepted: bool
     reason: str
@@ -281,8 +278,6 @@ class Evidence:
     spectra: tuple[Spectrum, ...]
     above_noise_floor: Array  # (joints,) share of the residual's power that is above the floor
     band: Array  # (joints, 2) [Hz] in which most of that lies
-    correlation: Array  # (joints, joints) of the residual of one joint with the torque of another
-    torques: Array  # (joints, joints) each measured torque on all modelled ones: near 1
     simulated_log: str = ""  # name of the log that was simulated in closed loop
     extended_position_error: Array | None = None  # [rad] (points, joints) of the extended model
 

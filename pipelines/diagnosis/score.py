@@ -25,14 +25,7 @@ import numpy.typing as npt
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 
-__all__ = [
-    "Blocks",
-    "chi2_bound",
-    "confidence_set",
-    "log_scores",
-    "probabilities",
-    "upper_point",
-]
+__all__ = ["Blocks", "chi2_bound", "confidence_set", "log_scores", "probabilities", "upper_point"]
 
 K = TypeVar("K", bound=Hashable)
 

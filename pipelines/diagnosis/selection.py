@@ -1,20 +1,20 @@
 """Select causes: forward by the predictive score, a confidence set at each round, then backward.
 
-selection = select(later, baseline, responses, config)
+selection = select(later, baseline, responses)
 selection.causes              each with its alternatives
-selection.stopped             why the search ended, where it did not for lack of anything left
+selection.last                the round in which the search ended, and why
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Key
-from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.events import Window, push_of
 from pipelines.diagnosis.refit import Fit, Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
@@ -24,17 +24,9 @@ from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.families import place_of
 
-__all__ = [
-    "Candidate",
-    "CandidateFit",
-    "Cause",
-    "Round",
-    "SearchStart",
-    "Selection",
-    "refit",
-    "select",
-]
+__all__ = ["Candidate", "Cause", "Round", "SearchStart", "Selection", "refit", "select"]
 
 
 @dataclass(frozen=True)
@@ -56,13 +48,9 @@ class Candidate:
         """True for a cause of one moment in one log."""
         return self.state.model.effects[-1].log is not None
 
-
-@dataclass(frozen=True)
-class CandidateFit:
-    """A candidate and its fit."""
-
-    key: Key
-    fit: Fit
+    def scores(self, later: Later) -> Array:
+        """Return the predictive score of each block."""
+        return _scores(later, self.state, self.numbers)
 
 
 @dataclass(frozen=True)
@@ -75,49 +63,16 @@ class Cause:
 
 
 @dataclass(frozen=True, eq=False)
-class Selection:
-    """The causes of a session."""
-
-    causes: tuple[Cause, ...]
-    start: State
-    end: State
-    explained: float  # cost that the causes save
-    stopped: str  # why a significant cause was not selected; "" where there was none
-    follows: str  # what the rest follows; "" where nothing is significant
-    rounds: tuple[Round, ...] = ()
-    cut: tuple[Key, ...] = ()  # causes still significant when the largest number was reached
-    moment: str = ""  # what stands out at one moment, and no event explains
-
-    @property
-    def without_selected_alternatives(self) -> Selection:
-        """The same without alternatives that are causes: backward elimination kept both."""
-        keys = {one.key for one in self.causes}
-        new = {
-            id(one): replace(one, alternatives=tuple(k for k in one.alternatives if k not in keys))
-            for one in self.causes
-        }
-        rounds = (replace(one, cause=new.get(id(one.cause), one.cause)) for one in self.rounds)
-        causes = tuple(new[id(one)] for one in self.causes)
-        return replace(self, causes=causes, rounds=tuple(rounds))
-
-    @property
-    def found(self) -> SearchStart:
-        """The selected causes, for a further search."""
-        rounds = tuple(one for one in self.rounds if one.cause is not None)
-        return SearchStart(self.causes, self.end.model, rounds)
-
-
-@dataclass(frozen=True, eq=False)
 class Round:
     """The outcome of one round of the forward selection."""
 
     before: Fit
-    cause: Cause | None
-    after: Fit | None
-    stopped: str = ""
-    follows: str = ""
-    significant: tuple[Screened, ...] = ()
-    tried: tuple[CandidateFit, ...] = ()
+    significant: tuple[Screened, ...]
+    tried: Mapping[Key, Fit]  # causes that were refitted exactly
+    cause: Cause | None = None
+    after: Fit | None = None
+    stopped: str = ""  # why a significant cause was not selected
+    follows: str = ""  # what the rest follows
     moment: str = ""  # what stands out at one moment, and no event explains
 
 
@@ -130,12 +85,42 @@ class SearchStart:
     rounds: tuple[Round, ...]  # in which a cause was selected
 
 
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """The causes of a session."""
+
+    causes: tuple[Cause, ...]
+    start: State
+    end: State
+    rounds: tuple[Round, ...]
+    cut: tuple[Key, ...] = ()  # causes still significant when the largest number was reached
+
+    @property
+    def last(self) -> Round | None:
+        """The round in which the search ended; None where no cause was looked for."""
+        return self.rounds[-1] if self.rounds else None
+
+    @property
+    def without_selected_alternatives(self) -> Selection:
+        """The same without alternatives that are causes: backward elimination kept both."""
+        keys = {one.key for one in self.causes}
+
+        def alone(one: Cause) -> Cause:
+            return replace(one, alternatives=tuple(k for k in one.alternatives if k not in keys))
+
+        new = {id(one): alone(one) for one in self.causes}
+        rounds = tuple(replace(one, cause=new.get(id(one.cause), one.cause)) for one in self.rounds)
+        return replace(self, causes=tuple(new.values()), rounds=rounds)
+
+    @property
+    def found(self) -> SearchStart:
+        """The selected causes, for a further search."""
+        rounds = tuple(one for one in self.rounds if one.cause is not None)
+        return SearchStart(self.causes, self.end.model, rounds)
+
+
 def select(
-    later: Later,
-    baseline: Baseline,
-    responses: Sequence[Acting],
-    config: DiagnosisConfig,
-    before: SearchStart | None = None,
+    later: Later, baseline: Baseline, responses: Sequence[Acting], before: SearchStart | None = None
 ) -> Selection:
     """Return the causes that explain the later rows.
 
@@ -144,343 +129,277 @@ def select(
         before: what was selected before the noise was known beside it.
     """
     start = state = later.start()
-    causes: list[Cause] = []
+    causes, rounds, most = list[Cause](), list[Round](), later.config.causes
     if before is not None:
-        causes, state = list(before.causes), later.start(before.model)
-    stopped = follows = ""
-    explained = max(start.cost - state.cost, 0.0)
-    rounds = [] if before is None else list(before.rounds)
-    while len(causes) < config.causes:
-        found, after = _round(
-            later, state, causes, explained, baseline, responses if not causes else (), config
-        )
+        causes, rounds = list(before.causes), list(before.rounds)
+        state = later.start(before.model)
+    explained, cut = max(start.cost - state.cost, 0.0), tuple[Key, ...]()
+    while True:
+        step = _Step(later.composed(state.model), state, baseline, causes, explained)
+        if len(causes) >= most:
+            cut = step.relevant_keys
+            break
+        found, after = step.round(() if causes else responses)
         rounds.append(found)
-        stopped, follows = found.stopped, found.follows
         if found.cause is None or after is None:
             break
-        causes.append(found.cause)
+        causes = [*causes, found.cause]
         explained += max(state.cost - after.cost, 0.0)
         state = after
-    cut: tuple[Key, ...] = ()
-    if len(causes) >= config.causes:
-        taken = [cause.key for cause in causes]
-        composed = later.composed(state.model)
-        more = _significant(composed, state, taken, explained, baseline, config).values()
-        ranked = sorted(more, key=lambda one: -one.gain)
-        ranked = [one for one in ranked if not _slight(composed, _torque(composed, one), config)]
-        cut = tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
-    causes, state = _backward(later, causes, state, config)
-    moment = rounds[-1].moment if rounds else ""
-    return Selection(
-        tuple(causes), start, state, explained, stopped, follows, tuple(rounds), cut, moment
-    )
+    causes, state = _backward(later, causes, state)
+    return Selection(tuple(causes), start, state, tuple(rounds), cut)
 
 
-def _round(
-    later: Later,
-    state: State,
-    causes: Sequence[Cause],
-    explained: float,
-    baseline: Baseline,
-    responses: Sequence[Acting],
-    config: DiagnosisConfig,
-) -> tuple[Round, State | None]:
-    """Return the cause that explains most of the residual of `state`, and the state fitted with it.
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """One round of the forward selection: candidates for what a state leaves."""
 
-    Where none is selected, the round says why, and there is no state.
-    """
-    later = later.composed(state.model)
-    significant = _significant(
-        later, state, [cause.key for cause in causes], explained, baseline, config
-    )
-    touch, moment = push_of(later.rows, later.dictionary, later.dataset.arm, state.residual, config)
-    promising = _promising(later, state, significant, config)
-    refitted = _refitted(later, state, promising, responses, touch, config)
-    tried = [
-        one for one in refitted if _relevant(later, state, one, significant, explained, config)
-    ]
-    others = _unnamed(later, state, significant, bool(responses))
-    seen = Round(
-        state.fit,
-        None,
-        None,
-        significant=tuple(significant.values()),
-        tried=tuple(CandidateFit(one.key, one.state.fit) for one in tried),
-        moment=moment,
-    )
-    if not tried:
-        return replace(seen, follows=_place(next(iter(others))) if others else ""), None
-    apart = _apart(later, state, significant, others, baseline, config)
-    pick, cause, stopped = _contest(later, state, tried, others, apart, config)
-    if pick is None:  # perhaps by another law of the same cause
-        tried = [_other_form(later, state, one, config) for one in tried]
-        pick, cause, stopped = _contest(later, state, tried, others, apart, config)
-    if pick is None:
-        return replace(seen, stopped=stopped), None
-    chosen = _other_form(later, state, pick, config).state
-    return replace(seen, cause=cause, after=chosen.fit), chosen
+    later: Later  # with the columns of drives and records beside the effects of the state
+    state: State
+    baseline: Baseline
+    causes: Sequence[Cause]  # selected before
+    explained: float  # cost that these save
 
+    def round(self, responses: Sequence[Acting]) -> tuple[Round, State | None]:
+        """Return the cause that explains most of the residual, and the state fitted with it.
 
-def _significant(
-    later: Later,
-    state: State,
-    taken: Sequence[Key],
-    explained: float,
-    baseline: Baseline,
-    config: DiagnosisConfig,
-) -> dict[Key, Screened]:
-    """Return the candidates above the family-wise threshold, the best shape of each.
+        Where none is selected, the round says why, and there is no state.
+        """
+        later = self.later
+        touch, moment = push_of(
+            later.rows, later.dictionary, later.dataset.arm, self.state.residual, later.config
+        )
+        tried = [one for one in self._refitted(responses, touch) if self._relevant(one)]
+        others = self._unnamed(not responses)
+        fits = {one.key: one.state.fit for one in tried}
+        seen = Round(self.state.fit, tuple(self.significant.values()), fits, moment=moment)
+        if not tried:
+            return replace(seen, follows=place_of(*next(iter(others))) if others else ""), None
+        apart = {shape: self._apart(other) for shape, other in others.items()}
+        pick, cause, stopped = self._contest(tried, others, apart)
+        if pick is None:  # perhaps by another law of the same cause
+            tried = [_other_form(later, self.state, one) for one in tried]
+            pick, cause, stopped = self._contest(tried, others, apart)
+        if pick is None:
+            return replace(seen, stopped=stopped), None
+        chosen = _other_form(later, self.state, pick).state
+        return replace(seen, cause=cause, after=chosen.fit), chosen
 
-    No law is exact: at the joints of the causes found so far, and of what stands since the
-    reference, what remains of these is larger than the noise, and a further cause has to gain more
-    than a share of what they explain there.
-    """
-    rows = later.rows.count
-    known = later.shares @ _inexact(later, state, explained, config)
-    inexact = dict(zip(later.dictionary.groups, known, strict=True))
-    return {
-        key: one
-        for key, one in best_of(later.screened(state)).items()
-        if (key not in taken or later.again(key))
-        and one.gain > inexact[one.group]
-        and one.gain > baseline.threshold(one.group, one.freedom, rows)
-        and (one.group.kind == "named" or not _slight(later, _torque(later, one), config))
-    }
+    @cached_property
+    def significant(self) -> dict[Key, Screened]:
+        """The candidates above the family-wise threshold, the best shape of each.
 
+        No law is exact: at the joints of the causes found so far, and of what stands since the
+        reference, what remains of these is larger than the noise, and a further cause has to gain
+        more than a share of what they explain there.
+        """
+        later, taken = self.later, {cause.key for cause in self.causes}
+        known = later.shares @ self._inexact
+        inexact = dict(zip(later.dictionary.groups, known, strict=True))
+        return {
+            key: one
+            for key, one in best_of(later.screened(self.state)).items()
+            if (key not in taken or later.again(key))
+            and one.gain > max(inexact[one.group], self._threshold(one))
+            and (one.group.kind == "named" or not later.slight(self._torque(one)))
+        }
 
-def _inexact(later: Later, state: State, explained: float, config: DiagnosisConfig) -> Array:
-    """Return the gain (joints,) that the causes found account for, because no law is exact."""
-    return config.relevance * (explained * later.acting(state) + later.standing)
+    @property
+    def relevant_keys(self) -> tuple[Key, ...]:
+        """The significant causes, the strongest first."""
+        ranked = sorted(self.significant.values(), key=lambda one: -one.gain)
+        ranked = [one for one in ranked if not self.later.slight(self._torque(one))]
+        return tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
 
+    def _threshold(self, one: Screened) -> float:
+        return self.baseline.threshold(one.group, one.freedom, self.later.rows.count)
 
-def _relevant(
-    later: Later,
-    state: State,
-    one: Candidate,
-    significant: Mapping[Key, Screened],
-    explained: float,
-    config: DiagnosisConfig,
-) -> bool:
-    """Return whether a cause, refitted, saves more than the laws found before it are inexact.
+    @cached_property
+    def _inexact(self) -> Array:
+        """Gain (joints,) that the causes found account for, because no law is exact."""
+        share = self.explained * self.later.acting(self.state) + self.later.standing
+        return self.later.config.relevance * share
 
-    A cause whose torque is within that of healthy machines is rejected. A joint where it saves less
-    counts for nothing, and one that it makes worse counts against it. What the standing numbers
-    have taken of it is a part of what it saves.
-    """
-    if one.event:
-        return one.gain >= config.relevance * explained
-    if one.key not in significant:  # frequency responses name it
-        return True
-    model = one.state.model
-    both = (later.rows.torque(x) for x in (model, model.without(len(model.effects) - 1)))
-    if _slight(later, [a - b for a, b in zip(*both, strict=True)], config):
-        return False
-    group = significant[one.key].group
-    shares = later.shares[later.dictionary.groups.index(group)]
-    saved = np.array(
-        [a @ a - b @ b for a, b in zip(state.residual, one.state.residual, strict=True)]
-    )
-    more = later.taken(state, [group])[0]
-    if one.key[1] is not None:  # of the whole arm base parameters are freed, which saves nothing
-        more += state.cost - state.rss - one.state.cost + one.state.rss
-    saved = saved + more * shares
-    beyond = saved - _inexact(later, state, explained, config)
-    return float(np.where(saved > 0.0, np.maximum(beyond, 0.0), saved).sum()) > 0.0
+    def _torque(self, one: Screened) -> tuple[Array, ...]:
+        """Return the torque of a screened candidate, joint by joint, in units of the noise."""
+        return self.later.candidates.take(one.group.columns).times(one.amplitudes)
 
+    def _relevant(self, one: Candidate) -> bool:
+        """Return whether a cause, refitted, saves more than the laws found before it are inexact.
 
-def _slight(later: Later, torque: Sequence[Array], config: DiagnosisConfig) -> bool:
-    """Return whether torque is as small as healthy machines have some, at every joint."""
-    least = later.usual(config)
-    return all(float(np.linalg.norm(x)) <= own for x, own in zip(torque, least, strict=True))
-
-
-def _torque(later: Later, one: Screened) -> tuple[Array, ...]:
-    """Return the torque of a screened candidate, joint by joint, in units of the noise."""
-    return later.candidates.take(one.group.columns).times(one.amplitudes)
-
-
-def _contest(
-    later: Later,
-    state: State,
-    tried: Sequence[Candidate],
-    others: Mapping[Key, State],
-    apart: Mapping[Key, Sequence[Key]],
-    config: DiagnosisConfig,
-) -> tuple[Candidate | None, Cause | None, str]:
-    """Return the winner of the predictive scores with its alternatives, or why nothing wins."""
-    scores = {one.key: _scores(later, one.state, one.numbers) for one in tried}
-    free = {
-        key: _scores(later, other, other.effects.width - state.effects.width)
-        for key, other in others.items()
-    }
-    without = _scores(later, state)
-    best = _place(min(scores, key=lambda key: scores[key].sum()))
-    fails = f"{best} does not pay on blocks that it was not fitted to"
-    better = {k: v for k, v in (scores | free).items() if v.sum() < without.sum()}
-    if not any(one.key in better for one in tried):
-        return None, None, fails
-    kept, first = confidence_set(better, config), min(better, key=lambda key: better[key].sum())
-    named = [one for one in tried if one.key in kept]
-    if first in free or not named:
-        promising = [one for one in tried if one.key in better]
-        named = _nearly(later, state, promising, others, config)
-        named = named or _beside(promising, better, apart, config)
-    if not named:
-        return None, None, f"{_place(first)} predicts better than {best}"
-    pick = min(named, key=lambda one: scores[one.key].sum())
-    unchanged = _scores(later, later.unchanged(state, pick.key))
-    pays = confidence_set({"with": scores[pick.key], "without": unchanged}, config)
-    if "without" in pays and not pick.event:
-        return None, None, fails
-    alike = tuple(one.key for one in named if one is not pick)
-    rivals = {shape: v for shape, v in free.items() if pick.key not in apart[shape]}
-    return pick, Cause(pick.key, alike, probabilities(scores | rivals, config)), ""
-
-
-def _beside(
-    tried: Sequence[Candidate],
-    better: Mapping[Key, Array],
-    apart: Mapping[Key, Sequence[Key]],
-    config: DiagnosisConfig,
-) -> list[Candidate]:
-    """Return the causes that predict better than every shape that may explain the same.
-
-    What a shape without a name explains elsewhere takes no cause its name.
-    """
-    best = {}
-    for one in tried:
-        rivals = [k for k, separate in apart.items() if k in better and one.key not in separate]
-        if all(better[one.key].sum() < better[k].sum() for k in rivals):
-            best[one.key] = better[one.key]
-    kept = confidence_set(best, config) if best else []
-    return [one for one in tried if one.key in kept]
-
-
-def _apart(
-    later: Later,
-    state: State,
-    significant: Mapping[Key, Screened],
-    others: Mapping[Key, State],
-    baseline: Baseline,
-    config: DiagnosisConfig,
-) -> dict[Key, list[Key]]:
-    """Return, for each shape without a name, the causes that explain something else than it does.
-
-    Beside it they are significant, gain more than a share of what they gain alone, and more than
-    the shape leaves because no law is exact.
-    """
-    out = {}
-    for shape, other in others.items():
-        gains = {one.group: one.gain for one in later.screened(other)}
-        inexact = config.relevance * (state.cost - other.cost)
-        out[shape] = [
-            key
-            for key, one in significant.items()
-            if gains[one.group]
-            > max(
-                config.share * one.gain,
-                inexact,
-                baseline.threshold(one.group, one.freedom, later.rows.count),
-            )
+        A cause whose torque is within that of healthy machines is rejected. A joint where it saves
+        less counts for nothing, and one that it makes worse counts against it. What the standing
+        numbers have taken of it is a part of what it saves.
+        """
+        later, state, new = self.later, self.state, one.state
+        if one.event:
+            return one.gain >= later.config.relevance * self.explained
+        if one.key not in self.significant:  # frequency responses name it
+            return True
+        both = [
+            later.rows.torque(x) for x in (new.model, new.model.without(len(new.model.effects) - 1))
         ]
-    return out
+        if later.slight([a - b for a, b in zip(*both, strict=True)]):
+            return False
+        group = self.significant[one.key].group
+        shares = later.shares[later.dictionary.groups.index(group)]
+        each = zip(state.residual, new.residual, strict=True)
+        saved = np.array([a @ a - b @ b for a, b in each])
+        more = later.taken(state, [group])[0]
+        if one.key[1] is not None:  # of the whole arm base parameters are freed: that saves nothing
+            more += state.cost - state.rss - new.cost + new.rss
+        saved = saved + more * shares
+        counted = np.where(saved > 0.0, np.maximum(saved - self._inexact, 0.0), saved)
+        return float(counted.sum()) > 0.0
 
+    def _promising(self) -> list[Screened]:
+        """Return the significant causes that are the most promising ones, the best first.
 
-def _nearly(
-    later: Later,
-    state: State,
-    tried: Sequence[Candidate],
-    others: Mapping[Key, State],
-    config: DiagnosisConfig,
-) -> list[Candidate]:
-    """Return the cause that explains as much as any unnamed shape, as far as laws are exact.
+        A cause is promising by its gain, or by its gain and what the standing numbers have taken of
+        it, for healthy machines have it in small. That of the largest gain is always among them.
+        """
+        config = self.later.config
+        named = {key: one for key, one in self.significant.items() if one.group.kind == "named"}
+        if not named:
+            return []
+        taken = self.later.taken(self.state, [one.group for one in named.values()])
+        gain = {key: one.gain for key, one in named.items()}
+        worth = {key: gain[key] + more for key, more in zip(named, taken, strict=True)}
+        best = {
+            key
+            for by in (gain, worth)
+            for key, x in by.items()
+            if x > config.promising * max(by.values())
+        }
+        most = max(gain.values())
+        order = sorted(best, key=lambda key: (gain[key] < most, -worth[key]))
+        return [named[key] for key in order[: config.refits]]
 
-    What a model explains is the cost that it saves, less ln(rows) for each number (Schwarz 1978).
-    """
-    number = np.log(later.rows.count)
-    saved = [state.cost - one.state.cost - one.numbers * number for one in tried]
-    best = int(np.argmax(saved))
-    free = max(
-        state.cost - one.cost - (one.effects.width - state.effects.width) * number
-        for one in others.values()
-    )
-    return [tried[best]] if 0.0 < saved[best] > (1.0 - config.relevance) * free else []
+    def _refitted(self, responses: Sequence[Acting], touch: Window | None) -> list[Candidate]:
+        """Return causes with all their numbers fitted exactly, and the best window of an event."""
+        later, named = self.later, self._promising()
+        top = max([1.0, *(one.gain for one in named)])
+        asked: list[tuple[Effect, Array, float, int | None]] = []
+        if touch is not None:
+            asked.append((touch.effect, touch.amplitudes, touch.gain, touch.log))
+        for one in named:
+            asked.append((later.form(one.group), one.amplitudes, one.gain, None))
+        for acting in responses:
+            effect = acting.effect.at(acting.values)
+            asked.append((effect, effect.amplitudes(acting.values), top, None))
+        tried = (_candidate(later, self.state, *one) for one in asked)
+        return [one for one in tried if one is not None and one.possible]
 
+    def _unnamed(self, compliant: bool) -> dict[Key, State]:
+        """Return the best shape without a name, and, where asked, the best compliance."""
+        out, number = {}, np.log(self.later.rows.count)
+        for kind in ("unnamed", "compliance") if compliant else ("unnamed",):
+            own = [one for one in self.significant.values() if one.group.kind == kind]
+            if own:
+                one = max(own, key=lambda s: s.gain - s.freedom * number)
+                columns = self.later.candidates.take(one.group.columns)
+                out[one.group.key] = self.later.with_columns(self.state, columns)
+        return out
 
-def _promising(
-    later: Later, state: State, significant: Mapping[Key, Screened], config: DiagnosisConfig
-) -> list[Screened]:
-    """Return the significant causes that are the most promising ones, the best first.
+    def _apart(self, other: State) -> list[Key]:
+        """Return the causes that explain something else than a shape without a name does.
 
-    A cause is promising by its gain, or by its gain and what the standing numbers have taken of it,
-    for healthy machines have it in small. The one of the largest gain is always among them.
-    """
-    named = {key: one for key, one in significant.items() if one.group.kind == "named"}
-    taken = later.taken(state, [one.group for one in named.values()])
-    worth = {key: named[key].gain + more for key, more in zip(named, taken, strict=True)}
-    gain = {key: one.gain for key, one in named.items()}
-    best = [
-        {k for k, x in by.items() if x > config.promising * max(by.values())}
-        for by in (gain, worth)
-    ]
-    most = max(gain.values(), default=0.0)
-    order = sorted(best[0] | best[1], key=lambda key: (gain[key] < most, -worth[key]))
-    return [named[key] for key in order[: config.refits]]
+        Beside it they are significant, gain more than a share of what they gain alone, and more
+        than the shape leaves because no law is exact.
+        """
+        config, gains = self.later.config, {s.group: s.gain for s in self.later.screened(other)}
+        inexact = config.relevance * (self.state.cost - other.cost)
+        return [
+            key
+            for key, one in self.significant.items()
+            if gains[one.group] > max(config.share * one.gain, inexact, self._threshold(one))
+        ]
 
+    def _contest(
+        self,
+        tried: Sequence[Candidate],
+        others: Mapping[Key, State],
+        apart: Mapping[Key, Sequence[Key]],
+    ) -> tuple[Candidate | None, Cause | None, str]:
+        """Return the winner of the predictive scores with its alternatives, or why nothing wins."""
+        later, width = self.later, self.state.effects.width
+        scores = {one.key: one.scores(later) for one in tried}
+        free = {k: _scores(later, own, own.effects.width - width) for k, own in others.items()}
+        without = _scores(later, self.state).sum()
+        best = place_of(*min(scores, key=lambda key: scores[key].sum()))
+        fails = f"{best} does not pay on blocks that it was not fitted to"
+        better = {k: v for k, v in (scores | free).items() if v.sum() < without}
+        paying = [one for one in tried if one.key in better]
+        if not paying:
+            return None, None, fails
+        named = self._named(paying, others, better, apart)
+        if not named:
+            first = min(better, key=lambda key: better[key].sum())
+            return None, None, f"{place_of(*first)} predicts better than {best}"
+        pick = min(named, key=lambda one: scores[one.key].sum())
+        unchanged = _scores(later, later.unchanged(self.state, pick.key))
+        pays = confidence_set({"with": scores[pick.key], "without": unchanged}, later.config)
+        if "without" in pays and not pick.event:
+            return None, None, fails
+        alike = tuple(one.key for one in named if one is not pick)
+        rivals = {shape: v for shape, v in free.items() if pick.key not in apart[shape]}
+        probable = probabilities(scores | rivals, later.config)
+        return pick, Cause(pick.key, alike, probable), ""
 
-def _refitted(
-    later: Later,
-    state: State,
-    named: Sequence[Screened],
-    responses: Sequence[Acting],
-    touch: Window | None,
-    config: DiagnosisConfig,
-) -> list[Candidate]:
-    """Return causes with all their numbers fitted exactly, beside the best window of an event."""
-    out = []
-    if touch is not None:
-        out.append(
-            _candidate(
-                later,
-                state,
-                (touch.effect.name, None),
-                touch.gain,
-                touch.effect,
-                touch.amplitudes,
-                config,
-                log=touch.log,
-            )
-        )
-    top = max([one.gain for one in named], default=0.0)
-    for one in named:
-        effect = later.dictionary.families[one.group.key].shapes[one.group.shape].forms()[0]
-        out.append(
-            _candidate(later, state, one.group.key, one.gain, effect, one.amplitudes, config)
-        )
-    for acting in responses:
-        effect = acting.effect.at(acting.values)
-        out.append(
-            _candidate(
-                later,
-                state,
-                (effect.name, effect.joint),
-                max(top, 1.0),
-                effect,
-                effect.amplitudes(acting.values),
-                config,
-            )
-        )
-    return [one for one in out if one is not None and one.possible]
+    def _named(
+        self,
+        paying: Sequence[Candidate],
+        others: Mapping[Key, State],
+        better: Mapping[Key, Array],
+        apart: Mapping[Key, Sequence[Key]],
+    ) -> list[Candidate]:
+        """Return the causes that the data do not tell from the best, as far as that has a name."""
+        kept = confidence_set(better, self.later.config)
+        named = [one for one in paying if one.key in kept]
+        if named and min(better, key=lambda key: better[key].sum()) not in others:
+            return named
+        return self._nearly(paying, others) or self._beside(paying, better, apart)
+
+    def _beside(
+        self,
+        paying: Sequence[Candidate],
+        better: Mapping[Key, Array],
+        apart: Mapping[Key, Sequence[Key]],
+    ) -> list[Candidate]:
+        """Return the causes that predict better than every shape that may explain the same.
+
+        What a shape without a name explains elsewhere takes no cause its name.
+        """
+        best = {}
+        for one in paying:
+            rivals = [k for k, separate in apart.items() if k in better and one.key not in separate]
+            if all(better[one.key].sum() < better[k].sum() for k in rivals):
+                best[one.key] = better[one.key]
+        kept = confidence_set(best, self.later.config) if best else []
+        return [one for one in paying if one.key in kept]
+
+    def _nearly(self, paying: Sequence[Candidate], others: Mapping[Key, State]) -> list[Candidate]:
+        """Return the cause that explains as much as any unnamed shape, as far as laws are exact.
+
+        What a model explains is the cost that it saves, less ln(rows) a number (Schwarz 1978).
+        """
+        width, cost = self.state.effects.width, np.log(self.later.rows.count)
+
+        def saved(state: State, numbers: int) -> float:
+            return float(self.state.cost - state.cost - numbers * cost)
+
+        best = max(paying, key=lambda one: saved(one.state, one.numbers))
+        free = max(saved(one, one.effects.width - width) for one in others.values())
+        exact = 1.0 - self.later.config.relevance
+        return [best] if 0.0 < saved(best.state, best.numbers) > exact * free else []
 
 
 def _candidate(
     later: Later,
     state: State,
-    key: Key,
-    gain: float,
     effect: Effect,
     amplitudes: Array,
-    config: DiagnosisConfig,
+    gain: float = 0.0,
     log: int | None = None,
 ) -> Candidate | None:
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
@@ -493,10 +412,9 @@ def _candidate(
     except np.linalg.LinAlgError:
         return None
     fitted = min(fits, key=lambda one: one.cost)
-    possible = later.possible(fitted, state.cost - fitted.cost, config) and bool(
-        np.isfinite(fitted.losses).all()
-    )
-    return Candidate(key, gain, fitted, possible)
+    possible = later.possible(fitted, state.cost - fitted.cost)
+    possible = possible and bool(np.isfinite(fitted.losses).all())
+    return Candidate((effect.name, effect.joint), gain, fitted, possible)
 
 
 def _plainer(model: Exact) -> tuple[Exact, ...]:
@@ -514,46 +432,18 @@ def _plainer(model: Exact) -> tuple[Exact, ...]:
     return (replace(model, columns=replace(columns, laws=plain)),)
 
 
-def _unnamed(
-    later: Later, state: State, significant: dict[Key, Screened], responses: bool
-) -> dict[Key, State]:
-    """Return the best shape without a name, and, without responses, the best compliance."""
-    out = {}
-    kinds = ("unnamed",) if responses else ("unnamed", "compliance")
-    for kind in kinds:
-        own = [one for one in significant.values() if one.group.kind == kind]
-        if own:
-            one = max(own, key=lambda s: s.gain - s.freedom * np.log(later.rows.count))
-            out[one.group.key] = later.with_columns(state, later.candidates.take(one.group.columns))
-    return out
-
-
-def _other_form(
-    later: Later, state: State, chosen: Candidate, config: DiagnosisConfig
-) -> Candidate:
+def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
     """Return the chosen cause by the law of it that predicts best."""
-    best, one = chosen, chosen.state.model.effects[-1]
-    if one.log is not None:
-        return best
-    for form in one.effect.forms()[1:]:
-        other = _candidate(
-            later, state, chosen.key, chosen.gain, form, np.array(one.amplitudes), config
-        )
-        if other is None or not other.possible:
-            continue
-        if _total(later, other) < _total(later, best):
-            best = other
-    return best
+    one, every = chosen.state.model.effects[-1], [chosen]
+    if one.log is None:
+        for form in one.effect.forms()[1:]:
+            other = _candidate(later, state, form, np.array(one.amplitudes), chosen.gain)
+            if other is not None and other.possible:
+                every.append(other)
+    return min(every, key=lambda one: float(one.scores(later).sum())) if every[1:] else chosen
 
 
-def _total(later: Later, one: Candidate) -> float:
-    """Return the predictive score of all blocks."""
-    return float(_scores(later, one.state, one.numbers).sum())
-
-
-def _backward(
-    later: Later, causes: list[Cause], end: State, config: DiagnosisConfig
-) -> tuple[list[Cause], State]:
+def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause], State]:
     """Take out every cause without which the rest predicts as well.
 
     What happened at one moment is not told by predictions of other times: it stood out of these.
@@ -566,7 +456,7 @@ def _backward(
         model = end.model.without(place)
         without = later.fit(model, end.theta, later.belief_of(model))
         scores = {"with": _scores(later, end), "without": _scores(later, without)}
-        if "without" in confidence_set(scores, config):
+        if "without" in confidence_set(scores, later.config):
             causes, end, place = [c for k, c in enumerate(causes) if k != place], without, 0
         else:
             place += 1
@@ -583,18 +473,7 @@ def _scores(later: Later, state: State, numbers: int = 0) -> Array:
     return np.asarray(log_scores(state.losses, later.block_rows) + price / len(later.block_rows))
 
 
-def _place(key: Key) -> str:
-    return key[0] if key[1] is None else f"{key[0]}:{key[1]}"
-
-
-def refit(
-    later: Later,
-    state: State,
-    key: Key,
-    effect: Effect,
-    amplitudes: Array,
-    config: DiagnosisConfig,
-) -> Candidate | None:
+def refit(later: Later, state: State, effect: Effect, amplitudes: Array) -> Candidate | None:
     """Return a cause that somebody names, refitted, by the law of it that predicts best."""
-    one = _candidate(later, state, key, 0.0, effect, amplitudes, config)
-    return None if one is None else _other_form(later, state, one, config)
+    one = _candidate(later, state, effect, amplitudes)
+    return None if one is None else _other_form(later, state, one)

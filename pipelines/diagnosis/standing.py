@@ -1,6 +1,6 @@
 """Find the baseline effects: causes that the reference logs show beside the nominal model.
 
-    standing = standing_of(later, config)
+    standing = standing_of(prepared, later)
     standing.effects                       causes of the library, with their numbers
 
 The diagnosis itself has columns for all of it (`prior`). A model for simulation has causes instead:
@@ -16,7 +16,6 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.diagnosis.candidates import FORM, Key
-from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Standing as Told
@@ -33,7 +32,7 @@ __all__ = ["standing_of"]
 _REFITS = 2  # numerics: candidates that are refitted in a round, at most
 
 
-def standing_of(prepared: Data | None, later: Later, config: DiagnosisConfig) -> Standing:
+def standing_of(prepared: Data | None, later: Later) -> Standing:
     """Return the baseline effects and the nominal model refitted with them to the reference.
 
     Args:
@@ -41,10 +40,10 @@ def standing_of(prepared: Data | None, later: Later, config: DiagnosisConfig) ->
     """
     if prepared is None or later.dataset.reference is None or later.dictionary.reference is None:
         return Standing(later.dataset.model)
-    own = _reference(later, config)
+    own = _reference(later)
     states = [own.start()]
-    for _ in range(own.rows.n_joints * config.causes):
-        best = _best(own, states[-1], later.rows, config)
+    for _ in range(own.rows.n_joints * own.config.causes):
+        best = _best(own, states[-1], later.rows)
         if best is None:
             break
         states.append(best.state)
@@ -62,7 +61,7 @@ def standing_of(prepared: Data | None, later: Later, config: DiagnosisConfig) ->
     return Standing(nominal, effects, found, done.rms)
 
 
-def _reference(later: Later, config: DiagnosisConfig) -> Later:
+def _reference(later: Later) -> Later:
     """Return the rows of the reference with a flat prior on nominal numbers, and what may stand."""
     dataset, dictionary, prior = later.dataset, later.dictionary, later.prior
     n = prior.n_nominal
@@ -81,14 +80,14 @@ def _reference(later: Later, config: DiagnosisConfig) -> Later:
         replace(dataset, later=dataset.known, reference=None),
         replace(dictionary, groups=groups, later=dictionary.reference, reference=None),
         prior.nominal(prior.precision[:n, :n], np.zeros(n)),
-        config,
+        later.config,
     )
 
 
-def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Candidate | None:
+def _best(own: Later, state: State, later: Rows) -> Candidate | None:
     """Return the first cause that is possible, None where it does not pay."""
     every = best_of(own.screened(state))
-    best = _first(own, state, every, later, config)
+    best = _first(own, state, every, later)
     if best is None:
         return None
     plain = max(
@@ -98,25 +97,22 @@ def _best(own: Later, state: State, later: Rows, config: DiagnosisConfig) -> Can
     unnamed = own.with_columns(state, own.candidates.take(plain.group.columns))
     models = {"with": best.state, "without": state, "unnamed": unnamed}
     scores = {name: log_scores(one.losses, own.block_rows) for name, one in models.items()}
-    kept = confidence_set(scores, config)
+    kept = confidence_set(scores, own.config)
     return best if "with" in kept and "without" not in kept else None
 
 
-def _first(
-    own: Later, state: State, every: dict[Key, Screened], later: Rows, config: DiagnosisConfig
-) -> Candidate | None:
+def _first(own: Later, state: State, every: dict[Key, Screened], later: Rows) -> Candidate | None:
     """Return the first cause that a joint leaves too much without, and holds for later logs."""
     taken = {(one.effect.name, one.effect.joint) for one in state.model.effects}
     seen = [s for key, s in every.items() if s.group.kind == "named" and key not in taken]
     known, motions = ([one.motion for one in rows.data.logs] for rows in (own.rows, later))
     for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
-        effect = own.dictionary.families[one.group.key].shapes[one.group.shape].forms()[0]
-        done = refit(own, state, one.group.key, effect, one.amplitudes, config)
+        done = refit(own, state, own.form(one.group), one.amplitudes)
         if done is None or not done.possible:
             continue
         without = state.mean_squares / done.state.mean_squares
         effect = done.state.model.effects[-1].effect
         beyond = any(q.seen for q in effect.parameters) and effect.goes_beyond(motions, known)
-        if without.max() > config.excess and not beyond:
+        if without.max() > own.config.excess and not beyond:
             return done
     return None

@@ -25,7 +25,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.diagnosis.candidates import Dictionary
-from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.refit import Later, State
@@ -223,18 +222,13 @@ class Trained:
 
     def _sizes(self, state: State) -> Array:
         """(numbers,) by which each number is scaled."""
-        slopes, _ = self.later.slopes(state)
+        slopes, _ = self.later.slopes(state.model)
         size: Array = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
         return np.concatenate([self.later.prior.scale, size])
 
 
 def train(
-    prepared: Prepared,
-    later: Later,
-    causes: Sequence[Named],
-    blocks: int,
-    standing: Standing,
-    config: DiagnosisConfig,
+    prepared: Prepared, later: Later, causes: Sequence[Named], blocks: int, standing: Standing
 ) -> Trained:
     """Return the nominal model and those with causes, in their order, without the held-out rows.
 
@@ -251,26 +245,26 @@ def train(
     rough = Rows.of(data, standing.nominal)
 
     def fitted(rows: Rows) -> Trained:
-        own = _beside(later, rows, standing, config)
+        own = _beside(later, rows, standing)
         states = _chain(own, causes)
         weight = 1.0 / data.rms(data.y - states[0].model.torque(data))
         models = tuple(_refined(own, state, data, weight) for state in states)
         return Trained(models, judge, tuple(states), own, blocks, standing.effects)
 
-    left = data.y - _together(_beside(later, rough, standing, config), causes).torque(data)
+    left = data.y - _together(_beside(later, rough, standing), causes).torque(data)
     plain = fitted(Rows.of(data, standing.nominal, data.rms(left)))
-    white = fitted(rough.whitened(rough.signal(left), config.noise_bins)[0])
-    return plain if _predicts_better(plain, white, config) else white
+    white = fitted(rough.whitened(rough.signal(left), later.config.noise_bins)[0])
+    return plain if _predicts_better(plain, white) else white
 
 
-def _predicts_better(one: Trained, other: Trained, config: DiagnosisConfig) -> bool:
+def _predicts_better(one: Trained, other: Trained) -> bool:
     """Return whether models predict left-out blocks of time significantly better than others."""
     try:
         scores = {"one": one.scores(), "other": other.scores()}
     except np.linalg.LinAlgError:  # one block alone tells a number
         return False
     known = all(len(own) > 1 and np.isfinite(own).all() for own in scores.values())
-    return known and "other" not in confidence_set(scores, config)
+    return known and "other" not in confidence_set(scores, one.later.config)
 
 
 def _together(own: Later, causes: Sequence[Named]) -> Exact:
@@ -291,12 +285,12 @@ def _chain(own: Later, causes: Sequence[Named]) -> list[State]:
     return states
 
 
-def _beside(later: Later, rows: Rows, standing: Standing, config: DiagnosisConfig) -> Later:
+def _beside(later: Later, rows: Rows, standing: Standing) -> Later:
     """Return rows beside the prior of nominal numbers."""
     dataset = replace(later.dataset, later=rows, model=standing.nominal)
     none = rows.nominal.take(np.zeros(0, dtype=np.intp))
     dictionary = Dictionary((), {}, none, None)
-    return Later.of(dataset, dictionary, _nominal(later.prior), config)
+    return Later.of(dataset, dictionary, _nominal(later.prior), later.config)
 
 
 def _nominal(prior: Prior) -> Prior:
@@ -322,7 +316,7 @@ def _refined(later: Later, state: State, data: Data, weight: Array) -> Refined:
 def _fitted(later: Later, state: State, names: Sequence[Which]) -> list[int]:
     """Return which of all slopes, named `names` behind the linear ones, the state has fitted."""
     first = len(state.model.beta)
-    return [*range(first), *(first + names.index(one) for one in later.slopes(state)[1])]
+    return [*range(first), *(first + names.index(one) for one in later.slopes(state.model)[1])]
 
 
 def covariance(later: Later, state: State) -> Array:
@@ -333,7 +327,7 @@ def covariance(later: Later, state: State) -> Array:
     by the scores of the blocks, P⁻¹ Σ_b J_b r_b r_bᵀ J_bᵀ P⁻¹ (White 1980; Liang & Zeger 1986).
     Numbers that the rows do not tell have the variance 0.
     """
-    slopes, _ = later.slopes(state)
+    slopes, _ = later.slopes(state.model)
     size = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
     columns = Table.stacked([state.known.base, state.effects])
     white = state.factor.solve(np.eye(columns.width))

@@ -145,10 +145,7 @@ def settle(
         noise, known = settled(dataset.reference, dictionary.reference)
         reference = dataset.reference.whitened(noise, config.noise_bins)[0], known
     before, known = reference
-    return (
-        replace(dataset, reference=before),
-        replace(dictionary, later=table, reference=known),
-    )
+    return (replace(dataset, reference=before), replace(dictionary, later=table, reference=known))
 
 
 def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tuple[Group, ...]:

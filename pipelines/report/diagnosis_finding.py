@@ -24,7 +24,6 @@ from pipelines.report.diagnosis_words import (
     told_value,
     torque_of,
     unit_or_dash,
-    without_keys,
 )
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Section, Table
@@ -62,10 +61,8 @@ def finding_section(number: int, one: Finding, nominal: ResidualRms, offer: bool
     if one.origin == "frequency responses":
         text.append("Frequency responses name it, and it explains these logs as well; its numbers are "
                     "fitted to both")
-    if one.doubt:
-        text.append(f"The extended model goes without it: {without_keys(one.doubt)}")
-    if offer and not one.doubt and not _happens_once(one):
-        text.append(_offer(one, [other for other in beside if not other.doubt and not _happens_once(other)]))
+    if offer and not _happens_once(one):
+        text.append(_offer(one, [other for other in beside if not _happens_once(other)]))
     if one.alternatives:
         names = ", ".join(f"{named(r.cause, r.joint)} (similarity {format_number(r.similarity, 2)})" for r in one.alternatives)
         text.append(f"It could also be {names}. To tell: {one.experiment or kind.words.experiment}")

@@ -12,13 +12,12 @@ from pipelines.report.style import format_number, format_unit
 
 __all__ = ["limits_sections"]
 
-_WAY = {"injected": "injection", "analytic": "analytic"}  # how a detection limit was found
 _AT = {  # what of a cause's shape a technician can use; the rest is the form of its law
     "order": "{size} waves {per}", "from_joint": "from joint {size}", "with_joint": "with joint {size}", "link": "of link {size}",
     "speed": "speed {size} {unit}", "distance": "travel {size} {unit}", "time_constant": "time constant {size} {unit}",
     "duration": "lasting {size} {unit}", "frequency": "{size} {unit}", "gap": "free play {size} {unit}",
     "limit": "at {size} {unit}"}
-_FOUND = ("With 95 %, had it been there; nothing smaller can be excluded; by injection into these logs, or analytically. "
+_FOUND = ("With 95 %, had it been there, by the power of the test; nothing smaller can be excluded. "
           "Cannot be seen: nothing that is physically likely would show.")
 
 
@@ -28,7 +27,7 @@ def limits_sections(result: Diagnosis) -> list[Section]:
     if result.detection_limits:
         rows = tuple((title_of(one.cause), one.joint, spoken(one.parameter), *_smallest(one)) for one in result.detection_limits)
         sections.append(Section("What would have been found", (_FOUND,),
-                                (Table(("cause", "joint", "parameter", "smallest", "unit", "at", "by"), rows),)))
+                                (Table(("cause", "joint", "parameter", "smallest", "unit", "at"), rows),)))
     if result.not_identifiable:
         hidden = tuple((title_of(one.cause), one.joint, without_keys(one.reason), without_keys(one.record))
                        for one in result.not_identifiable)
@@ -49,11 +48,11 @@ def _shape(at: Mapping[str, Value]) -> str:
 
 
 def _smallest(one: DetectionLimit) -> tuple[str, ...]:
-    """Value, unit, for what it is, and how it is known; words where nothing that is expected in either direction would show."""
+    """Value, unit, and for what it is; words where nothing that is expected in either direction would show."""
     value = one.minimum.value
     ends = [abs(end) for q in find_effect(one.cause).parameters if q.name == one.parameter for end in (q.low, q.high) if end]
     expected = [] if one.or_less else ends
     if isinstance(value, float) and expected and value >= min(expected):
-        return "cannot be seen", "", "", ""
+        return "cannot be seen", "", ""
     told = format_number(value, 2) if isinstance(value, float) else told_value(one.minimum)
-    return told, unit_or_dash(one.minimum.unit), "this or less" if one.or_less else _shape(one.at), _WAY[one.way]
+    return told, unit_or_dash(one.minimum.unit), "this or less" if one.or_less else _shape(one.at)

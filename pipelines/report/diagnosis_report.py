@@ -196,15 +196,13 @@ def _others(result: Result) -> list[Section]:
     shown += [t for t in sorted(result.candidate_causes, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
     if shown:
         rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _reachable(t.threshold),
-                      _hundredths(100.0 * t.exact_gain), _hundredths(t.identifiability),
-                      _outcome(t, result))
+                      _hundredths(100.0 * t.exact_gain), _outcome(t, result))
                      for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
         tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
         more = len(result.candidate_causes) - len(rows)
         text = (f"{more} more, all weaker, are in result.json.",) if more > 0 else ()
         sections.append(Section("Candidate causes", text, (Table(
             ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]",
-             "identifiability",
              "outcome"), rows,
             "Gain in square: share of the squared residual of the fitted logs that each takes away; what does not exceed its "
             f"threshold is not accepted, nor what held-out time does not confirm. {_OUT_OF_REACH} "

@@ -41,7 +41,7 @@ def _arm(shared: Path, number: str, names: str = "*") -> _Arm:
     prepared = prepare(Logs.by_role([read_parts(path)[0] for path in paths]), settings)
     found = diagnose_prepared(prepared, config)
     told, extended = answer(prepared, found, lambda words: None, _BLOCKS, whole=False)
-    limits = limits_of(found.look.later, found.look.selection.end, found.look.baseline, found.config)
+    limits = limits_of(found.look.later, found.look.selection.end, found.look.baseline)
     return _Arm(prepared, told, limits, extended, truth["parameters"], (truth["cause"], truth["joint"]))
 
 

@@ -55,14 +55,14 @@ def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
     assert [(one.effect, one.joint) for one in model.effects] == [("cogging", 2)]
 
 
-def test_what_does_harm_to_the_model_is_not_offered() -> None:
-    """Frequency responses name a soft base, and held-out motion shows none: the model is extended by the rest alone."""
-    soft: Any = SimpleNamespace(cause="base_resonance", joint=None, doubt="the held-out torque error is larger with it")
-    ripple: Any = SimpleNamespace(cause="cogging", joint=2, doubt="")
-    diagnosed: Any = SimpleNamespace(findings=(soft, ripple), verdict="cause")
+def test_what_happens_once_is_not_offered() -> None:
+    """Somebody touched the arm in one log: the model is extended by the rest alone."""
+    touch: Any = SimpleNamespace(cause="contact", joint=None)
+    ripple: Any = SimpleNamespace(cause="cogging", joint=2)
+    diagnosed: Any = SimpleNamespace(findings=(touch, ripple), verdict="cause")
     assert [one.effect.name for one in extend._found(diagnosed, "logs")] == ["cogging"]
-    diagnosed.findings = (soft,)
-    with pytest.raises(NothingMatched, match=r"happens once, or is in doubt, .*nothing to extend the model by"):
+    diagnosed.findings = (touch,)
+    with pytest.raises(NothingMatched, match=r"happens once, .*nothing to extend the model by"):
         extend._found(diagnosed, "logs")
 
 

@@ -162,7 +162,7 @@ def test_what_machines_in_order_have_is_no_problem(causes: tuple[str, ...], alte
 
 def test_a_threshold_that_nothing_can_exceed_is_no_figure() -> None:
     """No gain is more than the whole residual: 604 % says nothing but that the cause cannot be shown."""
-    trials = tuple(Trial(1, "cogging", joint, 0.02, threshold, 0.95, float("nan"), False, "below its threshold")
+    trials = tuple(Trial(1, "cogging", joint, 0.02, threshold, float("nan"), False, "below its threshold")
                    for joint, threshold in ((1, 0.05), (2, 6.04)))
     bounds = tuple(Threshold("cogging", joint, threshold, "blocks") for joint, threshold in ((1, 0.05), (2, 6.04)))
     page = diagnosis_report(Result(**(NOTHING | {"candidate_causes": trials, "thresholds": bounds})))
