@@ -15,12 +15,15 @@ class DiagnosisConfig:
 
     cutoff_hz: float | None = None  # zero-phase low-pass of all rows; None: as `recipe`
     lowest_hz: float = 10.0  # of a low-pass that is found: blocks and whitening need rows enough
+    keep: float = (
+        2.6  # rows in a period of the low-pass; more would fill a band, from 1.3 of the cut-off,
+        # where it lets a tenth through, with nothing but what whitening amplifies
+    )
     highest_hz: float = 25.0  # of a low-pass that is found: above it quantised positions dominate
     alpha: float = 0.01  # family-wise error of screening, all candidates together
     set_alpha: float = 0.05  # of the model confidence set (Hansen, Lunde & Nason 2011)
     block: float = 1.0  # [s] blocks of the predictive score, longer than the low-pass remembers
     blocks_together: int = 3  # length of the moving blocks of the bootstrap, in blocks
-    resamples: int = 400  # of the bootstrap
     friction_drift: float = 0.3  # relative std of friction between sessions
     healthy_share: float = (
         0.001  # of a joint's torque, whitened as its noise, in which a healthy machine differs from
@@ -64,6 +67,7 @@ class DiagnosisConfig:
         return Recipe(
             cutoff_hz=self.cutoff_hz,
             decimation=decimation,
+            keep=self.keep,
             min_speed=min_speed,
             orders=self.ripple_orders,
             lowest_hz=self.lowest_hz,

@@ -30,6 +30,7 @@ __all__ = ["Blocks", "chi2_bound", "confidence_set", "log_scores", "probabilitie
 K = TypeVar("K", bound=Hashable)
 
 _SEED = 1
+_RESAMPLES = 400  # numerics: of the bootstrap
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,9 +126,9 @@ def probabilities(scores: Mapping[K, Array], config: DiagnosisConfig) -> dict[K,
 def _drawn(blocks: int, config: DiagnosisConfig) -> Indices:
     """Return the blocks (resamples, blocks) of each resample of the moving-block bootstrap."""
     length, rng = min(config.blocks_together, blocks), np.random.default_rng(_SEED)
-    starts = rng.integers(0, blocks, (config.resamples, -(-blocks // length)))
+    starts = rng.integers(0, blocks, (_RESAMPLES, -(-blocks // length)))
     runs = starts[:, :, None] + np.arange(length)
-    return np.asarray(runs.reshape(config.resamples, -1)[:, :blocks] % blocks)
+    return np.asarray(runs.reshape(_RESAMPLES, -1)[:, :blocks] % blocks)
 
 
 def confidence_set(scores: Mapping[K, Array], config: DiagnosisConfig) -> list[K]:

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.blocks import impulse_toeplitz
 
-__all__ = ["LowPass", "ample", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "fast_length",
+__all__ = ["KEEP", "LowPass", "ample", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "fast_length",
            "passed_both_ways", "thinned", "zero_phase"]
 
 Array = npt.NDArray[np.float64]
@@ -23,7 +23,7 @@ Complex = npt.NDArray[np.complex128]
 
 _BLOCK = 48
 _AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed at least
-_KEEP = 4.0  # samples left per period of the cut-off: the filter is down by 2 × 6 dB per octave and order at the new Nyquist
+KEEP = 4.0  # samples left per period of the cut-off: the filter is down by 2 × 6 dB per octave and order at the new Nyquist
 
 
 @dataclass(frozen=True)
@@ -116,12 +116,12 @@ def _carry(across: Complex, drive: Array) -> Array:
     return drive
 
 
-def choose_decimation(cutoff_hz: float, rate: float) -> int:
-    """Every how many samples are enough after a low-pass at `cutoff_hz`: at least four a period of the cut-off stay.
+def choose_decimation(cutoff_hz: float, rate: float, keep: float = KEEP) -> int:
+    """Every how many samples are enough after a low-pass at `cutoff_hz`: at least `keep` a period of the cut-off stay.
 
     A multiple of `ample`, so that columns computed at that step hold every sample that stays.
     """
-    most, step = max(1, int(rate / (_KEEP * cutoff_hz) + 1e-9)), ample(cutoff_hz, rate)
+    most, step = max(1, int(rate / (keep * cutoff_hz) + 1e-9)), ample(cutoff_hz, rate)
     return most - most % step
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines.log.limits import GAP_TICKS
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.signal.filters import LowPass, choose_decimation, design_low_pass
+from pipelines.signal.filters import KEEP, LowPass, choose_decimation, design_low_pass
 
 __all__ = ["HIGHEST", "Conditioning", "condition", "cutoff_at", "wanted_cutoff"]
 
@@ -26,13 +26,19 @@ class Conditioning:
     min_speed: tuple[float, ...]  # [rad/s] slower samples of a joint are left out of its own equations
 
 
-def condition(motion: Motion, rate: float, cutoff_hz: float | None, decimation: int | None, min_speed: Array) -> Conditioning:
-    """The filter for a log, its cut-off from the motion where none is given; none where the rate is too low for it."""
+def condition(motion: Motion, rate: float, cutoff_hz: float | None, decimation: int | None, min_speed: Array,
+              keep: float = KEEP) -> Conditioning:
+    """The filter for a log, its cut-off from the motion where none is given; none where the rate is too low for it.
+
+    Args:
+        keep: samples left in a period of the cut-off, where no decimation is given.
+    """
     cutoff = cutoff_at(wanted_cutoff(motion, rate) if cutoff_hz is None else cutoff_hz, rate)
     speeds = tuple(map(float, min_speed))
     if cutoff is None:
         return Conditioning(None, None, decimation or 1, speeds)
-    return Conditioning(design_low_pass(cutoff, rate), cutoff, decimation or choose_decimation(cutoff, rate), speeds)
+    every = decimation or choose_decimation(cutoff, rate, keep)
+    return Conditioning(design_low_pass(cutoff, rate), cutoff, every, speeds)
 
 
 def cutoff_at(cutoff_hz: float | None, rate: float) -> float | None:

@@ -18,6 +18,7 @@ from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
+from pipelines.signal.filters import KEEP
 
 __all__ = ["FEWEST_OF_JOINT", "Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",
            "none_left", "of_each", "refuse_too_few", "with_cutoff"]
@@ -43,6 +44,7 @@ class Recipe:
     lowest_hz: float = 0.0  # of a cut-off that is found
     highest_hz: float = np.inf
     found: bool = False  # the cut-off, or that there is none, came of the fitted logs; one of a lower rate does without
+    keep: float = KEEP  # samples left in a period of the cut-off, where no decimation is given
 
 
 @dataclass(frozen=True, eq=False)
@@ -208,7 +210,7 @@ def equations_of(motions: Motions, recipe: Recipe, columns: Columns, rows: Seque
 def _of_log(log: ExperimentLog, found: Reconstructed, recipe: Recipe, columns: Columns, rows: Rows | None) -> LogEquations:
     slow: Array = np.broadcast_to(np.array(recipe.min_speed, dtype=np.float64), columns.body.robot.n_joints)
     cutoff = np.inf if recipe.found and recipe.cutoff_hz is None else recipe.cutoff_hz
-    how = condition(found.motion, 1.0 / log.sample_time, cutoff, recipe.decimation, slow)
+    how = condition(found.motion, 1.0 / log.sample_time, cutoff, recipe.decimation, slow, recipe.keep)
     equations = LogEquations(columns, found, how, held=log.torque != "measured", known=recipe.known, chosen=rows)
     if not equations.runs:
         raise InputRejected("T04", f"no stretch without a gap outlasts the low-pass at {how.cutoff_hz:.3g} Hz",
