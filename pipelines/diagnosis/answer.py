@@ -14,8 +14,14 @@ import numpy as np
 from pipelines.diagnosis.compliance import gaps_untold, untold
 from pipelines.diagnosis.decision import limited_by_estimate
 from pipelines.diagnosis.engine import Diagnosis as Found
-from pipelines.diagnosis.figures import evidence, with_simulation
-from pipelines.diagnosis.findings import Worth, alternatives_of, extension_of, findings_of, weigh
+from pipelines.diagnosis.findings import (
+    Worth,
+    alternatives_of,
+    extension_of,
+    findings_of,
+    weigh,
+    with_simulation,
+)
 from pipelines.diagnosis.limits import Limits, limits_of, without_limit
 from pipelines.diagnosis.result import (
     Diagnosis,
@@ -36,6 +42,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.rows.families import place_of
 from pipelines.model.rows.fit import worse_log
 from pipelines.model.rows.prepare import Prepared
+from pipelines.model.rows.residual_analysis import evidence
 from pipelines.model.words import within
 
 __all__ = ["WEAKER", "answer"]

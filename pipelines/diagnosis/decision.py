@@ -1,16 +1,7 @@
 """Decide: a cause, none, unknown, or that the logs cannot show it.
 
-    decision = decide(later, selection, baseline)
-    result = limited_by_estimate(result, prepared)         the verdict "cannot-judge"
-    common, differing = Repeated.of(data).parts(left)      what is noise, and what is not
-
-Noise is what differs between two rows of one state. With a residual r = f(q, dq, ddq) + e of a
-model error f and noise e, independent in both rows,
-
-    E ¼ (r₁ - r₂)² = ½ σ²        E ¼ (r₁ + r₂)² = ½ σ² + f²
-
-(Rice 1984, difference-based variance). Rows of periods that come again are such pairs, declared or
-not, within a log or between two. Where states differ a little, σ² is too large, not too small.
+decision = decide(later, selection, baseline)
+result = limited_by_estimate(result, prepared)         the verdict "cannot-judge"
 """
 
 from __future__ import annotations
@@ -20,7 +11,6 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.events import DIRECTIONS
@@ -37,61 +27,9 @@ from pipelines.model.estimation.regression import Columns, LogEquations
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Prepared
-from pipelines.signal.neighbours import nearest_pairs
+from pipelines.model.rows.repeated import Repeated
 
-__all__ = ["Decision", "Repeated", "decide", "facts", "limited_by_estimate", "nominal_estimate"]
-
-_STILL = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²; m, m/s, m/s²] less motion is noise
-_NEAR = 0.1  # of the standard deviation of each coordinate: rows of one state
-_APART = 1.0  # [s] in a log, at least: after less, what wanders is still where it was
-_OTHER_LOG = 1e9  # numerics: [s] between the clocks of two logs
-_FEWEST = 100  # numerics: pairs of a joint; fewer say little
-
-
-@dataclass(frozen=True, eq=False)
-class Repeated:
-    """Pairs of rows of one state; no row is in two of them."""
-
-    data: Data
-    first: npt.NDArray[np.intp]  # (pairs,) among the rows of all logs, one joint
-    second: npt.NDArray[np.intp]
-
-    @classmethod
-    def of(cls, data: Data) -> Repeated:
-        """Return the pairs, nearest first."""
-        logs = []
-        for one in data.logs:
-            scaled = zip((one.motion.q, one.motion.dq, one.motion.ddq), _STILL, strict=True)
-            logs.append(np.hstack([one.at_rows(x) / least for x, least in scaled]))
-        log = np.repeat(np.arange(len(logs)), [len(own) for own in logs])
-        time = np.concatenate([one.t for one in data.logs]) + _OTHER_LOG * log
-        return cls(data, *nearest_pairs(np.vstack(logs), time, _NEAR, _APART))
-
-    @property
-    def count(self) -> Array:
-        """(joints,) pairs that count."""
-        return np.asarray(self._counts.sum(axis=1), dtype=np.float64)
-
-    def parts(self, left: Array) -> tuple[Array, Array]:
-        """Return the mean squares of what pairs of a residual (rows,) share, and of the rest."""
-        one, other = (self._laid(left)[:, at] for at in (self.first, self.second))
-        counts, number = self._counts, np.where(self.count < _FEWEST, np.nan, self.count)
-        both = (one + other, one - other)
-        return tuple(np.square(0.5 * x).sum(axis=1, where=counts) / number for x in both)
-
-    def noise(self, left: Array) -> Array:
-        """Return the variance (joints,) of a residual's noise; NaN of too few pairs."""
-        return 2.0 * self.parts(left)[1]
-
-    @property
-    def _counts(self) -> npt.NDArray[np.bool_]:
-        """(joints, pairs)"""
-        weighed = np.concatenate([one.weighed for one in self.data.logs], axis=1)
-        return np.asarray(weighed[:, self.first] & weighed[:, self.second])
-
-    def _laid(self, x: Array) -> Array:
-        """(rows,) -> (joints, rows of one joint)"""
-        return np.concatenate(list(self.data.split(x)), axis=1)
+__all__ = ["Decision", "decide", "facts", "limited_by_estimate", "nominal_estimate"]
 
 
 @dataclass(frozen=True)

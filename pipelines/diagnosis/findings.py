@@ -13,16 +13,15 @@ from typing import Literal
 import numpy as np
 
 from pipelines.diagnosis.compliance import Compliance
-from pipelines.diagnosis.figures import proof
 from pipelines.diagnosis.refit import Fit, Later, State
 from pipelines.diagnosis.result import (
     Alternative,
     Answer,
     BeforeAfter,
+    Diagnosis,
     Extended,
     Finding,
     Gain,
-    Proof,
     ResidualRms,
     TipError,
 )
@@ -33,9 +32,18 @@ from pipelines.diagnosis.trained import Standing, Trained, covariance, parameter
 from pipelines.model.arm import Acting
 from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared
+from pipelines.model.rows.residual_analysis import Proof, proof
 from pipelines.model.simulation.comparison import Simulation, simulation_errors
 
-__all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "gain_of", "weigh"]
+__all__ = [
+    "Worth",
+    "alternatives_of",
+    "extension_of",
+    "findings_of",
+    "gain_of",
+    "weigh",
+    "with_simulation",
+]
 
 
 def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
@@ -150,6 +158,31 @@ def findings_of(
             )
         )
     return tuple(sorted(out, key=lambda one: -one.explained))
+
+
+_SECONDS, _POINTS = 3.0, 1500  # of a simulated log that are shown at most
+
+
+def with_simulation(found: Diagnosis, nominal: Simulation, extended: Simulation) -> Diagnosis:
+    """Return the result with the position errors of both arms, where both ran in closed loop."""
+    if not found.evidence or nominal.first is None or extended.first is None:
+        return found
+    first, other = nominal.first, extended.first.error
+    samples = int(np.searchsorted(first.t, _SECONDS))
+    shown = slice(0, samples, max(1, samples // _POINTS))
+    return replace(
+        found,
+        evidence=(
+            replace(
+                found.evidence[0],
+                simulated_t=first.t[shown],
+                simulated_position_error=first.error[shown],
+                simulated_log=first.log,
+                extended_position_error=other[shown],
+            ),
+            *found.evidence[1:],
+        ),
+    )
 
 
 Origin = Literal["residual", "base parameters", "frequency responses", "reversals"]

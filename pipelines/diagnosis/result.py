@@ -18,27 +18,24 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.prepare import FewerTerms
+from pipelines.model.rows.residual_analysis import Evidence, Proof
 from pipelines.model.simulation.comparison import SimulatedSpan
 
 __all__ = [
     "Alternative",
     "Answer",
     "BeforeAfter",
-    "Curve",
     "DetectionLimit",
     "Diagnosis",
-    "Evidence",
     "Extended",
     "Extension",
     "Finding",
     "Gain",
     "JudgedBy",
     "NotIdentifiable",
-    "Proof",
     "Rejected",
     "ResidualRms",
     "Result",
-    "Spectrum",
     "Standing",
     "Threshold",
     "TipError",
@@ -97,28 +94,6 @@ class Gain:
     simulation: Literal["closed-loop", "windowed", "none"]
     tip_error_rms: TipError | None
     simulated_span: tuple[SimulatedSpan, ...] = ()  # over which the simulated figures are taken
-
-
-@dataclass(frozen=True)
-class Proof:
-    """The figure that proves a finding: the residual before and after, and what the cause predicts.
-
-    Of the joint that shows most of it, over the signal that the cause depends on, in bins of equal
-    count, or, where it depends on none, the amplitudes of all three over frequency; and over time.
-    """
-
-    joint: int  # 1-based, whose residual is shown
-    against: str  # a signal of `figures.signals`, or "frequency"
-    unit: str
-    x: Array  # (bins,) middle of each
-    before: Array  # (bins,) [N m] mean residual without the finding
-    after: Array  # with it
-    predicted: Array  # what the finding predicts of `before`
-    spread: Array  # (bins,) [N m] standard error of `before`; none over frequency
-    t: Array  # (samples,) [s] a stretch of time where it shows most
-    before_in_time: Array
-    after_in_time: Array
-    predicted_in_time: Array
 
 
 @dataclass(frozen=True)
@@ -237,49 +212,6 @@ class Threshold:
     joint: int | None
     gain: float  # share of the squared weighted residual
     origin: str  # the logs between whose parts nothing has changed
-
-
-@dataclass(frozen=True)
-class Curve:
-    """The residual against one signal of its joint, in bins of equal count."""
-
-    joint: int
-    against: str
-    unit: str
-    x: Array  # (bins,)
-    mean: Array  # [N m]
-    spread: Array  # [N m] standard deviation within the bin
-    explained: float  # share of the residual's power that the means hold
-
-
-@dataclass(frozen=True)
-class Spectrum:
-    """Of one joint's residual: over time's frequency or over the orders of its angle."""
-
-    joint: int
-    over: Literal["frequency", "order"]
-    unit: str  # "Hz" | "1/rev"
-    x: Array  # (bins,)
-    amplitude: Array  # [N m] of each line or bin
-
-
-@dataclass(frozen=True)
-class Evidence:
-    """Residual analysis of one log."""
-
-    log: str  # name of the log that is shown
-    t: Array  # [s] (points,)
-    measured: Array  # [N m] (points, joints) after the low-pass
-    predicted: Array
-    residual: Array
-    simulated_t: Array | None  # [s] (points,)
-    simulated_position_error: Array | None  # [rad] (points, joints) simulated minus measured
-    curves: tuple[Curve, ...]
-    spectra: tuple[Spectrum, ...]
-    above_noise_floor: Array  # (joints,) share of the residual's power that is above the floor
-    band: Array  # (joints, 2) [Hz] in which most of that lies
-    simulated_log: str = ""  # name of the log that was simulated in closed loop
-    extended_position_error: Array | None = None  # [rad] (points, joints) of the extended model
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,10 @@ from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.selection import Candidate, refit
-from pipelines.diagnosis.trained import Standing, acting, told
+from pipelines.diagnosis.trained import Standing, told
 from pipelines.model.effects.base import adds
 from pipelines.model.rows.data import Data
-from pipelines.model.rows.fit import refine
+from pipelines.model.rows.fit import acting, refine
 
 __all__ = ["standing_of"]
 
@@ -49,7 +49,7 @@ def standing_of(prepared: Data | None, later: Later) -> Standing:
         states.append(best.state)
     weight = 1.0 / prepared.rms(prepared.y - states[-1].model.torque(prepared))
     done = refine(states[-1].model, prepared, weight)
-    effects = tuple(acting(done, k) for k in range(len(done.model.effects)))
+    effects = tuple(acting(done, k, finite=True) for k in range(len(done.model.effects)))
     rms = [prepared.rms(prepared.y - one.model.torque(prepared)) for one in states[:-1]]
     power = [float(np.sum(np.square(one / done.rms) - 1.0)) for one in (*rms, done.rms)]
     shares = np.clip(-np.diff(power) / max(power[0], 1e-12), 0.0, 1.0)

@@ -10,10 +10,6 @@ A model for simulation has no standing dictionary, but in its place causes that 
 show. The prior is that of its nominal numbers alone,
 
     N(m_n, (A_nn - A_ns A_ss⁻¹ A_sn)⁻¹),   the marginal of N(m, A⁻¹).
-
-What is reported follows from the fitted numbers to first order (the delta method): √(s C sᵀ), with
-slopes s and the covariance C of all numbers of the model. What follows mostly from a number that
-these logs do not distinguish from others has the deviation ∞.
 """
 
 from __future__ import annotations
@@ -22,7 +18,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.dataset import Rows
@@ -32,31 +27,15 @@ from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.result import Value
 from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.table import Array, Arrow, Table
-from pipelines.fit.differences import difference
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import Values
-from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
-from pipelines.model.rows.exact import Exact, Named, Which, number_moved, slopes_of
-from pipelines.model.rows.fit import Refined
+from pipelines.model.rows.exact import Exact, Named, Which, slopes_of
+from pipelines.model.rows.fit import Refined, acting, with_uncertainty
 from pipelines.model.rows.nominal import rigid_rows
 from pipelines.model.rows.prepare import Prepared
 
-__all__ = [
-    "Standing",
-    "Trained",
-    "acting",
-    "covariance",
-    "parameters",
-    "told",
-    "train",
-    "with_uncertainty",
-]
-
-Mask = npt.NDArray[np.bool_]
-
-_STEP = 1e-4  # numerics: of an amplitude or of its deviation, whichever is larger
+__all__ = ["Standing", "Trained", "covariance", "parameters", "told", "train"]
 
 
 def told(acting: Acting) -> dict[str, Value]:
@@ -79,53 +58,7 @@ def told(acting: Acting) -> dict[str, Value]:
 
 def parameters(done: Refined, place: int) -> dict[str, Value]:
     """Return what is reported of effect number `place`."""
-    return told(_with(done, place, _deviations(done, place)))
-
-
-def acting(done: Refined, place: int) -> Acting:
-    """Return effect number `place` with its numbers and their finite deviations, for a model."""
-    std = _deviations(done, place)
-    return _with(done, place, {name: x for name, x in std.items() if np.isfinite(x)})
-
-
-def _with(done: Refined, place: int, std: dict[str, float]) -> Acting:
-    one, revolute = done.model.effects[place], done.model.columns.body.robot.revolute
-    turning = one.effect.joint is None or revolute[one.effect.joint - 1]
-    return Acting.of(one.effect, one.values, std, revolute=turning)
-
-
-def _deviations(done: Refined, place: int) -> dict[str, float]:
-    """Return the deviation of every parameter that follows from numbers that were fitted.
-
-    Infinite where a number that these logs do not tell moves it more than all others.
-    """
-    one, index = done.model.effects[place], done.of_effect(place)
-    covariance = done.covariance()[np.ix_(index, index)]
-    std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
-    steps, moved = [], []
-    for k, known in zip(index, std, strict=True):
-        name = done.names[k - len(done.model.beta)][2]
-        size = max(abs(one.amplitudes[int(name)]), known) or 1.0 if name.isdigit() else 1.0
-        steps.append(_STEP * size)
-        moved.append(number_moved(one, name, steps[-1]).values)
-    return _by_slopes(one, moved, np.array(steps), covariance, np.isin(index, done.unseen))
-
-
-def _by_slopes(
-    one: Named, moved: Sequence[Values], steps: Array, covariance: Array, unseen: Mask
-) -> dict[str, float]:
-    """Return the deviations by the values with one number after the other moved by its step."""
-    found = {}
-    for q in one.effect.parameters:
-        here = one.values[q.name]
-        slope = np.array([difference(here, there[q.name], q.period) for there in moved]) / steps
-        if not slope.any() or not np.isfinite(slope).all():
-            continue
-        size = np.abs(slope)
-        hidden = np.where(unseen, size, 0.0).max() > np.where(unseen, 0.0, size).max()
-        variance = max(float(slope @ covariance @ slope), 0.0)
-        found[q.name] = np.inf if hidden else float(np.sqrt(variance))
-    return found
+    return told(acting(done, place))
 
 
 _UNSEEN = 1e6  # numerics: variance of a number of unit columns, from which the rows do not tell it
@@ -168,7 +101,7 @@ class Trained:
         """Return an arm with the baseline effects and every lasting cause, and their deviations."""
         done = self.models[place]
         kept = [k for k, one in enumerate(done.model.effects) if one.log is None]
-        own = (acting(done, k) for k in kept)
+        own = (acting(done, k, finite=True) for k in kept)
         return with_uncertainty(done.model.nominal.extended(*self.standing, *own), done)
 
     @property
@@ -347,27 +280,3 @@ def covariance(later: Later, state: State) -> Array:
     told = np.diag(white)[numbers] < _UNSEEN
     told[: later.prior.n_nominal] = True
     return np.asarray(out * told * told[:, None])
-
-
-def with_uncertainty(arm: Arm, done: Refined) -> Arm:
-    """Return the arm with the standard deviations of its base parameters and friction laws.
-
-    The shape of a law moves by its logarithm.
-    """
-    std = np.sqrt(np.maximum(np.diagonal(done.covariance()), 0.0)).tolist()
-    columns, count = done.model.columns, len(done.model.beta)
-    place = {i: k for k, i in enumerate(columns.kept)}
-    base = tuple(replace(p, std=std[place[i]]) if i in place else p for i, p in enumerate(arm.base))
-    linear = [
-        (k, q.name) for k, law in enumerate(columns.laws) for q in law.parameters if not q.shape
-    ]
-    known = dict(zip(linear, std[len(columns.kept) : count], strict=True))
-    for (kind, k, name), own in zip(done.names, std[count:], strict=True):
-        if kind == 0 and own > 0.0:
-            known[k, name] = own * abs(getattr(columns.laws[k], name))
-    laws = [k for k, law in enumerate(columns.laws) if isinstance(law, FrictionLaw)]
-    friction = []
-    for k, law in zip(laws, arm.friction, strict=True):
-        own = tuple(replace(p, std=known.get((k, p.name), p.std)) for p in law.parameters)
-        friction.append(replace(law, parameters=own))
-    return replace(arm, base=base, friction=tuple(friction))

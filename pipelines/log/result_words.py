@@ -32,7 +32,6 @@ WORDS: Final[dict[str, str]] = {
     "Balance.value": "the parameters by the balance of power, in the order of `names`", "Balance.std": "their standard deviations",
     "condition_number": "condition number of the columns; 1 is the best there is", "origin": "where it comes from",
     "visible": "whether these logs show it clearly", "gain": "what it gains on held-out logs",
-    "identifiability": "share of its columns that the refitted model cannot absorb",
     "explained": "share of the residual that it explains",
     # findings
     "verdict": "cause, no-fault-found, unknown or cannot-judge", "cause": "identifier of the cause, as commands take it",

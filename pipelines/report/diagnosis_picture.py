@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.diagnosis.result import Curve, Diagnosis, Evidence, Spectrum
+from pipelines.diagnosis.result import Diagnosis
+from pipelines.model.rows.residual_analysis import Curve, Evidence, Spectrum
 from pipelines.report import style
 from pipelines.report.diagnosis_floor import floor_words
 from pipelines.report.figures import broken_at_gaps, draw_measured, draw_modelled, envelope, joint_axes, joint_size

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.diagnosis.result import Finding, Proof
+from pipelines.diagnosis.result import Finding
+from pipelines.model.rows.residual_analysis import Proof
 from pipelines.report import style
 from pipelines.report.figures import broken_at_gaps
 from pipelines.report.joint_units import Units

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.trained import _by_slopes, acting, parameters, told
+from pipelines.diagnosis.trained import parameters, told
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
@@ -19,7 +19,7 @@ from pipelines.model.effects.transmission_coupling import TransmissionCoupling
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact, Named
-from pipelines.model.rows.fit import Refined, refine
+from pipelines.model.rows.fit import Refined, _by_slopes, acting, refine
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.arms import hidden
@@ -50,7 +50,7 @@ def test_an_inertia_that_is_a_part_of_the_links_is_not_known(joint: int, told: b
     done = _fitted(joint)
     found = parameters(done, 0)
     assert np.isfinite(found["inertia"].std) is np.bool_(told)
-    of_model = {parameter.name: parameter.std for parameter in acting(done, 0).parameters}
+    of_model = {parameter.name: parameter.std for parameter in acting(done, 0, finite=True).parameters}
     assert (of_model["inertia"] is not None) is told
     for name, true in (("viscous", VISCOUS), ("coulomb", COULOMB), *((("inertia", INERTIA),) if told else ())):
         assert found[name].value == pytest.approx(true, abs=max(4.0 * found[name].std, 0.02 * true))

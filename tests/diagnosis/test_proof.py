@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.figures import _fine_enough, binned, proof
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.model.rows.residual_analysis import _fine_enough, binned, proof
 from pipelines.report.diagnosis_proof import proof_figures
 from tests.diagnosis.rotor import turned
 from tests.report.test_diagnosis_words import found

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.decision import Repeated
 from pipelines.log.experiment import Array
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.prepare import Logs, prepare
+from pipelines.model.rows.repeated import Repeated
 from tests.diagnosis.arms import hidden
 
 NOISE = 0.05

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.figures import with_simulation
+from pipelines.diagnosis.findings import with_simulation
 from pipelines.model.simulation.comparison import Strayed
 
 

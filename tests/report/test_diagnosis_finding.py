@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure as Drawing
 
-from pipelines.diagnosis.result import Answer, Finding, Gain, Proof, Rejected, ResidualRms, Value
+from pipelines.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, Value
 from pipelines.diagnosis.words import how_much, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.model.rows.fit import TorqueGain
+from pipelines.model.rows.residual_analysis import Proof
 from pipelines.report.diagnosis_finding import finding_section
 from pipelines.report.diagnosis_floor import what_stays
 from pipelines.report.diagnosis_proof import draw_proof_in_time

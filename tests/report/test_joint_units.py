@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.diagnosis.result import BeforeAfter, Curve, Diagnosis, Evidence, Extension, Gain, ResidualRms
+from pipelines.diagnosis.result import BeforeAfter, Diagnosis, Extension, Gain, ResidualRms
 from pipelines.model.excitation.limits import Limit
 from pipelines.model.rows.fit import TorqueGain
+from pipelines.model.rows.residual_analysis import Curve, Evidence
 from pipelines.report.diagnosis_finding import gain_table
 from pipelines.report.diagnosis_floor import torque_errors
 from pipelines.report.joint_units import Units, each, unit_of, units_in

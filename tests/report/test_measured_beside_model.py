@@ -7,8 +7,8 @@ import io
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.result import Evidence
 from pipelines.model.friction.result import Series
+from pipelines.model.rows.residual_analysis import Evidence
 from pipelines.report import style
 from pipelines.report.bps import torque_figure
 from pipelines.report.diagnosis_picture import _figures

@@ -20,15 +20,17 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.bootstrap import apart
+from pipelines.fit.differences import difference
 from pipelines.log.experiment import Array
-from pipelines.model.effects.base import Effect
+from pipelines.model.arm import Acting, Arm
+from pipelines.model.effects.base import Effect, Values
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rows.data import Data
-from pipelines.model.rows.exact import Exact, Which, slopes_of
+from pipelines.model.rows.exact import Exact, Named, Which, number_moved, slopes_of
 from pipelines.model.rows.nominal import rigid_rows
 
-__all__ = ["Refined", "TorqueGain", "covariance", "dissipating", "driving", "left_out", "refine",
-           "solved", "superfluous", "torque_gain_of", "worse_log"]
+__all__ = ["Refined", "TorqueGain", "acting", "covariance", "dissipating", "driving", "left_out", "refine", "solved",
+           "superfluous", "torque_gain_of", "with_uncertainty", "worse_log"]
 
 
 def dissipating(beta: Array, laws: Sequence[Effect]) -> Array:
@@ -292,6 +294,82 @@ def _beyond(model: Exact, which: Which, by: float) -> bool:
         return False
     effect = model.columns.laws[place] if kind == 0 else model.effects[place].effect
     return effect.at_end(name, by)
+
+
+_STEP = 1e-4  # numerics: of an amplitude or of its deviation, whichever is larger
+
+
+def acting(done: Refined, place: int, finite: bool = False) -> Acting:
+    """Return effect number `place` with its numbers and their deviations.
+
+    To first order (the delta method) √(s C sᵀ), with slopes s and the covariance C of all numbers of the model; ∞ of what follows
+    mostly from a number that these logs do not tell from others.
+
+    Args:
+        finite: without those that are infinite, as a model has them.
+    """
+    one, revolute = done.model.effects[place], done.model.columns.body.robot.revolute
+    turning = one.effect.joint is None or revolute[one.effect.joint - 1]
+    std = {name: x for name, x in _deviations(done, place).items() if np.isfinite(x) or not finite}
+    return Acting.of(one.effect, one.values, std, revolute=turning)
+
+
+def _deviations(done: Refined, place: int) -> dict[str, float]:
+    """Return the deviation of every parameter that follows from numbers that were fitted.
+
+    Infinite where a number that these logs do not tell moves it more than all others.
+    """
+    one, index = done.model.effects[place], done.of_effect(place)
+    covariance = done.covariance()[np.ix_(index, index)]
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0)).tolist()
+    steps, moved = [], []
+    for k, known in zip(index, std, strict=True):
+        name = done.names[k - len(done.model.beta)][2]
+        size = max(abs(one.amplitudes[int(name)]), known) or 1.0 if name.isdigit() else 1.0
+        steps.append(_STEP * size)
+        moved.append(number_moved(one, name, steps[-1]).values)
+    return _by_slopes(one, moved, np.array(steps), covariance, np.isin(index, done.unseen))
+
+
+def _by_slopes(
+    one: Named, moved: Sequence[Values], steps: Array, covariance: Array, unseen: npt.NDArray[np.bool_]
+) -> dict[str, float]:
+    """Return the deviations by the values with one number after the other moved by its step."""
+    found = {}
+    for q in one.effect.parameters:
+        here = one.values[q.name]
+        slope = np.array([difference(here, there[q.name], q.period) for there in moved]) / steps
+        if not slope.any() or not np.isfinite(slope).all():
+            continue
+        size = np.abs(slope)
+        hidden = np.where(unseen, size, 0.0).max() > np.where(unseen, 0.0, size).max()
+        variance = max(float(slope @ covariance @ slope), 0.0)
+        found[q.name] = np.inf if hidden else float(np.sqrt(variance))
+    return found
+
+
+def with_uncertainty(arm: Arm, done: Refined) -> Arm:
+    """Return the arm with the standard deviations of its base parameters and friction laws.
+
+    The shape of a law moves by its logarithm.
+    """
+    std = np.sqrt(np.maximum(np.diagonal(done.covariance()), 0.0)).tolist()
+    columns, count = done.model.columns, len(done.model.beta)
+    place = {i: k for k, i in enumerate(columns.kept)}
+    base = tuple(replace(p, std=std[place[i]]) if i in place else p for i, p in enumerate(arm.base))
+    linear = [
+        (k, q.name) for k, law in enumerate(columns.laws) for q in law.parameters if not q.shape
+    ]
+    known = dict(zip(linear, std[len(columns.kept) : count], strict=True))
+    for (kind, k, name), own in zip(done.names, std[count:], strict=True):
+        if kind == 0 and own > 0.0:
+            known[k, name] = own * abs(getattr(columns.laws[k], name))
+    laws = [k for k, law in enumerate(columns.laws) if isinstance(law, FrictionLaw)]
+    friction = []
+    for k, law in zip(laws, arm.friction, strict=True):
+        own = tuple(replace(p, std=known.get((k, p.name), p.std)) for p in law.parameters)
+        friction.append(replace(law, parameters=own))
+    return replace(arm, base=base, friction=tuple(friction))
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,7 @@
-"""Compute the figures of a diagnosis: residual analysis, and the proof of each finding.
+"""Analyse what a fitted model leaves: over time, and against all that it may depend on.
 
     evidence(fit, floor)              the residual over time, and against all that it may depend on
     proof(before, after, joint, …)    of the joint that shows most of a finding
-    with_simulation(result, …)        the position errors of the simulated arms
 
 Amplitudes over the orders of an angle: a joint that goes to and fro over a part of a turn is longer
 at some angles than at others, and the mean of x e^(-jkq) shows the shape of that about every order.
@@ -16,18 +15,17 @@ weights a constant and one wave are fitted at a time:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
-from pipelines.diagnosis.result import Curve, Diagnosis, Evidence, Proof, Spectrum
-from pipelines.diagnosis.table import Array
+from pipelines.log.experiment import Array
 from pipelines.model.rows.data import Data, LogData
 from pipelines.model.rows.fit import Refined
-from pipelines.model.simulation.comparison import Simulation
 from pipelines.signal.spectra import welch
 
-__all__ = ["amplitudes", "binned", "evidence", "least_order", "proof", "with_simulation"]
+__all__ = ["Curve", "Evidence", "Proof", "Spectrum", "amplitudes", "binned", "evidence", "least_order", "proof"]
 
 _CURVE_BINS = 48
 _SERIES = 3000  # points of a series
@@ -45,7 +43,71 @@ _FINER = 0.02  # of the predicted power, that twice as many bins have to show
 _CHANCE = 4.0  # standard deviations of what they show by chance
 _SHOWN = 0.2  # of the predicted power, that its means over a signal have to hold
 _STRETCH = 2.0  # [s] of a proof over time
-_SECONDS, _POINTS = 3.0, 1500  # of a simulated log that are shown at most
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The figure that proves a finding: the residual before and after, and what the cause predicts.
+
+    Of the joint that shows most of it, over the signal that the cause depends on, in bins of equal
+    count, or, where it depends on none, the amplitudes of all three over frequency; and over time.
+    """
+
+    joint: int  # 1-based, whose residual is shown
+    against: str  # a signal of `figures.signals`, or "frequency"
+    unit: str
+    x: Array  # (bins,) middle of each
+    before: Array  # (bins,) [N m] mean residual without the finding
+    after: Array  # with it
+    predicted: Array  # what the finding predicts of `before`
+    spread: Array  # (bins,) [N m] standard error of `before`; none over frequency
+    t: Array  # (samples,) [s] a stretch of time where it shows most
+    before_in_time: Array
+    after_in_time: Array
+    predicted_in_time: Array
+
+
+@dataclass(frozen=True)
+class Curve:
+    """The residual against one signal of its joint, in bins of equal count."""
+
+    joint: int
+    against: str
+    unit: str
+    x: Array  # (bins,)
+    mean: Array  # [N m]
+    spread: Array  # [N m] standard deviation within the bin
+    explained: float  # share of the residual's power that the means hold
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Of one joint's residual: over time's frequency or over the orders of its angle."""
+
+    joint: int
+    over: Literal["frequency", "order"]
+    unit: str  # "Hz" | "1/rev"
+    x: Array  # (bins,)
+    amplitude: Array  # [N m] of each line or bin
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """Residual analysis of one log."""
+
+    log: str  # name of the log that is shown
+    t: Array  # [s] (points,)
+    measured: Array  # [N m] (points, joints) after the low-pass
+    predicted: Array
+    residual: Array
+    simulated_t: Array | None  # [s] (points,)
+    simulated_position_error: Array | None  # [rad] (points, joints) simulated minus measured
+    curves: tuple[Curve, ...]
+    spectra: tuple[Spectrum, ...]
+    above_noise_floor: Array  # (joints,) share of the residual's power that is above the floor
+    band: Array  # (joints, 2) [Hz] in which most of that lies
+    simulated_log: str = ""  # name of the log that was simulated in closed loop
+    extended_position_error: Array | None = None  # [rad] (points, joints) of the extended model
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,25 +381,3 @@ def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
                 best, found = power, slice(start, start + size)
         first += one.rows
     return times[found], found
-
-
-def with_simulation(found: Diagnosis, nominal: Simulation, extended: Simulation) -> Diagnosis:
-    """Return the result with the position errors of both arms, where both ran in closed loop."""
-    if not found.evidence or nominal.first is None or extended.first is None:
-        return found
-    first, other = nominal.first, extended.first.error
-    samples = int(np.searchsorted(first.t, _SECONDS))
-    shown = slice(0, samples, max(1, samples // _POINTS))
-    return replace(
-        found,
-        evidence=(
-            replace(
-                found.evidence[0],
-                simulated_t=first.t[shown],
-                simulated_position_error=first.error[shown],
-                simulated_log=first.log,
-                extended_position_error=other[shown],
-            ),
-            *found.evidence[1:],
-        ),
-    )
