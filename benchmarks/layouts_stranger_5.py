@@ -56,7 +56,8 @@ def kuka_nextgen_drive(folder: Path, run: Run) -> Answer:
     specs = "Time [s]=t; *A{} Programmed Axis Velocity [°/s]=dq_ref°; *A{} Real Axis Velocity [°/s]=dq°;"
     specs += "A{} Difference Axis Velocity [°/s]=edq; A{} Programmed Axis Acceleration [°/ss]=ddq;"
     specs += "A{} Calculated Axis Moment [Nm]=model; A{} Difference Axis Moment [Nm]=etau; A{} Motor Temperature [K]=kelvin;"
-    specs += "*A{} Axis Current [A]=amps:current:A; *A{} Real Axis Moment [Nm]=tau; *A{} Programmed Axis Position [°]=q_ref°; *A{} Real Axis Position [°]=q°"
+    specs += "*A{} Axis Current [A]=amps:current:A; *A{} Real Axis Moment [Nm]=tau;"
+    specs += "*A{} Programmed Axis Position [°]=q_ref°; *A{} Real Axis Position [°]=q°"
     data = {"edq": np.degrees(run.dq_ref - run.dq), "ddq": np.degrees(run.ddq), "model": run.tau_model}
     data |= {"etau": run.tau_model - run.tau, "kelvin": run.temperature + 273.15}
     columns, right = wide(run, specs, joint_wise=True, **data)
