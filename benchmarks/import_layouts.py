@@ -402,7 +402,7 @@ def judge(lay: Layout, folder: Path, seed: int) -> tuple[str, str]:
     try:
         draft = draft_recipe(folder / answer.file).text
     except RrridError as problem:
-        return ("refused" if answer.table else "asks"), str(problem)[-300:]
+        return ("refused" if answer.table and answer.draftable else "asks"), str(problem)[-300:]
     (folder.parent / "draft.toml").write_text(draft, encoding="utf-8")
     blanks, wrong = asks(draft), untrue(draft, lay, answer, run)
     if wrong:

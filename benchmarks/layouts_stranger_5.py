@@ -69,7 +69,7 @@ def kuka_nextgen_drive(folder: Path, run: Run) -> Answer:
 
 
 @layout(SEVEN)
-def matlab_timetable(folder: Path, run: Run) -> Answer:
+def matlab_durations(folder: Path, run: Run) -> Answer:
     """MATLAB's writetimetable (mathworks.com): durations as "0.005 sec", a matrix q becomes q_1, q_2, …."""
     times = np.array([f"{t:g} sec" for t in run.t])
     specs = "Time=clock; *q_{}=q; *qd_{}=dq; qdd_{}=ddq; *tau_{}=tau"
@@ -77,7 +77,7 @@ def matlab_timetable(folder: Path, run: Run) -> Answer:
 
 
 @layout(FOUR, rate=500.0)
-def simulink_structure(folder: Path, run: Run) -> Answer:
+def simulink_with_time(folder: Path, run: Run) -> Answer:
     """Simulink's To Workspace, "Structure With Time" (mathworks.com): time, signals.values, .dimensions, .label, blockName each."""
 
     def logged(v: np.ndarray, label: str) -> dict:
@@ -98,7 +98,7 @@ def siemens_to_trace(folder: Path, run: Run) -> Answer:
 
 
 @layout(FOUR, rate=200.0)
-def moteus_registers(folder: Path, run: Run) -> Answer:
+def moteus_by_id(folder: Path, run: Run) -> Answer:
     """mjbots moteus registers (docs/reference.md): position in revolutions, velocity in rev/s, torque in N m, q_current."""
     specs = "timestamp=epoch; id{}_mode=10; *id{}_position=rev:q:rev; *id{}_velocity=revs:dq:rev/s; *id{}_q_current=amps:current:A;"
     specs += "*id{}_torque=tau; id{}_d_current=0.0; id{}_voltage=24.1; id{}_temperature=temp; id{}_fault=0"
@@ -304,7 +304,7 @@ def advantagescope_list(folder: Path, run: Run) -> Answer:
 
 
 @layout(THREE, rate=100.0)
-def influx_annotated(folder: Path, run: Run) -> Answer:
+def influx_query(folder: Path, run: Run) -> Answer:
     """InfluxDB's annotated CSV (docs.influxdata.com): #group, #datatype, #default, one row a value, joints as a tag."""
     head = "#group,false,false,false,false,true,true,true\n#datatype,string,long,dateTime:RFC3339,double,string,string,string\n"
     head, frames = head + "#default,_result,,,,,,\n", []
