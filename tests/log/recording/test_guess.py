@@ -513,6 +513,12 @@ def test_settings_above_a_table_with_a_line_of_units_are_skipped(tmp_path: Path)
     assert 'tau = { column = "CH3", unit = "N m" }' in draft
 
 
+def test_a_velocity_that_is_not_imported_is_named(tmp_path: Path) -> None:
+    moved = simulate(Arm("pendulum", ("joint",), "y", (30,)), seed=3)
+    columns = {"t": moved.t, "q": moved.q[:, 0], "dq": moved.dq[::-1, 0], "tau": moved.tau[:, 0]}
+    assert '# left out: dq (velocity), column = "dq"' in drafted(tmp_path, text(columns))
+
+
 @pytest.mark.parametrize(("name", "quantity"), [("time_index", "index"), ("timestep", "index"), ("sample_time", "time"),
                                                 ("step_time_ms", "time"), ("time of frame", "time")])  # fmt: skip
 def test_the_last_noun_tells_a_clock_from_a_counter(name: str, quantity: str) -> None:
