@@ -34,7 +34,7 @@ from pipelines.stage import Request, run_stage
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("robots", "programs", "stranger", "stranger_2", "fresh", "fresh_2", "stranger_3", "stranger_4")
+SETS = ("robots", "programs", "stranger", "stranger_2", "fresh", "fresh_2", "stranger_3", "stranger_4", "stranger_5")
 
 
 @dataclass(frozen=True)
@@ -402,7 +402,7 @@ def judge(lay: Layout, folder: Path, seed: int) -> tuple[str, str]:
     try:
         draft = draft_recipe(folder / answer.file).text
     except RrridError as problem:
-        return ("refused" if answer.table else "asks"), str(problem)[-300:]
+        return ("refused" if answer.table and answer.draftable else "asks"), str(problem)[-300:]
     (folder.parent / "draft.toml").write_text(draft, encoding="utf-8")
     blanks, wrong = asks(draft), untrue(draft, lay, answer, run)
     if wrong:

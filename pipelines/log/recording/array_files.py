@@ -115,6 +115,8 @@ def _npy_header(data: bytes, source: str) -> tuple[np.dtype[Any], bool, tuple[in
 def read_npz(data: bytes, source: str) -> dict[str, Array]:
     """Return the arrays of a NumPy archive by name; nothing is written to disk.
 
+    Arrays of Python objects are not opened and come back empty.
+
     Raises:
         UsageError: X12, it holds anything but arrays.
         InputRejected: F08 damaged, X05 larger than a recording, and what `read_npy` raises.
@@ -131,9 +133,12 @@ def read_npz(data: bytes, source: str) -> dict[str, Array]:
                 raise _too_large(declared, source)
             for member in members:
                 name = member.filename.removesuffix(".npy")
-                for field, array in read_npy(
-                    archive.read(member), f"{source}, array {name}"
-                ).items():
+                packed = archive.read(member)
+                where = f"{source}, array {name}"
+                if _npy_header(packed, where)[0].hasobject:
+                    found[name] = np.empty(0, object)
+                    continue
+                for field, array in read_npy(packed, where).items():
                     found[name if field == "column" else f"{name}.{field}"] = array
     except _BAD_ARCHIVE:
         message, remedy = "truncated or damaged NPZ archive", "save or copy it again"

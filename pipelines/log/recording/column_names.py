@@ -317,7 +317,9 @@ def _head(nouns: Sequence[tuple[int, str]]) -> tuple[int | None, str]:
             return None, whole
     motion = [noun for noun in nouns if noun[1] not in ("time", "index")]
     times = [noun for noun in nouns if noun[1] == "time"]
-    chosen = motion[-1:] or times[:1] or nouns[:1]
+    # A "time index" counts, a "sample time" does not.
+    counts = [n for n in nouns[-1:] if n[1] == "index" and (n[0] - 1, "time") in nouns]
+    chosen = motion[-1:] or counts or times[:1] or nouns[:1]
     return chosen[0] if chosen else (None, "")
 
 

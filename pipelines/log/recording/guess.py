@@ -275,20 +275,23 @@ class _Drafting:
         return f'"{words[0]}"' if len(set(words)) == 1 else f"[{', '.join(map(_quoted, words))}]"
 
     def _velocity(self) -> list[str]:
-        """Return the line of a velocity that is the slope of the position; nothing otherwise."""
+        """Return the line of a velocity that is the slope of the position; else a comment."""
         group, slope, table = self.reading.dq.group, self.found.slope, self.reading.table
         position = self.reading.q.group
-        if group is None or slope is None or self.found.t is None or position is None:
+        if group is None:
             return []
+        left_out = [f"    # left out: {group.words} (velocity), {_columns(group.columns, table)}"]
+        if slope is None or self.found.t is None or position is None:
+            return left_out
         if any(joint.type != "revolute" for joint in self.found.joints):
-            return []
+            return left_out
         doubt = self.found.doubt("q", position, self.reading.tau.group)
         if self.found.out_of_order(group) or position.order != group.order or doubt is not None:
-            return []
+            return left_out
         named = self.found.named(group, table)[0]
         unit = velocity_unit(slope, self.found.position_units(position)[0][0])
         if not unit or UNITS.get(named or unit) != UNITS[unit]:
-            return []
+            return left_out
         why = f"the position's slope is {slope.factor:.4g} times it"
         why += "; remove the line where it was not measured"
         line = f"dq = {{ {_columns(group.columns, table)}, unit = {_quoted(unit)} }}"

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
-from pipelines.log.recording.column_names import signal_of
+from pipelines.log.recording.column_names import read_name, signal_of
 from pipelines.log.recording.text_format import split_unit
 
 __all__ = ["Arrays", "RawTable", "columns_of_arrays", "described", "distinct", "expand", "unit_in",
@@ -292,6 +292,9 @@ def unstacked(table: RawTable) -> RawTable:
     again. Rows of one key continue each other and neighbouring rows do not: what merely counts
     modulo k in one motion is no key. Of key "joint", "position" becomes "position[elbow]", …; what
     the k rows of every sample share stays one column.
+
+    Raises:
+        InputRejected: S11, the rows of a key come below those of another.
     """
     keys = (*table.cycles.items(), *itertools.islice(_numbers_in_turn(table), _MOST_KEYS))
     for key, words in keys:
@@ -299,7 +302,24 @@ def unstacked(table: RawTable) -> RawTable:
         interleaved = any(_interleaved(values, k) for values in table.columns.values())
         if len(set(words)) == k and interleaved:
             return _by_key(table, key, words)
+    for name, values in table.columns.items():
+        if read_name(name).quantity == "time":
+            _refuse_stacked(table, name, values)
     return table
+
+
+def _refuse_stacked(table: RawTable, name: str, stamps: Array) -> None:
+    """S11: refuse series below each other: a date comes again and the stamps rise from it again.
+
+    Runs of one experiment do so too, but their clock starts from zero or goes on.
+    """
+    falls = np.flatnonzero(np.diff(stamps) < 0) + 1
+    if not falls.size or (stamps[falls] != stamps[0]).any() or stamps[0] <= np.ptp(stamps):
+        return
+    message = f"the same times come {falls.size + 1} times: series below each other"
+    where = f"{table.source}, column '{name}', {table.place(int(falls[0]))}"
+    remedy = "put them side by side, one row a sample: pivot in pandas or in the data base"
+    raise InputRejected("S11", message, where=where, remedy=remedy)
 
 
 def _by_key(table: RawTable, key: str, words: tuple[str, ...]) -> RawTable:

@@ -63,6 +63,8 @@ _MARK = "\0"  # a number's place in a line's form; no text file holds it
 _DAY = "\1"
 _PIECE = re.compile(rf"[^\W\d][\w.]*|[\[({{<\])}}>]|{_MARK}|{_DAY}")
 _LABEL = re.compile(rf"(?<![\w.])[^\W\d][\w.]*+\s*+[=:>]\s*+[\"'\[({{]*{_MARK}")
+_GROUPED = re.compile(r"[-+.\d\seEnaNif]*[\[(][-+.\d\seEnaNif()\[\]]*")  # "12 (0.1 0.2) (3 4)"
+_NO_BRACKETS = str.maketrans("()[]", "    ")
 _SEARCHED = 200  # lines that show the form
 _LEAST = 0.9  # of these, behind the first lines, and of all lines, that have one form
 _LONGEST = 20_000  # characters of a line
@@ -89,6 +91,8 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
         raise InputRejected("F01", "no line of numbers in the file", where=source, remedy=remedy)
     if given == TextFormat() and (labelled := _labelled_lines(lines)) is not None:
         return _labelled(*labelled, text, source, checks)
+    if given == TextFormat() and all(_GROUPED.fullmatch(line) for _, line in lines):
+        lines = [(number, line.translate(_NO_BRACKETS)) for number, line in lines]
     dialect = find_dialect(lines, source, given)
     if dialect.width > _WIDEST:
         message = f"{dialect.width} cells in a line, {dialect.words}: not a table of columns"

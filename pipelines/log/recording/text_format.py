@@ -32,7 +32,7 @@ Line = tuple[int, str]  # its number, from 1, and text
 MISSING = frozenset({"", "nan", "NaN", "NAN", "NA", "N/A", "null", "NULL", "None", "missing",
                      "-nan", "-NaN", "-", "1.#IND", "-1.#IND", "1.#QNAN", "-1.#QNAN"})  # fmt: skip
 FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*")
-WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*([^\W\d_][^\d\s]{0,9})")
+WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|°)[^\d\s]{0,9})")
 _INFINITE = r"[+-]?(inf|Inf|INF|infinity|Infinity)"
 _NUMBER = re.compile(rf"[+-]?(\d++\.?\d*|\.\d++)([eEdD][+-]?\d+)?|{_INFINITE}")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d+")  # as spreadsheets show numbers, in quotes

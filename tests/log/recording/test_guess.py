@@ -513,6 +513,19 @@ def test_settings_above_a_table_with_a_line_of_units_are_skipped(tmp_path: Path)
     assert 'tau = { column = "CH3", unit = "N m" }' in draft
 
 
+def test_a_velocity_that_is_not_imported_is_named(tmp_path: Path) -> None:
+    moved = simulate(Arm("pendulum", ("joint",), "y", (30,)), seed=3)
+    columns = {"t": moved.t, "q": moved.q[:, 0], "dq": moved.dq[::-1, 0], "tau": moved.tau[:, 0]}
+    assert '# left out: dq (velocity), column = "dq"' in drafted(tmp_path, text(columns))
+
+
+@pytest.mark.parametrize(("name", "quantity"), [("time_index", "index"), ("timestep", "index"), ("sample_time", "time"),
+                                                ("step_time_ms", "time"), ("time of frame", "time")])  # fmt: skip
+def test_the_last_noun_tells_a_clock_from_a_counter(name: str, quantity: str) -> None:
+    """A counter is perfectly even, so it would be preferred to time stamps, and hide samples that are lost."""
+    assert read_name(name).quantity == quantity
+
+
 @pytest.mark.parametrize(("name", "unit"), [("torque_mNm", "mN m"), ("Moment_kNm", "kN m"), ("i_mA", "mA"), ("tau_Nm", "N m")])
 def test_a_unit_with_its_prefix_is_one_word(name: str, unit: str) -> None:
     """Read as N m, a bench's torques would be a thousand times too large."""

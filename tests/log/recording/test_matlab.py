@@ -126,6 +126,13 @@ def test_s11_a_matrix_of_gains_beside_signals_is_no_signal() -> None:
     assert list(table.columns) == ["q_1", "q_2", "q_3"]
 
 
+def test_x07_an_array_of_objects_costs_itself_alone(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", contacts=np.array({}), **signals())
+    table = read_table(tmp_path / "run.npz")
+    assert np.array_equal(table.columns["q_3"], good()["q_3"])
+    assert table.text == {"contacts": "objects"}
+
+
 def test_x12_an_npz_archive_is_read_and_one_of_other_files_is_not(tmp_path: Path) -> None:
     path = tmp_path / "run.npz"
     np.savez_compressed(path, **signals())

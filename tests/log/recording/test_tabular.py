@@ -35,6 +35,34 @@ def test_a_table_of_one_row_a_joint_becomes_one_of_one_row_a_sample() -> None:
     assert np.array_equal(table.columns["q[a]"], columns["q_2"])
 
 
+@pytest.mark.parametrize(("start", "refused"), [(1.7e9, True), (0.0, False)])
+def test_s11_series_below_each_other_are_refused_and_runs_are_not(start: float, refused: bool) -> None:
+    """A date comes once; a clock that starts from zero may do so with each run."""
+    columns = good()
+    table = parse(text({"t": np.tile(start + columns["t"], 3), "q": np.concatenate([columns[f"q_{j}"] for j in (1, 2, 3)])}))
+    if not refused:
+        assert unstacked(table) is table
+        return
+    with pytest.raises(InputRejected, match="RRID-S11 run.csv, column 't', line 1202: the same times come 3 times"):
+        unstacked(table)
+
+
+def test_brackets_round_bare_numbers_lose_none_of_them() -> None:
+    """As yarpdatadumper writes lists, without a label."""
+    rows = np.column_stack(list(good().values()))
+    written = "".join(f"{t:.17g} ({' '.join(f'{x:.17g}' for x in q)}) 1\n" for t, *q in rows)
+    assert np.array_equal(np.column_stack(list(parse(written).columns.values()))[:, :-1], rows)
+
+
+def test_a_unit_behind_every_number_may_be_a_sign() -> None:
+    """As Grafana formats cells."""
+    columns = good()
+    rows = zip(columns["t"], columns["q_1"], strict=True)
+    table = parse("t,q\n" + "".join(f"{t:.17g},{q:.17f}°\n" for t, q in rows))
+    assert np.allclose(table.columns["q"], columns["q_1"])
+    assert table.units == {"q": "deg"}
+
+
 def test_a_counter_that_starts_again_in_one_motion_is_no_joint() -> None:
     columns = good() | {"frame": np.arange(1200.0) % 4, "bit": np.arange(1200.0) % 2}
     assert list(unstacked(parse(text(columns))).columns) == list(columns)
