@@ -5,13 +5,12 @@ answer(prepared, diagnose_prepared(prepared, config), tell)
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.compliance import gaps_untold, untold
+from pipelines.diagnosis.compliance import untold
 from pipelines.diagnosis.decision import limited_by_estimate
 from pipelines.diagnosis.engine import Diagnosis as Found
 from pipelines.diagnosis.findings import (
@@ -47,14 +46,6 @@ from pipelines.model.words import within
 
 __all__ = ["WEAKER", "answer"]
 
-_UNNAMED = {
-    r"ripple (\d+):(\d+)": r"a torque ripple of joint \2, \1 a turn,",
-    r"spline of q:(\d+)": r"a curve over the position of joint \1",
-    r"spline of dq:(\d+)": r"a curve over the speed of joint \1",
-    r"spline of tau:(\d+)": r"a curve over the torque of joint \1",
-    r"friction form:(\d+)": r"another law of friction at joint \1",
-    r"drift of friction:(\d+)": r"friction of joint \1 that drifts",
-}
 _ACCEPTED = "accepted"
 _ALIKE = "these logs do not tell it from the cause that is named"
 _WORSE = "others predict blocks of time better"
@@ -83,7 +74,7 @@ def answer(
     named = [(one.probability[one.key], own[id(one)]) for one in causes]
     findings = findings_of(worth, look.later, look.selection.end, named, found.responses)
     verdict = "unknown" if worse and not causes else found.decision.verdict
-    reason = "; ".join(one for one in (worse, _plain(found.decision.reason)) if one)
+    reason = "; ".join(one for one in (worse, found.decision.reason) if one)
     limits = _limits(found, findings, exclude) if whole else Limits((), ())
     trained, last = worth.trained, len(causes)
     told_of = Diagnosis(
@@ -119,8 +110,7 @@ def _limits(found: Found, findings: Sequence[Finding], exclude: Sequence[str]) -
     """Return the limits of the causes without a finding, and what responses leave open."""
     look, named = found.look, {one.cause for one in findings}
     limits = limits_of(look.later, look.selection.end, look.baseline)
-    left = (*untold(found.responses, exclude), *gaps_untold(found.responses, exclude))
-    more = (one for one in left if one.cause not in named)
+    more = (one for one in untold(found.responses, exclude) if one.cause not in named)
     return replace(limits, not_identifiable=(*limits.not_identifiable, *more))
 
 
@@ -185,13 +175,6 @@ def _others(first: Finding, found: Found) -> list[str]:
     return out
 
 
-def _plain(reason: str) -> str:
-    """Return a reason with shapes that have no name, "spline of q:2" say, in words."""
-    for pattern, words in _UNNAMED.items():
-        reason = re.sub(pattern, words, reason)
-    return reason
-
-
 def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Rejected, ...]:
     """Return the causes above their thresholds that are not named.
 
@@ -202,15 +185,12 @@ def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Reject
     doubtful = {one.key for one in found.look.selection.causes} - named
     alike = {key for one in causes for key in one.alternatives}
     why = {
-        key: worse or (_plain(found.decision.reason) if key in doubtful else "") or _WORSE
+        key: worse or (found.decision.reason if key in doubtful else "") or _WORSE
         for one in found.look.selection.rounds
         for key in one.tried
     }
     why |= {
-        key: _plain(one.stopped)
-        for one in found.look.selection.rounds
-        if one.stopped
-        for key in one.tried
+        key: one.stopped for one in found.look.selection.rounds if one.stopped for key in one.tried
     }
     return tuple(Rejected(*key, said) for key, said in why.items() if key not in named | alike)
 
@@ -221,7 +201,7 @@ def _ledger(found: Found) -> tuple[Trial, ...]:
     for step, one in enumerate(found.look.selection.rounds, 1):
         power = one.before.cost
         exact = {key: 1.0 - fit.cost / power for key, fit in one.tried.items()}
-        reasons = dict.fromkeys(exact, _plain(one.stopped) or _WORSE)
+        reasons = dict.fromkeys(exact, one.stopped or _WORSE)
         if one.cause is not None:
             reasons |= dict.fromkeys(one.cause.alternatives, _ALIKE)
         if one.cause is not None and one.cause in found.decision.causes:

@@ -6,7 +6,6 @@ models leave everywhere; that grows with the number of rows as the noise does no
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 
@@ -17,8 +16,8 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.score import chi2_bound, upper_point
-from pipelines.diagnosis.screening import Screened, best_of, screen
-from pipelines.diagnosis.table import Array, Arrow, Parts, Structure, Table
+from pipelines.diagnosis.screening import Screened, best_of, screen, squares_of
+from pipelines.diagnosis.table import Array, Arrow, Structure, Table
 
 __all__ = ["Baseline", "baseline"]
 
@@ -116,7 +115,7 @@ class _Parts:
     groups: tuple[Group, ...]
     cross: Array  # (parts, k, columns) B Cᵀ
     moments: Array  # (parts, columns) C y
-    squares: tuple[Array, ...]  # of each group (parts, width, width), C Cᵀ
+    squares: list[tuple[Array, ...]]  # of each part, C Cᵀ of each group
     powers: Array  # (parts,) yᵀy
     counts: Array  # (parts,) rows
 
@@ -130,7 +129,7 @@ class _Parts:
             dictionary.groups,
             np.array([base.gram(candidates, part) for part in parts]),
             np.array([candidates.moments(y, part) for part in parts]),
-            tuple(_squares(candidates.take(g.columns), parts) for g in dictionary.groups),
+            [squares_of(candidates, dictionary.groups, part) for part in parts],
             np.array(
                 [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
             ),
@@ -148,17 +147,15 @@ class _Parts:
         known = Arrow.of(info + gram, self.prior.structure)
         mean = known.solve(moment + own)
         cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
-        squares = [own[after].sum(axis=0) for own in self.squares]
+        squares = [
+            np.sum(own, axis=0) for own in zip(*(self.squares[k] for k in after), strict=True)
+        ]
         found = screen(
             self.groups, known, cross, squares, self.moments[after].sum(axis=0) - cross.T @ mean
         )
         cost = self.powers[after].sum() - (moment + own) @ mean
         cost += expected @ moment
         return found, float(cost) / rows, rows
-
-
-def _squares(table: Table, parts: Sequence[Parts]) -> Array:
-    return np.array([table.gram(table, part) for part in parts])
 
 
 def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:

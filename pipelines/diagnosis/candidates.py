@@ -12,7 +12,7 @@ every cause, the cause is not known.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -27,18 +27,32 @@ from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, everywhere
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
-from pipelines.model.rows.families import Family, families, lay_family, whole_motion
+from pipelines.model.rows.families import Family, Laid, families, lay_family, place_of, whole_motion
 
-__all__ = ["FORM", "Dictionary", "Group", "Key", "Kind"]
+__all__ = ["FORM", "Dictionary", "Group", "Key", "Kind", "in_words", "laid"]
 
 FORM = "friction form"
+_WORDS = {
+    "spline of q": "a curve over the position of joint {}",
+    "spline of dq": "a curve over the speed of joint {}",
+    "spline of tau": "a curve over the torque of joint {}",
+    "drift of friction": "friction of joint {} that drifts",
+    FORM: "another law of friction at joint {}",
+}
 _ROUNDED = 1e-9  # numerics: of travel [rad or m], or share of an order, that is rounding
 
 Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
-Kind = Literal[
-    "named", "compliance", "unnamed"
-]  # of compliance rows show the class, responses the cause
+# of compliance rows show the class, responses the cause
+Kind = Literal["named", "compliance", "unnamed"]
+
+
+def in_words(key: Key) -> str:
+    """Return "cogging:2" of a cause, and what it is of a shape without a name."""
+    cause, joint = key
+    if cause.startswith("ripple "):
+        return f"a torque ripple of joint {joint}, {cause.removeprefix('ripple ')} a turn,"
+    return _WORDS[cause].format(joint) if cause in _WORDS else place_of(cause, joint)
 
 
 @dataclass(frozen=True)
@@ -140,11 +154,11 @@ def _lay(
     seen = sum(part.width for part in parts)
     compliant = family.shapes[0].evidence == "frequency responses"
     kind: Kind = "compliance" if compliant else "named"
-    for laid in lay_family(rows.data, family, arm):
-        shapes, width, _ = laid.table.shape
-        parts.append(rows.table(laid.table.reshape(shapes * width, -1), laid.rows).compact())
+    for one, table in laid(rows, family, arm):
+        parts.append(table)
+        shapes, width, _ = one.table.shape
         for k in range(shapes):
-            number = laid.first + k
+            number = one.first + k
             groups.append(
                 Group(
                     (family.cause, family.joint),
@@ -159,6 +173,13 @@ def _lay(
                 )
             )
             seen += width
+
+
+def laid(rows: Rows, family: Family, arm: Arm) -> Iterator[tuple[Laid, Table]]:
+    """Return the columns of every shape of a cause over rows, and which shapes they are of."""
+    for one in lay_family(rows.data, family, arm):
+        shapes, width, _ = one.table.shape
+        yield one, rows.table(one.table.reshape(shapes * width, -1), one.rows).compact()
 
 
 def _length(shape: Effect) -> float | None:

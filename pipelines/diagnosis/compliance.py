@@ -3,7 +3,6 @@
 found = compliance(logs.frf, arm)
 found.named              causes that the responses name, with their numbers
 untold(found)            causes that they leave open, with the reason
-gaps_untold(found)       causes that only responses without a spring let be named
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
 from pipelines.model.frf.modes import relative_acceleration
 
-__all__ = ["Compliance", "compliance", "gaps_untold", "new_causes", "untold"]
+__all__ = ["Compliance", "compliance", "new_causes", "untold"]
 
 _MOVED = 3.0  # standard deviations of a frequency or stiffness, beyond which it has changed
 _SAME = 0.03  # of it, within which sessions show the same one: temperature, how the arm stood
@@ -86,30 +85,25 @@ def _moved(now: Acting, before: Acting) -> bool:
 
 
 def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIdentifiable, ...]:
-    """Return causes that only frequency responses show, where these are missing or undecided."""
+    """Return causes that frequency responses would show, or let be named, and these do not.
+
+    They are missing or undecided; and a gap is told from a spring only by responses without one.
+    """
     missing = "only frequency responses tell it, and there is no frf log"
-    reason = missing if told is None else told.open
+    open_by = {"frequency responses": missing if told is None else told.open}
+    if told is None or told.named:
+        open_by["reversals"] = _NO_RESPONSES if told is None else _GIVES_WAY
+    first = "Measure frequency responses, which tell a spring. " if told is None else ""
     named = () if told is None else tuple(one.effect.name for one in told.named)
     return tuple(
-        NotIdentifiable(kind.name, None, reason, kind.words.experiment)
+        NotIdentifiable(
+            kind.name,
+            None,
+            open_by[kind.evidence],
+            (first if kind.evidence == "reversals" else "") + kind.words.experiment,
+        )
         for kind in all_effects()
-        if reason and kind.evidence == "frequency responses" and kind.name not in (*named, *without)
-    )
-
-
-def gaps_untold(
-    told: Compliance | None, without: Sequence[str] = ()
-) -> tuple[NotIdentifiable, ...]:
-    """Return causes at reversals, which need frequency responses that name no spring."""
-    if told is not None and not told.named:
-        return ()
-    reason, first = _GIVES_WAY, ""
-    if told is None:
-        reason, first = _NO_RESPONSES, "Measure frequency responses, which tell a spring. "
-    return tuple(
-        NotIdentifiable(kind.name, None, reason, f"{first}{kind.words.experiment}")
-        for kind in all_effects()
-        if kind.evidence == "reversals" and kind.name not in without
+        if open_by.get(kind.evidence) and kind.name not in (*named, *without)
     )
 
 

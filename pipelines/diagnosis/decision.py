@@ -13,6 +13,7 @@ from itertools import chain
 import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
+from pipelines.diagnosis.candidates import in_words
 from pipelines.diagnosis.events import DIRECTIONS
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Diagnosis, Verdict
@@ -214,13 +215,15 @@ def _followed(later: Later, selection: Selection) -> tuple[Array, tuple[str, ...
         return taken, ()
     power, told = [float(y @ y) for y in later.rows.y], []
     for one in sorted(selection.rounds[-1].significant, key=lambda s: -s.gain):
-        name, joint = one.group.key
+        joint = one.group.key[1]
         if one.group.kind != "unnamed" or joint is None or taken[joint - 1]:
             continue
         share = np.sqrt(one.gain / power[joint - 1])
         if share > later.config.misfit:
             taken[joint - 1] = one.gain
-            told.append(f"{share:.1%} of the torque of joint {joint} follows {name}:{joint}")
+            told.append(
+                f"{share:.1%} of the torque of joint {joint} follows {in_words(one.group.key)}"
+            )
     return taken, tuple(told)
 
 

@@ -13,18 +13,17 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import Dictionary, Group, Key
+from pipelines.diagnosis.candidates import Dictionary, Group, Key, laid
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
-from pipelines.diagnosis.screening import Screened, price, screen
+from pipelines.diagnosis.screening import Screened, price, screen, squares_of
 from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.families import lay_family
 
 __all__ = ["Fit", "Later", "State"]
 
@@ -124,10 +123,6 @@ class Later:
         rows = dataset.later
         base = prior.table(rows.nominal, dictionary.later)
         table = dictionary.later
-        squares = []
-        for group in dictionary.groups:
-            own = table.take(group.columns)
-            squares.append(own.gram(own))
         return cls(
             rows,
             dictionary,
@@ -138,7 +133,7 @@ class Later:
             table,
             base.gram(base),
             base.gram(table),
-            tuple(squares),
+            squares_of(table, dictionary.groups),
             rows.blocks(config.block),
         )
 
@@ -222,31 +217,17 @@ class Later:
         keys = [k for k, f in self.dictionary.families.items() if _passes_on(f.shapes, acting)]
         if not keys:
             return self
-        candidates, cross = self.candidates, self.cross.copy()
-        own = [g for key in keys for g in self.dictionary.groups if g.key == key]
-        new, at = self._laid(keys, model), np.concatenate([g.columns for g in own])
-        rest = np.setdiff1d(np.arange(candidates.width), at)
-        back = np.argsort(np.r_[rest, at])
-        candidates = Table.stacked([candidates.take(rest), new]).take(back)
+        families = [self.dictionary.families[key] for key in keys]
+        new = Table.stacked([t for one in families for _, t in laid(self.rows, one, model.arm)])
+        own = [group for key in keys for group in self.dictionary.groups if group.key == key]
+        at = np.concatenate([group.columns for group in own])
+        rest = np.setdiff1d(np.arange(self.candidates.width), at)
+        candidates = Table.stacked([self.candidates.take(rest), new])
+        candidates, cross = candidates.take(np.argsort(np.r_[rest, at])), self.cross.copy()
         cross[:, at] = self.base.gram(new)
-        every = zip(self.dictionary.groups, self.squares, strict=True)
-        squares = []
-        for group, square in every:
-            if group in own:
-                there = candidates.take(group.columns)
-                square = there.gram(there)
-            squares.append(square)
-        return replace(self, candidates=candidates, cross=cross, squares=tuple(squares))
-
-    def _laid(self, keys: Sequence[Key], model: Exact) -> Table:
-        """Return the columns of every shape of some causes, beside the effects of a model."""
-        parts = []
-        for key in keys:
-            for laid in lay_family(self.rows.data, self.dictionary.families[key], model.arm):
-                shapes, width, _ = laid.table.shape
-                table = laid.table.reshape(shapes * width, -1)
-                parts.append(self.rows.table(table, laid.rows).compact())
-        return Table.stacked(parts)
+        squares = dict(zip(self.dictionary.groups, self.squares, strict=True))
+        squares |= zip(own, squares_of(candidates, own), strict=True)
+        return replace(self, candidates=candidates, cross=cross, squares=tuple(squares.values()))
 
     def screened(self, state: State) -> list[Screened]:
         """Return T_c of every candidate on what the state leaves."""

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.diagnosis.candidates import Group, Key
-from pipelines.diagnosis.table import Array, Arrow
+from pipelines.diagnosis.table import Array, Arrow, Parts, Table
 
-__all__ = ["Screened", "best_of", "price", "screen"]
+__all__ = ["Screened", "best_of", "price", "screen", "squares_of"]
 
 _VISIBLE = 1e-6  # numerics: eigenvalue of H in unit columns, below which a direction is absorbed
 
@@ -66,6 +66,14 @@ def _at_length(one: Screened, length: float) -> Screened:
     best = float(one.amplitudes[0])
     share = 1.0 - (1.0 - length / best) ** 2 if best > 0.0 else 0.0
     return replace(one, gain=max(one.gain * share, 0.0), amplitudes=np.array([length]))
+
+
+def squares_of(
+    columns: Table, groups: Sequence[Group], part: Parts | None = None
+) -> tuple[Array, ...]:
+    """Return C Cᵀ of each group, over the rows of `part` where it is given."""
+    every = (columns.take(group.columns) for group in groups)
+    return tuple(own.gram(own, part) for own in every)
 
 
 def price(x: Array) -> float:

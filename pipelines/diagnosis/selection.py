@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
-from pipelines.diagnosis.candidates import Key
+from pipelines.diagnosis.candidates import Key, in_words
 from pipelines.diagnosis.events import Window, push_of
 from pipelines.diagnosis.refit import Fit, Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
@@ -24,7 +24,6 @@ from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.families import place_of
 
 __all__ = ["Candidate", "Cause", "Round", "SearchStart", "Selection", "refit", "select"]
 
@@ -174,7 +173,7 @@ class _Step:
         fits = {one.key: one.state.fit for one in tried}
         seen = Round(self.state.fit, tuple(self.significant.values()), fits, moment=moment)
         if not tried:
-            return replace(seen, follows=place_of(*next(iter(others))) if others else ""), None
+            return replace(seen, follows=in_words(next(iter(others))) if others else ""), None
         apart = {shape: self._apart(other) for shape, other in others.items()}
         pick, cause, stopped = self._contest(tried, others, apart)
         if pick is None:  # perhaps by another law of the same cause
@@ -326,7 +325,7 @@ class _Step:
         scores = {one.key: one.scores(later) for one in tried}
         free = {k: _scores(later, own, own.effects.width - width) for k, own in others.items()}
         without = _scores(later, self.state).sum()
-        best = place_of(*min(scores, key=lambda key: scores[key].sum()))
+        best = in_words(min(scores, key=lambda key: scores[key].sum()))
         fails = f"{best} does not pay on blocks that it was not fitted to"
         better = {k: v for k, v in (scores | free).items() if v.sum() < without}
         paying = [one for one in tried if one.key in better]
@@ -335,7 +334,7 @@ class _Step:
         named = self._named(paying, others, better, apart)
         if not named:
             first = min(better, key=lambda key: better[key].sum())
-            return None, None, f"{place_of(*first)} predicts better than {best}"
+            return None, None, f"{in_words(first)} predicts better than {best}"
         pick = min(named, key=lambda one: scores[one.key].sum())
         unchanged = _scores(later, later.unchanged(self.state, pick.key))
         pays = confidence_set({"with": scores[pick.key], "without": unchanged}, later.config)

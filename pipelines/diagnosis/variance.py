@@ -20,7 +20,7 @@ from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.events import windows_of
-from pipelines.diagnosis.screening import best_of, screen
+from pipelines.diagnosis.screening import best_of, screen, squares_of
 from pipelines.diagnosis.table import Array, Arrow, Indices, Structure, Table
 from pipelines.model.arm import Arm
 
@@ -154,8 +154,7 @@ def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tupl
     known = Arrow.of(nominal.gram(nominal) + _FLAT * np.eye(nominal.width), Structure.of(nominal))
     cross = nominal.gram(candidates)
     moments = candidates.moments(rows.y) - cross.T @ known.solve(nominal.moments(rows.y))
-    squares = [own.gram(own) for own in (candidates.take(g.columns) for g in groups)]
-    best = best_of(screen(groups, known, cross, squares, moments))
+    best = best_of(screen(groups, known, cross, squares_of(candidates, groups), moments))
     return tuple(one.group for one in best.values())
 
 
