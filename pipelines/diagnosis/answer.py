@@ -36,6 +36,7 @@ from pipelines.diagnosis.screening import best_of
 from pipelines.diagnosis.selection import Cause
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import Trained, told, train
+from pipelines.diagnosis.unnamed import Key
 from pipelines.diagnosis.words import beside, how_much, taken_in, where
 from pipelines.model.arm import Acting
 from pipelines.model.rows.families import place_of
@@ -181,18 +182,14 @@ def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Reject
     Args:
         worse: why some that were found are none.
     """
-    named = {one.key for one in causes}
-    doubtful = {one.key for one in found.look.selection.causes} - named
-    alike = {key for one in causes for key in one.alternatives}
-    why = {
-        key: worse or (found.decision.reason if key in doubtful else "") or _WORSE
-        for one in found.look.selection.rounds
-        for key in one.tried
-    }
-    why |= {
-        key: one.stopped for one in found.look.selection.rounds if one.stopped for key in one.tried
-    }
-    return tuple(Rejected(*key, said) for key, said in why.items() if key not in named | alike)
+    settled = {key for one in causes for key in (one.key, *one.alternatives)}
+    doubtful = {one.key for one in found.look.selection.causes}
+    out: dict[Key, Rejected] = {}
+    for one in found.look.selection.rounds:
+        for key in one.tried.keys() - settled:
+            doubt = found.decision.reason if key in doubtful else ""
+            out[key] = Rejected(*key, one.stopped or worse or doubt or _WORSE)
+    return tuple(sorted(out.values(), key=lambda one: (one.cause, one.joint or 0)))
 
 
 def _ledger(found: Found) -> tuple[Trial, ...]:

@@ -4,55 +4,34 @@
     dictionary.groups                      what each run of columns is
     dictionary.table(rows)                 the columns over some rows
 
-A group is what is screened at once: one shape of one cause at one joint. Groups without a name are
-splines of the position, speed and torque of a joint, ripple of its drive, of any order, the form of
-its friction law, and dry and viscous friction that drift: where one of these predicts better than
-every cause, the cause is not known.
+A group is what is screened at once: one shape of one cause at one joint, or a shape without a name.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.table import Array, Indices, Table
+from pipelines.diagnosis.unnamed import Key, Make, Unnamed
 from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, everywhere
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
-from pipelines.model.rows.families import Family, Laid, families, lay_family, place_of, whole_motion
+from pipelines.model.rows.families import Family, Laid, families, lay_family, whole_motion
 
-__all__ = ["FORM", "Dictionary", "Group", "Key", "Kind", "in_words", "laid"]
+__all__ = ["Dictionary", "Group", "Kind", "laid"]
 
-FORM = "friction form"
-_WORDS = {
-    "spline of q": "a curve over the position of joint {}",
-    "spline of dq": "a curve over the speed of joint {}",
-    "spline of tau": "a curve over the torque of joint {}",
-    "drift of friction": "friction of joint {} that drifts",
-    FORM: "another law of friction at joint {}",
-}
 _ROUNDED = 1e-9  # numerics: of travel [rad or m], or share of an order, that is rounding
-
-Key = tuple[str, int | None]  # a cause, or a shape without a name, and its joint
 
 # of compliance rows show the class, responses the cause
 Kind = Literal["named", "compliance", "unnamed"]
-
-
-def in_words(key: Key) -> str:
-    """Return "cogging:2" of a cause, and what it is of a shape without a name."""
-    cause, joint = key
-    if cause.startswith("ripple "):
-        return f"a torque ripple of joint {joint}, {cause.removeprefix('ripple ')} a turn,"
-    return _WORDS[cause].format(joint) if cause in _WORDS else place_of(cause, joint)
 
 
 @dataclass(frozen=True)
@@ -99,7 +78,7 @@ class Dictionary:
         """Return every candidate, with its columns over the reference and the later rows."""
         found = _families(dataset, exclude)
         standing = {key: _standing(family, dataset) for key, family in found.items()}
-        plain = _unnamed(dataset, config)
+        plain = Unnamed.of(dataset, config).every
         tables: list[Table | None] = []
         for rows in (dataset.later, dataset.reference):
             if rows is None:
@@ -206,78 +185,6 @@ def _standing(family: Family, dataset: Dataset) -> set[int]:
             kept.add(number)
             last = getattr(shape, order)
     return kept
-
-
-Make = Callable[[Motion], Array]  # (samples, k) on one joint
-
-
-def _unnamed(dataset: Dataset, config: DiagnosisConfig) -> dict[Key, Make]:
-    """Return the shapes without a name: splines of q, dq and torque, ripple, form of friction.
-
-    The form of a friction law is a sum of sigmoids tanh(dq / w) of any widths w (Kostić et al.
-    2004, eq. 7): no law has the form of a machine's friction at every speed.
-    """
-    motions = [
-        one.motion for rows in (dataset.reference, dataset.later) if rows for one in rows.data.logs
-    ]
-    nominal, found = dataset.model.nominal, dict[Key, Make]()
-
-    def signal(kind: str, motion: Motion, j: int) -> Array:
-        values = nominal.torque(motion) if kind == "tau" else getattr(motion, kind)
-        return np.asarray(values[:, j])
-
-    from scipy.interpolate import BSpline
-
-    def spline(kind: str, j: int) -> Make:
-        every = np.concatenate([signal(kind, motion, j) for motion in motions])
-        low, high = float(every.min()), float(every.max())
-        knots = np.r_[[low] * 3, np.linspace(low, high, config.knots - 2), [high] * 3]
-        inside = high - 1e-9 * (high - low)
-        return lambda motion: np.asarray(
-            BSpline.design_matrix(np.clip(signal(kind, motion, j), low, inside), knots, 3).toarray()
-        )
-
-    def ripple(order: int, j: int) -> Make:
-        def make(motion: Motion) -> Array:
-            angle = order * motion.q[:, j]
-            waves = np.stack([np.sin(angle), np.cos(angle)], 1)
-            return np.asarray(signal("tau", motion, j)[:, None] * waves)
-
-        return make
-
-    def widths_of(j: int) -> Array:
-        top = max(float(np.abs(motion.dq[:, j]).max()) for motion in motions)
-        own = [law for law in dataset.model.columns.laws if law.joint == j + 1]
-        sharp = next((law.sharpness for law in own if hasattr(law, "sharpness")), 1.0 / top)
-        return np.asarray(np.geomspace(0.5 / sharp, top, config.form_widths))
-
-    def form(j: int) -> Make:
-        widths = widths_of(j)
-        return lambda motion: np.asarray(np.tanh(motion.dq[:, j, None] / widths))
-
-    clocks = [one.motion.t for one in dataset.later.data.logs]
-    start = dataset.session_start if dataset.reference is None else None  # two days have no clock
-    session = [np.concatenate(clocks)] if start is not None else clocks
-    span = max(1e-9, *(float(np.ptp(t)) for t in session))
-
-    def drift(j: int) -> Make:
-        def make(motion: Motion) -> Array:
-            since = (motion.t - (motion.t[0] if start is None else start)) / span
-            course = legvander(np.clip(2.0 * since - 1.0, -1.0, 1.0), config.drift_order)[:, 1:]
-            dq = motion.dq[:, j]
-            sharp = widths_of(j)[0]
-            return np.concatenate([course * np.tanh(dq / sharp)[:, None], course * dq[:, None]], 1)
-
-        return make
-
-    for j in range(dataset.later.n_joints):
-        found[FORM, j + 1] = form(j)
-        found["drift of friction", j + 1] = drift(j)
-        for kind in ("q", "dq", "tau"):
-            found[f"spline of {kind}", j + 1] = spline(kind, j)
-        for order in range(1, config.ripple_orders + 1):
-            found[f"ripple {order}", j + 1] = ripple(order, j)
-    return found
 
 
 def _lay_unnamed(rows: Rows, key: Key, make: Make, groups: list[Group], parts: list[Table]) -> None:

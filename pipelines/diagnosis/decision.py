@@ -13,13 +13,13 @@ from itertools import chain
 import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
-from pipelines.diagnosis.candidates import in_words
 from pipelines.diagnosis.events import DIRECTIONS
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Diagnosis, Verdict
 from pipelines.diagnosis.score import chi2_bound
 from pipelines.diagnosis.selection import Cause, Round, Selection
 from pipelines.diagnosis.table import Array
+from pipelines.diagnosis.unnamed import in_words
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.judgeable import Facts, cannot_judge, predicted_std, unresolved

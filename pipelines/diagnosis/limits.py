@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
-from pipelines.diagnosis.candidates import Group, Key
+from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import (
     DetectionLimit,
@@ -32,6 +32,7 @@ from pipelines.diagnosis.result import (
     WithoutLimit,
 )
 from pipelines.diagnosis.table import Array
+from pipelines.diagnosis.unnamed import Key
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.effects.kinds import FrictionLaw

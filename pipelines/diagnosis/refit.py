@@ -13,12 +13,13 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import Dictionary, Group, Key, laid
+from pipelines.diagnosis.candidates import Dictionary, Group, laid
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
 from pipelines.diagnosis.screening import Screened, price, screen, squares_of
 from pipelines.diagnosis.table import Array, Arrow, Indices, Table
+from pipelines.diagnosis.unnamed import Key
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Motion
@@ -42,6 +43,16 @@ class Fit:
     model: Exact
     cost: float
     residual: tuple[Array, ...]  # of each joint, in units of the noise
+
+
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Where a fit has come to."""
+
+    model: Exact
+    theta: Array
+    residual: tuple[Array, ...]
+    cost: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,41 +181,49 @@ class Later:
 
     def fit(self, model: Exact, theta: Array, belief: Belief, steps: int = _STEPS) -> State:
         """Return the model with all its numbers fitted; those of effects have no prior."""
-        residual = self._residual(model, theta)
-        now = belief.cost(theta, residual) + self._read_off(model)
+        here = self._at(model, theta, belief)
         for k in range(1 + steps):
-            slopes, names = self.slopes(
-                model if k else replace(model, effects=())
-            )  # linear numbers first
-            size = _unit(slopes.norms)
-            unit = slopes.scaled(1.0 / size)
-            known = self._exact(belief, model)
-            gradient = np.r_[known.slope(theta, residual), unit.moments(residual)]
-            before = now
-            for damping in _DAMPING if names else _DAMPING[:1]:
-                step = known.beside(unit, damping).solve(gradient)
-                settled = damping == RIDGE and gradient @ step < 2.0 + _SETTLED * now  # if linear
-                way, more = step[: len(theta)], step[len(theta) :] / size
-                own = way[: self.prior.n_nominal] / self.prior.scale
-                tried = model.moved(np.r_[own, more], names)
-                with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
-                    left = self._residual(tried, theta + way)
-                    cost = belief.cost(theta + way, left) + self._read_off(tried)
-                if np.isfinite(cost) and cost <= now:
-                    model, theta, residual, now = tried, theta + way, left, cost
-                    break
-                if settled:
-                    break
-            gained = before - now
-            if k and gained < 2.0 + _SETTLED * now:
+            there = self._better(here, belief, linear=not k)  # linear numbers first
+            gained, here = here.cost - there.cost, there
+            if k and gained < 2.0 + _SETTLED * here.cost:
                 break
-        slopes, names = self.slopes(model)
+        slopes, names = self.slopes(here.model)
         effects = slopes.scaled(1.0 / _unit(slopes.norms))
-        lasting = np.flatnonzero(
-            [not of_effect or model.effects[place].log is None for of_effect, place, _ in names]
+        logs = [one.log for one in here.model.effects]
+        lasting = [not of_effect or logs[place] is None for of_effect, place, _ in names]
+        return State(
+            here.model,
+            here.theta,
+            belief,
+            self._exact(belief, here.model),
+            here.residual,
+            effects,
+            np.flatnonzero(lasting),
+            self._read_off(here.model),
         )
-        known, price_paid = self._exact(belief, model), self._read_off(model)
-        return State(model, theta, belief, known, residual, effects, lasting, price_paid)
+
+    def _at(self, model: Exact, theta: Array, belief: Belief) -> _Point:
+        with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
+            residual = self._residual(model, theta)
+            cost = belief.cost(theta, residual) + self._read_off(model)
+        return _Point(model, theta, residual, cost)
+
+    def _better(self, here: _Point, belief: Belief, linear: bool) -> _Point:
+        """Return where a step of Levenberg and Marquardt leads; `here` where none leads lower."""
+        slopes, names = self.slopes(replace(here.model, effects=()) if linear else here.model)
+        size = _unit(slopes.norms)
+        unit, known = slopes.scaled(1.0 / size), self._exact(belief, here.model)
+        gradient = np.r_[known.slope(here.theta, here.residual), unit.moments(here.residual)]
+        for damping in _DAMPING if names else _DAMPING[:1]:
+            step = known.beside(unit, damping).solve(gradient)
+            way, more = step[: len(here.theta)], step[len(here.theta) :] / size
+            own = way[: self.prior.n_nominal] / self.prior.scale
+            there = self._at(here.model.moved(np.r_[own, more], names), here.theta + way, belief)
+            if np.isfinite(there.cost) and there.cost <= here.cost:
+                return there
+            if damping == RIDGE and gradient @ step < 2.0 + _SETTLED * here.cost:  # if linear
+                break
+        return here
 
     def composed(self, model: Exact) -> Later:
         """Return the same with the columns of drives and records beside the effects of a model.

@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import Group, Key
+from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.table import Array, Arrow, Parts, Table
+from pipelines.diagnosis.unnamed import Key
 
 __all__ = ["Screened", "best_of", "price", "screen", "squares_of"]
 

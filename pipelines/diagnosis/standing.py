@@ -15,7 +15,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.candidates import FORM, Key
 from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Standing as Told
@@ -23,6 +22,7 @@ from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.selection import Candidate, refit
 from pipelines.diagnosis.trained import Standing, told
+from pipelines.diagnosis.unnamed import FORM, Key
 from pipelines.model.effects.base import adds
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.fit import acting, refine
