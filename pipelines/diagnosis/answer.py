@@ -13,14 +13,7 @@ import numpy as np
 from pipelines.diagnosis.compliance import untold
 from pipelines.diagnosis.decision import limited_by_estimate
 from pipelines.diagnosis.engine import Diagnosis as Found
-from pipelines.diagnosis.findings import (
-    Worth,
-    alternatives_of,
-    extension_of,
-    findings_of,
-    weigh,
-    with_simulation,
-)
+from pipelines.diagnosis.findings import Worth, alternatives_of, extension_of, findings_of, weigh
 from pipelines.diagnosis.limits import Limits, limits_of, without_limit
 from pipelines.diagnosis.result import (
     Diagnosis,
@@ -42,7 +35,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.rows.families import place_of
 from pipelines.model.rows.fit import worse_log
 from pipelines.model.rows.prepare import Prepared
-from pipelines.model.rows.residual_analysis import evidence
+from pipelines.model.rows.residual_analysis import Evidence, evidence, with_simulation
 from pipelines.model.words import within
 
 __all__ = ["WEAKER", "answer"]
@@ -94,17 +87,22 @@ def answer(
         worth.rms(last),
         _ledger(found),
         _thresholds(found, f"parts of {'the reference' if reference else 'these'} logs"),
-        (evidence(trained.models[0], worth.floor),) if whole else (),
+        (_evidence(worth, last),) if whole else (),
         trained.arm(0),
         trained.arm(last),
         fewer_terms=prepared.fewer,
     )
-    told_of = with_simulation(told_of, worth.simulated[0], worth.simulated[last])
     told_of = limited_by_estimate(told_of, prepared)
     if whole:
         unsized = without_limit(told_of, bool(prepared.logs.frf), exclude)
         told_of = replace(told_of, without_limit=unsized)
     return told_of, extension_of(prepared, worth, findings) if verdict == "cause" else None
+
+
+def _evidence(worth: Worth, last: int) -> Evidence:
+    """Return what the nominal model leaves, and the position errors of the simulated arms."""
+    one = evidence(worth.trained.models[0], worth.floor)
+    return with_simulation(one, worth.simulated[0], worth.simulated[last])
 
 
 def _limits(found: Found, findings: Sequence[Finding], exclude: Sequence[str]) -> Limits:
@@ -186,10 +184,10 @@ def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Reject
     doubtful = {one.key for one in found.look.selection.causes}
     out: dict[Key, Rejected] = {}
     for one in found.look.selection.rounds:
-        for key in one.tried.keys() - settled:
+        for key in one.tried:
             doubt = found.decision.reason if key in doubtful else ""
             out[key] = Rejected(*key, one.stopped or worse or doubt or _WORSE)
-    return tuple(sorted(out.values(), key=lambda one: (one.cause, one.joint or 0)))
+    return tuple(one for key, one in out.items() if key not in settled)
 
 
 def _ledger(found: Found) -> tuple[Trial, ...]:

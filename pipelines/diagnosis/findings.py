@@ -18,7 +18,6 @@ from pipelines.diagnosis.result import (
     Alternative,
     Answer,
     BeforeAfter,
-    Diagnosis,
     Extended,
     Finding,
     Gain,
@@ -35,15 +34,7 @@ from pipelines.model.rows.prepare import Prepared
 from pipelines.model.rows.residual_analysis import Proof, proof
 from pipelines.model.simulation.comparison import Simulation, simulation_errors
 
-__all__ = [
-    "Worth",
-    "alternatives_of",
-    "extension_of",
-    "findings_of",
-    "gain_of",
-    "weigh",
-    "with_simulation",
-]
+__all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "gain_of", "weigh"]
 
 
 def gain_of(torque: TorqueGain, before: Simulation, after: Simulation) -> Gain:
@@ -158,31 +149,6 @@ def findings_of(
             )
         )
     return tuple(sorted(out, key=lambda one: -one.explained))
-
-
-_SECONDS, _POINTS = 3.0, 1500  # of a simulated log that are shown at most
-
-
-def with_simulation(found: Diagnosis, nominal: Simulation, extended: Simulation) -> Diagnosis:
-    """Return the result with the position errors of both arms, where both ran in closed loop."""
-    if not found.evidence or nominal.first is None or extended.first is None:
-        return found
-    first, other = nominal.first, extended.first.error
-    samples = int(np.searchsorted(first.t, _SECONDS))
-    shown = slice(0, samples, max(1, samples // _POINTS))
-    return replace(
-        found,
-        evidence=(
-            replace(
-                found.evidence[0],
-                simulated_t=first.t[shown],
-                simulated_position_error=first.error[shown],
-                simulated_log=first.log,
-                extended_position_error=other[shown],
-            ),
-            *found.evidence[1:],
-        ),
-    )
 
 
 Origin = Literal["residual", "base parameters", "frequency responses", "reversals"]

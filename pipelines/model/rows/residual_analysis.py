@@ -15,7 +15,7 @@ weights a constant and one wave are fitted at a time:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -23,9 +23,11 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.rows.data import Data, LogData
 from pipelines.model.rows.fit import Refined
+from pipelines.model.simulation.comparison import Simulation
 from pipelines.signal.spectra import welch
 
-__all__ = ["Curve", "Evidence", "Proof", "Spectrum", "amplitudes", "binned", "evidence", "least_order", "proof"]
+__all__ = ["Curve", "Evidence", "Proof", "Spectrum", "amplitudes", "binned", "evidence", "least_order", "proof",
+           "with_simulation"]
 
 _CURVE_BINS = 48
 _SERIES = 3000  # points of a series
@@ -43,6 +45,7 @@ _FINER = 0.02  # of the predicted power, that twice as many bins have to show
 _CHANCE = 4.0  # standard deviations of what they show by chance
 _SHOWN = 0.2  # of the predicted power, that its means over a signal have to hold
 _STRETCH = 2.0  # [s] of a proof over time
+_SECONDS, _POINTS = 3.0, 1500  # of a simulated log that are shown at most
 
 
 @dataclass(frozen=True)
@@ -381,3 +384,19 @@ def _stretch(data: Data, predicted: Array) -> tuple[Array, slice]:
                 best, found = power, slice(start, start + size)
         first += one.rows
     return times[found], found
+
+
+def with_simulation(one: Evidence, nominal: Simulation, extended: Simulation) -> Evidence:
+    """Return the analysis with the position errors of both arms, where both ran in closed loop."""
+    if nominal.first is None or extended.first is None:
+        return one
+    first, other = nominal.first, extended.first.error
+    samples = int(np.searchsorted(first.t, _SECONDS))
+    shown = slice(0, samples, max(1, samples // _POINTS))
+    return replace(
+        one,
+        simulated_t=first.t[shown],
+        simulated_position_error=first.error[shown],
+        simulated_log=first.log,
+        extended_position_error=other[shown],
+    )
