@@ -67,7 +67,8 @@ class Case:
         law = _friction(self.law, typical, speed, rng)
         typical = typical + law.coulomb
         resolution = np.array([self.resolution * (0.1 if axis.slide else 1.0) for axis in arm.axes])
-        robot = arm.described(tuple(resolution.tolist()), np.ceil(6.0 * typical), self.geared)
+        limit = np.ceil(6.0 * typical)
+        robot = arm.described(tuple(resolution.tolist()), limit, self.geared)
         counts = 12.0 * typical / 2**13
         sick = self._fault(typical, law, speed)
         logs = []
@@ -75,7 +76,7 @@ class Case:
             own = np.random.default_rng([seed, place])
             t: Array = np.arange(round(self.duration / self.sample_time)) * self.sample_time
             path = motion(kind, arm, t, own)
-            loop = Loop(self.loop, arm, self.sample_time, inertia, min(5.0, 0.02 / self.sample_time), counts)
+            loop = Loop(self.loop, arm, self.sample_time, inertia, min(5.0, 0.02 / self.sample_time), counts, limit)
             now = None if role == "reference" or (self.fault == "contact" and place != _TOUCHED) else sick
             plant = Plant(arm if now is None else self._bent(arm), law, now, self.noise * typical, self.coloured, resolution)
             q, tau = plant.run(loop, path, self.sample_time, own)

@@ -1,7 +1,7 @@
 """Motions that an arm follows, and the loops that make it follow them; none of them is the bench's.
 
     q, dq, ddq = motion("fourier", arm, t, rng)        (samples, joints) each
-    loop = Loop("cascade", arm, sample_time, inertia, bandwidth_hz, counts)
+    loop = Loop("cascade", arm, sample_time, inertia, bandwidth_hz, counts, limit)
     command = loop(q_ref, dq_ref, ddq_ref, q)          (joints,) at each sample
 """
 
@@ -70,9 +70,10 @@ class Loop:
     """A controller with its memory: "pd", "pid", "pd+gravity", "cascade" or "computed torque". Of the first two a log can tell. Its
     own model, where it has one, is a tenth too heavy."""
 
-    def __init__(self, kind: str, arm: Arm, sample_time: float, inertia: Array, bandwidth_hz: float, counts: Array) -> None:
+    def __init__(self, kind: str, arm: Arm, sample_time: float, inertia: Array, bandwidth_hz: float, counts: Array,
+                 limit: Array) -> None:
         w = 2.0 * np.pi * bandwidth_hz
-        self.kind, self.step, self.counts = kind, sample_time, counts
+        self.kind, self.step, self.counts, self.limit = kind, sample_time, counts, limit
         self.kp, self.kd = inertia * w**2, 2.0 * _DAMPING * inertia * w
         self.ki = 0.3 * w * self.kp if kind == "pid" else 0.0 * self.kp
         self.inertia, self.rate = inertia, w
@@ -90,9 +91,10 @@ class Loop:
     def __call__(self, q_ref: Array, dq_ref: Array, ddq_ref: Array, q: Array) -> Array:
         e = q - q_ref
         change = np.zeros(len(e)) if self._last is None else (e - self._last) / self.step
-        self._last = e
+        self._last, before = e, self._sum
         torque = getattr(self, "_" + self.kind.replace("+", "_").replace(" ", "_"))(q_ref, dq_ref, ddq_ref, q, e, change)
-        return np.asarray(np.rint(torque / self.counts) * self.counts)
+        self._sum = np.where(np.abs(torque) > self.limit, before, self._sum)  # no more than the drives have, and no wind-up
+        return np.asarray(np.rint(np.clip(torque, -self.limit, self.limit) / self.counts) * self.counts)
 
     def _pd(self, q_ref: Array, dq_ref: Array, ddq_ref: Array, q: Array, e: Array, change: Array) -> Any:
         return -self.kp * e - self.kd * change

@@ -188,27 +188,34 @@ class _Step:
     def significant(self) -> dict[Key, Screened]:
         """The candidates above the family-wise threshold, the best shape of each.
 
-        No law is exact: at the joints of the causes found so far, and of what stands since the
-        reference, what remains of these is larger than the noise, and a further cause has to gain
-        more than a share of what they explain there.
+        What has no name is not refitted: it is judged by its relevance here, a cause by what it
+        saves when all its numbers are fitted, of which a step along its columns shows a part.
         """
         later, taken = self.later, {cause.key for cause in self.causes}
-        known = later.shares @ self._inexact
-        inexact = dict(zip(later.dictionary.groups, known, strict=True))
         return {
             key: one
             for key, one in best_of(later.screened(self.state)).items()
             if (key not in taken or later.again(key))
-            and one.gain > max(inexact[one.group], self._threshold(one))
-            and (one.group.kind == "named" or not later.slight(self._torque(one)))
+            and one.gain > self._threshold(one)
+            and (one.group.kind == "named" or self._matters(one))
         }
 
     @property
     def relevant_keys(self) -> tuple[Key, ...]:
         """The significant causes, the strongest first."""
         ranked = sorted(self.significant.values(), key=lambda one: -one.gain)
-        ranked = [one for one in ranked if not self.later.slight(self._torque(one))]
-        return tuple(one.group.key for one in ranked if one.group.kind != "unnamed")
+        ranked = [one for one in ranked if one.group.kind != "unnamed" and self._matters(one)]
+        return tuple(one.group.key for one in ranked)
+
+    def _matters(self, one: Screened) -> bool:
+        """Return whether a candidate gains more than laws are inexact, and healthy machines have.
+
+        At the joints of the causes found so far, and of what stands since the reference, what
+        remains of these is larger than the noise.
+        """
+        place = self.later.dictionary.groups.index(one.group)
+        inexact = float(self.later.shares[place] @ self._inexact)
+        return one.gain > inexact and not self.later.slight(self._torque(one))
 
     def _threshold(self, one: Screened) -> float:
         return self.baseline.threshold(one.group, one.freedom, self.later.rows.count)
