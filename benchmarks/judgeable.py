@@ -18,12 +18,12 @@ import numpy as np
 
 from pipelines import diagnose
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.decision import facts, nominal_estimate
 from pipelines.errors import RrridError
 from pipelines.estimation.checks.gates import logs_of_roles
 from pipelines.model.estimation.judgeable import Facts, JudgeableConfig, cannot_judge
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import prepare
+from pipelines.model.rows.repeated import facts, nominal_estimate
 from pipelines.stage import Request
 
 __all__ = ["asked", "decided", "main"]
@@ -59,7 +59,7 @@ def asked(folder: Path) -> dict[str, Any]:
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
     rows = DiagnosisConfig().recipe()
     prepared = with_terms_told_apart(prepare(chosen, rows), settings.blocks)
-    known = facts(found, prepared, nominal_estimate(prepared))
+    known = facts(found.residual_rms.validate, found.noise_floor_origin != "blocks", prepared, nominal_estimate(prepared))
     return {"verdict": found.verdict, "origin": found.noise_floor_origin,
             "findings": [f"{one.cause}:{one.joint}" for one in found.findings],
             "left": known.left.tolist(), "torque": known.torque.tolist(),

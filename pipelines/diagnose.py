@@ -27,6 +27,7 @@ from pipelines.model.named_cause import refuse_unknown
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, Logs, prepare
 from pipelines.report.diagnosis_report import diagnosis_report
+from pipelines.report.finding_words import summary_of
 from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
 
@@ -134,6 +135,7 @@ def _diagnosed(logs: Logs, settings: Settings, given: Material, whole: bool) -> 
     given.tell("comparing with the reference logs" if logs.reference else "looking for causes")
     found = diagnose_prepared(prepared, config, settings.exclude)
     told, extension = answer(prepared, found, given.tell, settings.blocks, whole, settings.exclude)
+    told = replace(told, summary=summary_of(told))
     return _with_cut(told, found.look.selection.cut, settings.max_causes), extension
 
 

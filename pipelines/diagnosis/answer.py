@@ -1,4 +1,4 @@
-"""Build the result of a diagnosis: verdict, summary, findings, limits, ledger.
+"""Build the result of a diagnosis: verdict, findings, limits, ledger.
 
 answer(prepared, diagnose_prepared(prepared, config), tell)
 """
@@ -15,28 +15,16 @@ from pipelines.diagnosis.decision import limited_by_estimate
 from pipelines.diagnosis.engine import Diagnosis as Found
 from pipelines.diagnosis.findings import Worth, alternatives_of, extension_of, findings_of, weigh
 from pipelines.diagnosis.limits import Limits, limits_of, without_limit
-from pipelines.diagnosis.result import (
-    Diagnosis,
-    Extended,
-    Finding,
-    Rejected,
-    Threshold,
-    Trial,
-    Value,
-    Verdict,
-)
+from pipelines.diagnosis.result import Diagnosis, Extended, Finding, Rejected, Threshold, Trial
 from pipelines.diagnosis.screening import best_of
 from pipelines.diagnosis.selection import Cause
 from pipelines.diagnosis.standing import standing_of
-from pipelines.diagnosis.trained import Trained, told, train
+from pipelines.diagnosis.trained import train
 from pipelines.diagnosis.unnamed import Key
-from pipelines.diagnosis.words import beside, how_much, taken_in, where
-from pipelines.model.arm import Acting
 from pipelines.model.rows.families import place_of
 from pipelines.model.rows.fit import worse_log
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.rows.residual_analysis import Evidence, evidence, with_simulation
-from pipelines.model.words import within
 
 __all__ = ["WEAKER", "answer"]
 
@@ -73,7 +61,7 @@ def answer(
     trained, last = worth.trained, len(causes)
     told_of = Diagnosis(
         verdict,
-        _sentence(verdict, reason, findings, trained, found),
+        "",
         findings,
         worth.standing,
         _rejected(found, causes, worse),
@@ -133,45 +121,6 @@ def _worth(
         why = f"with {place_of(*causes[-1].key)} {worse}"
         causes = causes[:-1]
     return causes, worth.first(len(causes)), why
-
-
-def _sentence(
-    verdict: Verdict, reason: str, findings: Sequence[Finding], trained: Trained, found: Found
-) -> str:
-    """Return the summary, one sentence for a technician."""
-    if verdict == "no-fault-found":
-        return "Nothing is wrong with this arm, as far as these logs can tell."
-    if not findings:
-        return f"Something is wrong, and no cause is named: {reason}."
-    first = findings[0]
-    revolute = trained.models[0].model.arm.robot.revolute
-    turns = revolute if first.joint is None else revolute[first.joint - 1 : first.joint]
-    unit = " or ".join(
-        dict.fromkeys("N m rms of torque" if one else "N rms of force" for one in turns)
-    )
-    what = f"{first.title}{how_much(first)}{where(first)}"
-    others = _others(first, found)
-    if others:
-        which = "".join(f", or {one}" for one in others)
-        more = first.experiment or ""
-        return f"{what}{which}: these logs do not tell which. {more}".rstrip()
-    size = f": {first.torque_rms:.2g} {unit}{taken_in(first, trained.models[0].rms)}"
-    return f"{what}{size}{beside(findings[1:])}."
-
-
-def _others(first: Finding, found: Found) -> list[str]:
-    """Return the alternatives of a finding, each with its number."""
-    keys = {(one.cause, one.joint) for one in first.alternatives}
-    every = (one for one in found.look.selection.rounds if one.cause is not None)
-    own = next((r for r in every if r.cause and r.cause.key == (first.cause, first.joint)), None)
-    out = []
-    for (cause, joint), fit in ({} if own is None else own.tried).items():
-        if (cause, joint) in keys:
-            one = fit.model.effects[-1]
-            numbers: dict[str, Value] = told(Acting.of(one.effect, one.values))
-            like = replace(first, cause=cause, joint=joint, parameters=numbers, log=None)
-            out.append(f"{within(one.effect.words.title)}{how_much(like)}{where(like)}")
-    return out
 
 
 def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Rejected, ...]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import chain
 
 import numpy as np
 
@@ -21,16 +20,12 @@ from pipelines.diagnosis.selection import Cause, Round, Selection
 from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.unnamed import in_words
 from pipelines.model.arm import Arm
-from pipelines.model.estimation.estimate import Estimate, estimate
-from pipelines.model.estimation.judgeable import Facts, cannot_judge, predicted_std, unresolved
+from pipelines.model.estimation.judgeable import cannot_judge
 from pipelines.model.estimation.negative_viscous import negative_viscous
-from pipelines.model.estimation.regression import Columns, LogEquations
-from pipelines.model.rows.data import Data
-from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Prepared
-from pipelines.model.rows.repeated import Repeated
+from pipelines.model.rows.repeated import Repeated, facts, nominal_estimate
 
-__all__ = ["Decision", "decide", "facts", "limited_by_estimate", "nominal_estimate"]
+__all__ = ["Decision", "decide", "limited_by_estimate"]
 
 
 @dataclass(frozen=True)
@@ -227,9 +222,6 @@ def _followed(later: Later, selection: Selection) -> tuple[Array, tuple[str, ...
     return taken, tuple(told)
 
 
-_ABOVE = 1.6  # times the noise between rows of one state: a smaller residual is noise
-
-
 def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
     """Return the diagnosis, "cannot-judge" where its logs cannot show that nothing is wrong.
 
@@ -241,42 +233,9 @@ def limited_by_estimate(found: Diagnosis, prepared: Prepared) -> Diagnosis:
         return found
     estimated = nominal_estimate(prepared)
     found = replace(found, checks=negative_viscous(estimated, prepared.logs.identify[0].robot_name))
-    why = cannot_judge(facts(found, prepared, estimated)) if nothing else ""
-    if not why:
-        return found
-    return replace(
-        found,
-        verdict="cannot-judge",
-        reason=why,
-        summary=f"Whether anything is wrong with this arm cannot be judged: {why}.",
-    )
-
-
-def nominal_estimate(prepared: Prepared) -> Estimate:
-    """Return the nominal model as `estimate-bps` fits it, on the rows of a diagnosis."""
-    return estimate(_equations(prepared.data, prepared.columns), prepared.columns)
-
-
-def facts(found: Diagnosis, prepared: Prepared, estimated: Estimate) -> Facts:
-    """Return the errors of the nominal model on held-out motion, and the state of its floor."""
-    judge = prepared.data if prepared.judge is None else prepared.judge
-    left = found.residual_rms.validate
-    spread = predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns)))
-    known = np.full(len(left), found.noise_floor_origin != "blocks")
-    if not known.all():  # what is predicted is off by the noise and by the deviations of the model
-        known = left <= _ABOVE * np.hypot(_noise(prepared), spread)
-    return Facts(left, judge.rms(judge.y), spread, unresolved(estimated), known)
-
-
-def _noise(prepared: Prepared) -> Array:
-    """Return the noise (joints,) [N m] of the residual by rows of one state; 0 without any."""
-    _, fit = fit_nominal(prepared.data, prepared.columns)
-    return np.sqrt(np.nan_to_num(Repeated.of(prepared.data).noise(fit.left)))
-
-
-def _equations(data: Data, columns: Columns) -> list[LogEquations]:
-    """Return the equations of each log in `columns`; rows may hold more terms of a friction law."""
-    return [replace(log.equations, columns=columns) for log in data.logs]
+    left, floor = found.residual_rms.validate, found.noise_floor_origin != "blocks"
+    why = cannot_judge(facts(left, floor, prepared, estimated)) if nothing else ""
+    return replace(found, verdict="cannot-judge", reason=why) if why else found
 
 
 def _negative(arm: Arm | None) -> bool:

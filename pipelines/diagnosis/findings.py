@@ -27,7 +27,7 @@ from pipelines.diagnosis.result import (
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.selection import Round
 from pipelines.diagnosis.table import Array
-from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters
+from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters, told
 from pipelines.model.arm import Acting
 from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared
@@ -221,7 +221,9 @@ def alternatives_of(own: Round) -> tuple[Alternative, ...]:
         theirs = taken(own.tried[key])
         size = float(np.linalg.norm(mine) * np.linalg.norm(theirs))
         similarity = float(mine @ theirs) / max(size, 1e-300)
-        out.append(Alternative(*key, similarity, probability[key]))
+        effect = own.tried[key].model.effects[-1]
+        numbers = told(Acting.of(effect.effect, effect.values))
+        out.append(Alternative(*key, similarity, probability[key], numbers))
     return tuple(sorted(out, key=lambda one: -one.probability))
 
 

@@ -67,6 +67,7 @@ class Alternative:
     joint: int | None
     similarity: float  # cosine of the angle between the torques that the two explain
     probability: float
+    parameters: dict[str, Value] = field(default_factory=dict, metadata=NOT_STORED, repr=False)
 
 
 @dataclass(frozen=True)

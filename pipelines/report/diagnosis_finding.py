@@ -8,7 +8,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.diagnosis.result import Finding, Gain, ResidualRms
-from pipelines.diagnosis.words import of_any_size, taken_in, where
 from pipelines.log.experiment import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.parameter_names import numbered
@@ -25,6 +24,7 @@ from pipelines.report.diagnosis_words import (
     torque_of,
     unit_or_dash,
 )
+from pipelines.report.finding_words import of_any_size, taken_in, where
 from pipelines.report.joint_units import Units
 from pipelines.report.report import Section, Table
 from pipelines.report.style import format_decimals, format_number, three_digits, to_one_place

@@ -9,7 +9,6 @@ import numpy as np
 
 from pipelines.diagnosis.answer import WEAKER
 from pipelines.diagnosis.result import Finding, Rejected, Result, Trial
-from pipelines.diagnosis.words import how_much, of_any_size, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
 from pipelines.report.boundary_card import boundary_card
@@ -36,6 +35,7 @@ from pipelines.report.diagnosis_words import (
     torque_of,
     without_keys,
 )
+from pipelines.report.finding_words import how_much, of_any_size, taken_in, where
 from pipelines.report.joint_units import units_in
 from pipelines.report.model_words import laws_words, threshold_words
 from pipelines.report.report import Report, Section, Table, Tone

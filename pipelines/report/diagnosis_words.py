@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from pipelines.diagnosis.result import Finding, Rejected, Value
-from pipelines.diagnosis.words import other_joint
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.parameter_names import numbered, part_of
 from pipelines.model.words import within
+from pipelines.report.finding_words import other_joint
 from pipelines.report.joint_units import Units
 from pipelines.report.style import format_number, format_unit, unit_in_words, with_std
 

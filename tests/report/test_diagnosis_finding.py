@@ -11,7 +11,6 @@ import pytest
 from matplotlib.figure import Figure as Drawing
 
 from pipelines.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, Value
-from pipelines.diagnosis.words import how_much, taken_in, where
 from pipelines.model.effects import find_effect
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.residual_analysis import Proof
@@ -19,6 +18,7 @@ from pipelines.report.diagnosis_finding import finding_section
 from pipelines.report.diagnosis_floor import what_stays
 from pipelines.report.diagnosis_proof import draw_proof_in_time
 from pipelines.report.diagnosis_words import together
+from pipelines.report.finding_words import how_much, taken_in, where
 from pipelines.report.frf_figures import posture_words
 
 

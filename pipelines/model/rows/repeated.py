@@ -1,6 +1,7 @@
 """Tell noise from model error by pairs of rows of one state.
 
     common, differing = Repeated.of(data).parts(left)      what is noise, and what is not
+    facts(left, known, prepared, nominal_estimate(prepared))    whether a residual can be judged
 
 Noise is what differs between two rows of one state. With a residual r = f(q, dq, ddq) + e of a
 model error f and noise e, independent in both rows,
@@ -13,21 +14,28 @@ not, within a log or between two. Where states differ a little, σ² is too larg
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.log.experiment import Array
+from pipelines.model.estimation.estimate import Estimate, estimate
+from pipelines.model.estimation.judgeable import Facts, predicted_std, unresolved
+from pipelines.model.estimation.regression import Columns, LogEquations
 from pipelines.model.rows.data import Data
+from pipelines.model.rows.nominal import fit_nominal
+from pipelines.model.rows.prepare import Prepared
 from pipelines.signal.neighbours import nearest_pairs
 
-__all__ = ["Repeated"]
+__all__ = ["Repeated", "facts", "nominal_estimate"]
 
 _STILL = (1e-3, 1e-2, 0.1)  # [rad, rad/s, rad/s²; m, m/s, m/s²] less motion is noise
 _NEAR = 0.1  # of the standard deviation of each coordinate: rows of one state
 _APART = 1.0  # [s] in a log, at least: after less, what wanders is still where it was
 _OTHER_LOG = 1e9  # numerics: [s] between the clocks of two logs
+_ABOVE = 1.6  # times the noise between rows of one state: a smaller residual is noise
 _FEWEST = 100  # numerics: pairs of a joint; fewer say little
 
 
@@ -75,3 +83,34 @@ class Repeated:
     def _laid(self, x: Array) -> Array:
         """(rows,) -> (joints, rows of one joint)"""
         return np.concatenate(list(self.data.split(x)), axis=1)
+
+
+def nominal_estimate(prepared: Prepared) -> Estimate:
+    """Return the nominal model as `estimate-bps` fits it, on prepared rows."""
+    return estimate(_equations(prepared.data, prepared.columns), prepared.columns)
+
+
+def facts(left: Array, known: bool, prepared: Prepared, estimated: Estimate) -> Facts:
+    """Return the errors of the nominal model on held-out motion, and the state of its floor.
+
+    Args:
+        left: (joints,) [N m] rms residual on held-out motion.
+        known: the floor, by reference logs.
+    """
+    judge = prepared.data if prepared.judge is None else prepared.judge
+    spread = predicted_std(estimated, chain.from_iterable(_equations(judge, prepared.columns)))
+    told = np.full(len(left), known)
+    if not known:  # what is predicted is off by the noise and by the deviations of the model
+        told = left <= _ABOVE * np.hypot(_noise(prepared), spread)
+    return Facts(left, judge.rms(judge.y), spread, unresolved(estimated), told)
+
+
+def _noise(prepared: Prepared) -> Array:
+    """Return the noise (joints,) [N m] of the residual by rows of one state; 0 without any."""
+    _, fit = fit_nominal(prepared.data, prepared.columns)
+    return np.asarray(np.sqrt(np.nan_to_num(Repeated.of(prepared.data).noise(fit.left))))
+
+
+def _equations(data: Data, columns: Columns) -> list[LogEquations]:
+    """Return the equations of each log in `columns`; rows may hold more terms of a friction law."""
+    return [replace(log.equations, columns=columns) for log in data.logs]

@@ -1,8 +1,8 @@
-"""Say in words where a finding is, how much of it there is, and what imitates it.
+"""Say in words what was found: where, how much of it there is, and what imitates it.
 
+summary_of(result)             one sentence for a technician
 where(finding)                 " at joint 2 (from joint 1)"
 how_much(finding)              " of 0.15 kg", " (28 Hz)", " (-10 %)"
-beside(findings)               "; and torque logging delay (120 ms) at joint 1"
 taken_in(finding, left)        ", most of which the nominal model had taken in"
 of_any_size(finding)           whether these logs leave open how large its torque is
 """
@@ -10,15 +10,16 @@ of_any_size(finding)           whether these logs leave open how large its torqu
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from pipelines.diagnosis.result import Finding, Value
+from pipelines.diagnosis.result import Alternative, Diagnosis, Finding, Value
 from pipelines.log.experiment import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.words import plain_number, within
 
-__all__ = ["beside", "how_much", "of_any_size", "other_joint", "taken_in", "where"]
+__all__ = ["how_much", "of_any_size", "other_joint", "summary_of", "taken_in", "where"]
 
 # usual units, where these are not SI
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
@@ -26,6 +27,31 @@ _DEGREE = np.pi / 180.0
 _TORQUES = ("N m", "N")
 _TOLD = 2  # further findings that a sentence names
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
+
+
+def summary_of(found: Diagnosis) -> str:
+    """Return the summary, one sentence for a technician."""
+    if found.verdict == "no-fault-found":
+        return "Nothing is wrong with this arm, as far as these logs can tell."
+    if found.verdict == "cannot-judge":
+        return f"Whether anything is wrong with this arm cannot be judged: {found.reason}."
+    if not found.findings:
+        return f"Something is wrong, and no cause is named: {found.reason}."
+    first, *more = found.findings
+    what = f"{first.title}{how_much(first)}{where(first)}"
+    if first.alternatives:
+        which = "".join(f", or {_alternative(first, one)}" for one in first.alternatives)
+        return f"{what}{which}: these logs do not tell which. {first.experiment or ''}".rstrip()
+    revolute = () if found.nominal is None else found.nominal.robot.revolute
+    turns = revolute if first.joint is None else revolute[first.joint - 1 : first.joint]
+    units = dict.fromkeys("N m rms of torque" if one else "N rms of force" for one in turns)
+    size = f"{first.torque_rms:.2g} {' or '.join(units)}"
+    return f"{what}: {size}{taken_in(first, found.residual_rms.identify)}{_beside(more)}."
+
+
+def _alternative(first: Finding, other: Alternative) -> str:
+    like = replace(first, cause=other.cause, joint=other.joint, parameters=other.parameters, log=None)
+    return f"{within(find_effect(other.cause).words.title)}{how_much(like)}{where(like)}"
 
 
 def where(one: Finding) -> str:
@@ -64,7 +90,7 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
     return ""
 
 
-def beside(others: Sequence[Finding]) -> str:
+def _beside(others: Sequence[Finding]) -> str:
     """Return "; and torque logging delay (120 ms) at joint 1", and how many more there are."""
     told = [f"{within(one.title)}{how_much(one)}{where(one)}" for one in others[:_TOLD]]
     if len(others) > _TOLD:
