@@ -17,7 +17,7 @@ from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
 from pipelines.diagnosis.score import chi2_bound, upper_point
 from pipelines.diagnosis.screening import Screened, best_of, screen, squares_of
-from pipelines.diagnosis.table import Array, Arrow, Structure, Table
+from pipelines.fit.joint_table import Array, Arrow, Structure, Table
 
 __all__ = ["Baseline", "baseline"]
 

@@ -17,8 +17,8 @@ import numpy as np
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.table import Array, Indices, Table
 from pipelines.diagnosis.unnamed import Key, Make, Unnamed
+from pipelines.fit.joint_table import Array, Indices, Table
 from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, everywhere

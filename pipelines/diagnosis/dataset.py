@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.diagnosis.table import Array, Indices, Table, by_joint
 from pipelines.errors import InputRejected
+from pipelines.fit.joint_table import Array, Indices, Table, by_joint
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.regression import Columns

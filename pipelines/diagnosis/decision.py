@@ -17,8 +17,8 @@ from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Diagnosis, Verdict
 from pipelines.diagnosis.score import chi2_bound
 from pipelines.diagnosis.selection import Cause, Round, Selection
-from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.unnamed import in_words
+from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.judgeable import cannot_judge
 from pipelines.model.estimation.negative_viscous import negative_viscous

@@ -16,8 +16,8 @@ from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.prior import Prior, prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.selection import SearchStart, Selection, select
-from pipelines.diagnosis.table import Array, Table
 from pipelines.diagnosis.variance import settle
+from pipelines.fit.joint_table import Array, Table
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

@@ -26,8 +26,8 @@ from pipelines.diagnosis.result import (
 )
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.selection import Round
-from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters, told
+from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Acting
 from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared

@@ -31,8 +31,8 @@ from pipelines.diagnosis.result import (
     Value,
     WithoutLimit,
 )
-from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.unnamed import Key
+from pipelines.fit.joint_table import Array
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.effects.kinds import FrictionLaw

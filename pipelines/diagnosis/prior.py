@@ -26,9 +26,9 @@ from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.score import Blocks
-from pipelines.diagnosis.table import Array, Arrow, Indices, Structure, Table
 from pipelines.diagnosis.unnamed import FORM
 from pipelines.diagnosis.variance import Components, components
+from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.kinds import FrictionLaw
 

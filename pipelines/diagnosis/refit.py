@@ -18,8 +18,8 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
 from pipelines.diagnosis.screening import Screened, price, screen, squares_of
-from pipelines.diagnosis.table import Array, Arrow, Indices, Table
 from pipelines.diagnosis.unnamed import Key
+from pipelines.fit.joint_table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Motion

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.table import Array, Arrow, Indices, Table
+from pipelines.fit.joint_table import Array, Arrow, Indices, Table
 
 __all__ = ["Blocks", "chi2_bound", "confidence_set", "log_scores", "probabilities", "upper_point"]
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.diagnosis.candidates import Group
-from pipelines.diagnosis.table import Array, Arrow, Parts, Table
 from pipelines.diagnosis.unnamed import Key
+from pipelines.fit.joint_table import Array, Arrow, Parts, Table
 
 __all__ = ["Screened", "best_of", "price", "screen", "squares_of"]
 

@@ -18,8 +18,8 @@ from pipelines.diagnosis.events import Window, push_of
 from pipelines.diagnosis.refit import Fit, Later, State
 from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
-from pipelines.diagnosis.table import Array
 from pipelines.diagnosis.unnamed import Key, in_words
+from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb

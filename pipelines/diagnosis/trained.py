@@ -26,7 +26,7 @@ from pipelines.diagnosis.refit import Later, State
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.result import Value
 from pipelines.diagnosis.score import confidence_set, log_scores
-from pipelines.diagnosis.table import Array, Arrow, Table
+from pipelines.fit.joint_table import Array, Arrow, Table
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data

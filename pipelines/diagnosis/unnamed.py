@@ -17,7 +17,7 @@ from numpy.polynomial.legendre import legvander
 
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
-from pipelines.diagnosis.table import Array
+from pipelines.fit.joint_table import Array
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.families import place_of
 

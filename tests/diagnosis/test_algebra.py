@@ -10,7 +10,7 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.prior import Belief
 from pipelines.diagnosis.score import Blocks, confidence_set
 from pipelines.diagnosis.screening import screen
-from pipelines.diagnosis.table import Array, Arrow, Structure, Table, by_joint
+from pipelines.fit.joint_table import Array, Arrow, Structure, Table, by_joint
 
 _ROWS, _JOINTS, _KNOWN, _MORE = 240, 3, 5, 2
 
