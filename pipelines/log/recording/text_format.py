@@ -35,6 +35,7 @@ FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*
 WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|°)[^\d\s]{0,9})")
 _INFINITE = r"[+-]?(inf|Inf|INF|infinity|Infinity)"
 _NUMBER = re.compile(rf"[+-]?(\d++\.?\d*|\.\d++)([eEdD][+-]?\d+)?|{_INFINITE}")
+_QUOTED = re.compile(r"""(['"])(.*)\1""")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d+")  # as spreadsheets show numbers, in quotes
 # Encodings of a file without a mark; the first where none fits better.
 _ENCODINGS = ("latin-1", "cp932", "gb18030", "cp949", "cp1250", "cp1251")
@@ -150,7 +151,8 @@ def cells_of(line: str, delimiter: str) -> list[str]:
             return [cell.replace(",", "") if _THOUSANDS.fullmatch(cell) else cell for cell in cells]
         except (csv.Error, StopIteration):
             pass
-    return [cell.strip().strip("'\"") for cell in line.split(delimiter)]
+    bare = (cell.strip() for cell in line.split(delimiter))
+    return [found[2] if (found := _QUOTED.fullmatch(cell)) else cell for cell in bare]
 
 
 def is_number(cell: str, decimal: str = ".") -> bool:
