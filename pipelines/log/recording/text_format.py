@@ -449,12 +449,15 @@ def without_repeats(columns: dict[str, Array], header: Header, source: str) -> d
     Raises:
         InputRejected: S03, two columns of one name hold different numbers.
     """
+    places: dict[str, list[int]] = {}
     for name, first in header.again.items():
         both = [columns[key] for key in (name, first) if key in columns]
-        if len(both) == 2 and np.array_equal(both[0], both[1], equal_nan=True):
-            continue
-        at = header.names.index(first) + 1, header.names.index(name) + 1
-        message = f"columns {at[0]} and {at[1]} are both named '{first[:80]}'"
-        where, remedy = f"{source}, line {header.line}", "rename one of them in the file"
+        if len(both) < 2 or not np.array_equal(both[0], both[1], equal_nan=True):
+            at = places.setdefault(first, [header.names.index(first) + 1])
+            at.append(header.names.index(name) + 1)
+    if places:
+        pairs = [(", ".join(map(str, at)), name[:80]) for name, at in places.items()][:8]
+        message = "; ".join(f"columns {at} are all named '{name}'" for at, name in pairs)
+        where, remedy = f"{source}, line {header.line}", "give each its own name in the file"
         raise InputRejected("S03", message, where=where, remedy=remedy)
     return {name: values for name, values in columns.items() if name not in header.again}

@@ -211,7 +211,7 @@ def test_cells_that_julia_left_missing_are_no_numbers() -> None:
 
 
 def test_s03_two_columns_of_one_name_are_both_named() -> None:
-    with pytest.raises(InputRejected, match=r"RRID-S03.*line 1.*columns 2 and 3 are both named 'q_1'"):
+    with pytest.raises(InputRejected, match=r"RRID-S03.*line 1.*columns 2, 3 are all named 'q_1'"):
         parse(text(good()).replace("q_2", "q_1", 1))
 
 
