@@ -270,7 +270,7 @@ def same_names_again(folder: Path, run: Run) -> Answer:
     """Three joints beside each other, each below the same three names (own, after usual practice)."""
     parts = [np.column_stack([run.q[:, j], run.dq[:, j], run.tau[:, j]]) for j in range(3)]
     rows(folder / "arm.csv", np.column_stack([run.t, *parts]), ",", "time" + ",pos,vel,trq" * 3 + "\n")
-    return Answer("arm.csv", {"time": "s"}, right=anywhere(q=RAD, dq=RADS, tau=NM), texts=False)
+    return Answer("arm.csv", {"time": "s"}, right=anywhere(q=RAD, dq=RADS, tau=NM), texts=False, table=False)
 
 
 @layout(SIX, rate=20.0)
