@@ -81,7 +81,7 @@ REFUSED: dict[str, tuple[str, Callable[[Path], object], str, str]] = {
     "a fourth joint": ("S02", lambda f: write(f, text(good() | {"q_4": good()["q_1"]})), RECIPE,
                        "4 columns for q, but the robot has 3"),
     "names twice": ("S03", lambda f: write(f, text(good()).replace("q_3", "q_2", 1)), RECIPE,
-                    "columns 3 and 4 are both named 'q_2'"),
+                    "columns 3, 4 are all named 'q_2'"),
     "no unit": ("S04", lambda f: None, unit_away(RECIPE), 'signal q: no unit.*unit = "rad"'),
     "volts": ("S05", lambda f: None, RECIPE.replace('"N m"', '"V"'), "unknown unit 'V'; torque needs one of N m"),
     "header says otherwise": ("S05", lambda f: write(f, text(good()).replace("q_1", "q_1 [deg]", 1)), RECIPE,

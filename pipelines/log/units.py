@@ -52,7 +52,7 @@ UNITS: Final[dict[str, Unit]] = {
     "lbf in": Unit("torque", 0.0254 * _LBF), "ozf in": Unit("torque", 0.0254 * _LBF / 16.0),
     "N": Unit("torque", 1.0), "mN": Unit("torque", 1e-3), "kN": Unit("torque", 1e3),
     # current
-    "A": Unit("current", 1.0), "mA": Unit("current", 1e-3),
+    "A": Unit("current", 1.0), "mA": Unit("current", 1e-3), "Arms": Unit("current", 1.0),  # what it is times: N m per A rms
     # temperature
     "degC": Unit("temperature", 1.0), "°C": Unit("temperature", 1.0), "K": Unit("temperature", 1.0, -273.15),
 }
@@ -77,7 +77,7 @@ _WORDS: Final = ((r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"), (r"\bmilli[
                  (r"deg(?:ree)?s?\b", "deg"), (r"rad(?:ian)?s?\b", "rad"), (r"\b(?:rev(?:olution)?|turn)s?\b", "rev"),
                  (r"sec(?:ond)?s?\b", "s"), (r"amp(?:ere)?s?\b", "A"), (r"°", "deg"), (r"/s/s\b|/s\^?2\b", "/s^2"),
                  (r"\bdps\b", "deg/s"), (r"\brps\b", "rev/s"), (r"rev/min(?:ute)?\b", "rpm"), (r"^min(?:ute)?s?$", "min"),
-                 (r"\bkg(?=[ -])", "kgf"),
+                 (r"\bkg(?=[ -])", "kgf"), (r"(?i)^a[ _-]?rms$", "Arms"),
                  (r"\b(?:ft|in)[ -](?:lbs?|lbf|oz)\b", lambda m: _turned(m[0])), (r"\blbs?(?=[ -])", "lbf"),
                  (r"\boz(?=[ -])", "ozf"), (r"(?<=f)-", " "), (r"^([mcuk]?)n[ .-]?m$", r"\1N m"))  # fmt: skip
 

@@ -203,7 +203,8 @@ def read_mat5(data: bytes, source: str) -> Arrays:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", UserWarning)
-            names = _wanted(whosmat(io.BytesIO(data)), source)
+            listed = whosmat(io.BytesIO(data))
+            names = _wanted(listed, source)
             # Not mat_dtype=True, the type MATLAB shows: it would drop imaginary parts.
             loaded = loadmat(io.BytesIO(data), variable_names=names)
     except MatReadWarning as problem:
@@ -213,7 +214,7 @@ def read_mat5(data: bytes, source: str) -> Arrays:
         raise damaged_mat(source) from None
     if not set(names) <= loaded.keys():
         raise damaged_mat(source)
-    found: dict[str, Array] = {}
+    found: dict[str, Array] = {k: np.empty(0, object) for k, _, kind in listed if kind == "cell"}
     for name in names:
         opened = _opened(name, loaded[name], _DEEPEST)
         found |= {distinct(key, found, source): values for key, values in opened}
@@ -277,14 +278,16 @@ def read_mat73(path: Path, source: str) -> Arrays:
     try:
         with h5py.File(path, "r", locking=False) as file:
             members = _scan(file, "", source)
-            declared = sum(dataset.nbytes for dataset in members.values())
+            series = {k: dataset for k, dataset in members.items() if _usable(dataset, k, source)}
+            declared = sum(dataset.nbytes for dataset in series.values())
             if declared > min(_BUDGET, _MOST_PACKED * path.stat().st_size + (64 << 20)):
                 raise _too_large(declared, source, " of samples")
             found: dict[str, Array] = dict(_attributes(file, ""))
-            for name, dataset in members.items():
+            for name, dataset in series.items():
                 for key, values in _columns(name, dataset):
                     found[distinct(key, found, source)] = values
-            return found
+            closed = {k: _unopened(members[k]) for k in members if k not in series}
+            return found | {k: array for k, array in closed.items() if array is not None}
     except InputRejected:
         raise
     except (*_BAD_MAT, UnicodeError):
@@ -292,7 +295,7 @@ def read_mat73(path: Path, source: str) -> Arrays:
 
 
 def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:
-    """Return the data sets of numbers below a group by their path."""
+    """Return the data sets below a group by their path."""
     import h5py
 
     found: dict[str, Any] = {}
@@ -308,7 +311,7 @@ def _scan(group: Any, prefix: str, source: str) -> dict[str, Any]:
         kind = group.get(name, getclass=True)
         if kind is h5py.Group and prefix.count(".") < _DEEPEST:
             found |= _scan(group[name], f"{prefix}{name}.", source)
-        elif kind is h5py.Dataset and _usable(group[name], f"{prefix}{name}", source):
+        elif kind is h5py.Dataset:
             found[f"{prefix}{name}"] = group[name]
     return found
 
@@ -326,7 +329,19 @@ def _usable(dataset: Any, name: str, source: str) -> bool:
     numbers = dataset.dtype.kind in "fiub" or dataset.dtype.names is not None
     plain = numbers and dataset.shape is not None and "MATLAB_empty" not in dataset.attrs
     closed = dataset.attrs.get("MATLAB_class", b"double") in _CLOSED
-    return bool(plain and not closed and 1 <= len(dataset.shape) <= 2)
+    return bool(plain and not closed and dataset.shape and _long_sides(dataset) <= 2)
+
+
+def _long_sides(dataset: Any) -> int:
+    return sum(side > 1 for side in dataset.shape or ())
+
+
+def _unopened(dataset: Any) -> Array | None:
+    """Return an empty array in place of cells or pictures, to name them; None for anything else."""
+    if dataset.attrs.get("MATLAB_class") in (b"cell", "cell"):
+        return np.empty(0, object)
+    pictures = dataset.dtype.kind in "fiub" and _long_sides(dataset) > 2
+    return np.empty((0, *dataset.shape[1:])) if pictures else None
 
 
 def _attributes(group: Any, prefix: str) -> Iterator[tuple[str, Array]]:

@@ -98,7 +98,7 @@ def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False)
         key = (name.quantity, name.origin, name.motor, name.partial, name.filtered, name.role)
         found.setdefault(key, []).append((name, place))
     groups = []
-    for part in (part for members in found.values() for part in _split(members)):
+    for part in (part for members in found.values() for part in _split(members, len(joints))):
         if {"x", "y", "z"} <= {name.column.removeprefix(shared).lower() for name, _ in part}:
             part = [(replace(name, quantity="other"), place) for name, place in part]  # a pose
         groups.append(_ordered(part, joints, texts))
@@ -212,10 +212,11 @@ def by_texts(
     return list(columns), None if rising else "text"
 
 
-def _split(members: list[Member]) -> list[list[Member]]:
+def _split(members: list[Member], n: int) -> list[list[Member]]:
     """Split columns of one kind by their words: arm_q_1 … and leg_q_1 … are two groups.
 
-    Where a word comes once only, the words name the joints: wrist_1, wrist_2, elbow.
+    Where a word comes once only, the words name the joints: wrist_1, wrist_2, elbow; but a word
+    that comes once for each of `n` joints names a signal.
     """
     places = [place for _, place in members if place is not None]
     if places and len(set(places)) == len(places):
@@ -224,7 +225,11 @@ def _split(members: list[Member]) -> list[list[Member]]:
     for member in members:
         words = tuple("#" if word.isdecimal() else word for word in member[0].label)
         parts.setdefault(words, []).append(member)
-    return list(parts.values()) if all(len(part) > 1 for part in parts.values()) else [members]
+    if all(len(part) > 1 for part in parts.values()):
+        return list(parts.values())
+    whole = [part for part in parts.values() if len(part) == n > 1]
+    rest = [member for member in members if not any(member in part for part in whole)]
+    return [*whole, rest]
 
 
 def _ordered(members: list[Member], joints: Sequence[str], texts: Sequence[str]) -> Group:

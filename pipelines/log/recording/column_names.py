@@ -181,7 +181,7 @@ _UNIT_WORDS = {
     "%": "pct percent", "‰": "permille promille", "LSB": "lsb",
 }  # fmt: skip
 # Words and indices rather than units.
-_NOT_IN_NAMES = frozenset(["m", "d", "n", "k", "min", "mn", "kn", "turn", "100ns"])
+_NOT_IN_NAMES = frozenset(["m", "d", "n", "k", "min", "mn", "kn", "turn", "100ns", "arms"])
 _SUFFIX_UNITS = {
     word: unit
     for join in ("", "p")

@@ -308,7 +308,7 @@ class _Drafting:
         scale = stated[0] if len(stated) == 1 else None
         named = tuple(unit or (scale.value if scale else None) for unit in named)
         guess = found.torque_unit(tau, group, named[0])
-        self.current = guess.value in ("A", "mA") or (self.current and not guess.value)
+        self.current = guess.value in ("A", "mA", "Arms") or (self.current and not guess.value)
         first = next(filter(None, named), None)
         units = [unit_of_joint(unit, guess.value, first) for unit in named]
         if found.q is not None and found.q.shape == tau.shape:
@@ -343,7 +343,8 @@ class _Drafting:
             items = list(table.text.items())[:5]
             left = ", ".join(f"{clean(name, 40)} ({clean(text, 80)})" for name, text in items)
             further = [f"    # no columns of numbers: {left}"] if left else []
-            return [f"{line}   # no column looks like it", *further]
+            needed = ", and a log needs a torque" if signal == "tau" else ""
+            return [f"{line}   # no column looks like it{needed}", *further]
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
         lines = [line, f"    # {doubt}"] if doubt else [line]
         if all(group.origin == "commanded" for group in found):

@@ -29,7 +29,7 @@ _MOST_KEYS = 32  # joints, servos or environments in turn
 _SEPARATE = 0.5  # mean step from key to key over that from row to row: 1 for noise
 _ROUNDED = 1e-3  # of a clock's step: what rounding may take
 _WIDEST_MATRIX = 64  # more joints than any arm: what is wider is not "one column a joint"
-_NOT_REAL = {"c": "complex numbers", "O": "objects", "U": "text", "S": "text"}
+_NOT_REAL = {"c": "complex numbers", "O": "objects or cells", "U": "text", "S": "text"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +150,8 @@ def columns_of_arrays(arrays: Arrays, source: str) -> RawTable:
     Raises:
         InputRejected: S11 where arrays can be read both ways, S12 where none holds real numbers.
     """
+    # MATLAB's timeseries of a vector is (n, 1, samples).
+    arrays = {k: array.squeeze() if array.ndim > 2 else array for k, array in arrays.items()}
     problems = {name: _not_real(array) for name, array in arrays.items()}
     text = {name: problem for name, problem in problems.items() if problem}
     usable = {k: array for k, array in arrays.items() if k not in text and array.size > 1}
@@ -158,12 +160,14 @@ def columns_of_arrays(arrays: Arrays, source: str) -> RawTable:
     columns: dict[str, Array] = {}
     groups: dict[str, tuple[str, ...]] = {}
     units: dict[str, str] = {}
+    others: list[str] = []
     for name, array in usable.items():
         matrix = array[:, None] if array.ndim == 1 else array
         rows, wide = matrix.shape
         if samples not in matrix.shape or rows == wide:
             why = "square" if rows == wide else f"not of {samples} samples"
             text[name] = f"an array of shape {array.shape}, {why}"
+            others += [f"'{clean(name, 40)}'"] if samples not in matrix.shape and max(matrix.shape) >= FEWEST else []
             continue
         if (wide if rows == samples else rows) > _WIDEST_MATRIX:
             continue
@@ -178,6 +182,10 @@ def columns_of_arrays(arrays: Arrays, source: str) -> RawTable:
         units |= dict.fromkeys(names, unit) if unit else {}
         for j, key in enumerate(names):
             columns[key] = np.ascontiguousarray(matrix[:, j], dtype=np.float64)
+    if others:
+        message = f"left out, not of {samples} samples: {', '.join(others[:8])}"
+        remedy = "save another motion as a file of its own"
+        checks.append(Check.of("S11", "warn", message, where=source, remedy=remedy))
     if not columns:
         found = ", ".join(f"{name} ({what})" for name, what in text.items()) or "nothing"
         message = f"no array of real numbers; there is {found}"

@@ -35,6 +35,7 @@ FORMULA = re.compile(r"\s*(#(REF|DIV/0|N/A|NAME|VALUE|NUM|NULL)[!?]?|=.+|@.+)\s*
 WITH_UNIT = re.compile(r"([+-]?\d++\.?\d*+(?:[eE][+-]?\d+)?)\s*((?:[^\W\d_]|°)[^\d\s]{0,9})")
 _INFINITE = r"[+-]?(inf|Inf|INF|infinity|Infinity)"
 _NUMBER = re.compile(rf"[+-]?(\d++\.?\d*|\.\d++)([eEdD][+-]?\d+)?|{_INFINITE}")
+_QUOTED = re.compile(r"""(['"])(.*)\1""")
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?:,\d{3})+\.\d+")  # as spreadsheets show numbers, in quotes
 # Encodings of a file without a mark; the first where none fits better.
 _ENCODINGS = ("latin-1", "cp932", "gb18030", "cp949", "cp1250", "cp1251")
@@ -150,7 +151,8 @@ def cells_of(line: str, delimiter: str) -> list[str]:
             return [cell.replace(",", "") if _THOUSANDS.fullmatch(cell) else cell for cell in cells]
         except (csv.Error, StopIteration):
             pass
-    return [cell.strip().strip("'\"") for cell in line.split(delimiter)]
+    bare = (cell.strip() for cell in line.split(delimiter))
+    return [found[2] if (found := _QUOTED.fullmatch(cell)) else cell for cell in bare]
 
 
 def is_number(cell: str, decimal: str = ".") -> bool:
@@ -447,12 +449,15 @@ def without_repeats(columns: dict[str, Array], header: Header, source: str) -> d
     Raises:
         InputRejected: S03, two columns of one name hold different numbers.
     """
+    places: dict[str, list[int]] = {}
     for name, first in header.again.items():
         both = [columns[key] for key in (name, first) if key in columns]
-        if len(both) == 2 and np.array_equal(both[0], both[1], equal_nan=True):
-            continue
-        at = header.names.index(first) + 1, header.names.index(name) + 1
-        message = f"columns {at[0]} and {at[1]} are both named '{first[:80]}'"
-        where, remedy = f"{source}, line {header.line}", "rename one of them in the file"
+        if len(both) < 2 or not np.array_equal(both[0], both[1], equal_nan=True):
+            at = places.setdefault(first, [header.names.index(first) + 1])
+            at.append(header.names.index(name) + 1)
+    if places:
+        pairs = [(", ".join(map(str, at)), name[:80]) for name, at in places.items()][:8]
+        message = "; ".join(f"columns {at} are all named '{name}'" for at, name in pairs)
+        where, remedy = f"{source}, line {header.line}", "give each its own name in the file"
         raise InputRejected("S03", message, where=where, remedy=remedy)
     return {name: values for name, values in columns.items() if name not in header.again}

@@ -513,6 +513,19 @@ def test_settings_above_a_table_with_a_line_of_units_are_skipped(tmp_path: Path)
     assert 'tau = { column = "CH3", unit = "N m" }' in draft
 
 
+def test_words_that_come_once_a_joint_are_a_signal_each(tmp_path: Path) -> None:
+    """pyfri: a word that comes once, as dt, does not make one group of all that no word explains."""
+    draft = _arm(tmp_path, lambda run: _block("mp#", run.q) | _block("mt#", run.tau) | {"dt": np.full(len(run.t), 0.005)})
+    assert 'candidate: columns = "mp{j}"' in draft
+    assert 'candidate: columns = "mt{j}"' in draft
+
+
+def test_a_current_in_a_rms_keeps_its_unit_and_asks_for_the_constant(tmp_path: Path) -> None:
+    draft = _arm(tmp_path, lambda run: _block("pos_# [rad]", run.q) | _block("I_# [Arms]", run.current))
+    assert 'columns = "I_{j}", unit = "Arms"' in draft
+    assert 'torque_constant = "FILL IN"' in draft
+
+
 def test_a_velocity_that_is_not_imported_is_named(tmp_path: Path) -> None:
     moved = simulate(Arm("pendulum", ("joint",), "y", (30,)), seed=3)
     columns = {"t": moved.t, "q": moved.q[:, 0], "dq": moved.dq[::-1, 0], "tau": moved.tau[:, 0]}

@@ -130,7 +130,28 @@ def test_x07_an_array_of_objects_costs_itself_alone(tmp_path: Path) -> None:
     np.savez(tmp_path / "run.npz", contacts=np.array({}), **signals())
     table = read_table(tmp_path / "run.npz")
     assert np.array_equal(table.columns["q_3"], good()["q_3"])
-    assert table.text == {"contacts": "objects"}
+    assert table.text == {"contacts": "objects or cells"}
+
+
+@pytest.mark.parametrize("version", ["5", "7.3"])
+def test_a_timeseries_of_vectors_is_a_matrix_and_cells_and_pictures_are_named(tmp_path: Path, version: str) -> None:
+    path, q, named = tmp_path / "run.mat", np.arange(300.0).reshape(100, 3), {"jPos": "objects or cells"}
+    stacked = {"q": q.T[:, None, :], "t": np.arange(100.0)}
+    if version == "5":
+        mat5(path, stacked | {"jPos": q.astype(object)})
+    else:
+        named |= {"camera": "an array of 3 dimensions"}
+        with h5py.File(path, "w") as file:
+            file.update({name: values.T for name, values in stacked.items()} | {"camera": np.zeros((100, 4, 5), np.uint8)})
+            file.create_dataset("jPos", data=[[0]]).attrs["MATLAB_class"] = b"cell"
+    table = read_table(path)
+    assert np.array_equal(np.column_stack([table.columns[f"q_{j}"] for j in (1, 2, 3)]), q)
+    assert table.text == named
+
+
+def test_s11_another_motion_in_the_same_file_is_named() -> None:
+    table = columns_of_arrays({"q": np.zeros((400, 2)), "tau": np.ones((400, 2)), "q_test": np.zeros((90, 2))}, "run.mat")
+    assert [check.message for check in table.checks] == ["left out, not of 400 samples: 'q_test'"]
 
 
 def test_x12_an_npz_archive_is_read_and_one_of_other_files_is_not(tmp_path: Path) -> None:

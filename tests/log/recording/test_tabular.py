@@ -27,6 +27,12 @@ def equal(table: RawTable, rows: slice = slice(None)) -> bool:
     return all(np.array_equal(table.columns[name], values[rows]) for name, values in good().items())
 
 
+def test_quotes_are_taken_off_in_pairs() -> None:
+    """npTDMS names a column /'Motion'/'q'."""
+    table = parse("'t';/'Motion'/'q'\n" + "\n".join(f"{k};'{k / 7:.5f}'" for k in range(50)))
+    assert list(table.columns) == ["t", "/'Motion'/'q'"]
+
+
 def test_a_table_of_one_row_a_joint_becomes_one_of_one_row_a_sample() -> None:
     columns = good()
     rows = [(t, name, columns[f"q_{j}"][k]) for k, t in enumerate(columns["t"]) for j, name in enumerate("cab", start=1)]
@@ -205,7 +211,7 @@ def test_cells_that_julia_left_missing_are_no_numbers() -> None:
 
 
 def test_s03_two_columns_of_one_name_are_both_named() -> None:
-    with pytest.raises(InputRejected, match=r"RRID-S03.*line 1.*columns 2 and 3 are both named 'q_1'"):
+    with pytest.raises(InputRejected, match=r"RRID-S03.*line 1.*columns 2, 3 are all named 'q_1'"):
         parse(text(good()).replace("q_2", "q_1", 1))
 
 
