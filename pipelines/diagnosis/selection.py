@@ -132,9 +132,9 @@ def select(
     if before is not None:
         causes, rounds = list(before.causes), list(before.rounds)
         state = later.start(before.model)
-    explained, cut = max(start.cost - state.cost, 0.0), tuple[Key, ...]()
+    cut = tuple[Key, ...]()
     while True:
-        step = _Step(later.composed(state.model), state, baseline, causes, explained)
+        step = _Step(later.composed(state.model), start, state, baseline, causes)
         if len(causes) >= most:
             cut = step.relevant_keys
             break
@@ -142,9 +142,7 @@ def select(
         rounds.append(found)
         if found.cause is None or after is None:
             break
-        causes = [*causes, found.cause]
-        explained += max(state.cost - after.cost, 0.0)
-        state = after
+        causes, state = [*causes, found.cause], after
     causes, state = _backward(later, causes, state)
     return Selection(tuple(causes), start, state, tuple(rounds), cut)
 
@@ -154,10 +152,10 @@ class _Step:
     """One round of the forward selection: candidates for what a state leaves."""
 
     later: Later  # with the columns of drives and records beside the effects of the state
+    start: State  # without causes
     state: State
     baseline: Baseline
-    causes: Sequence[Cause]  # selected before
-    explained: float  # cost that these save
+    causes: Sequence[Cause]  # selected before, which the state has
 
     def round(self, responses: Sequence[Acting]) -> tuple[Round, State | None]:
         """Return the cause that explains most of the residual, and the state fitted with it.
@@ -222,9 +220,16 @@ class _Step:
 
     @cached_property
     def _inexact(self) -> Array:
-        """Gain (joints,) that the causes found account for, because no law is exact."""
-        share = self.explained * self.later.acting(self.state) + self.later.standing
-        return self.later.config.relevance * share
+        """Gain (joints,) that the causes found account for, because no law is exact.
+
+        It is a share of what they save at each joint; what they save of the prior's cost belongs to
+        the joints where they act.
+        """
+        start, state = self.start, self.state
+        prior = max(start.cost - start.rss - state.cost + state.rss, 0.0)
+        saved = np.maximum(_power(start.residual) - _power(state.residual), 0.0)
+        saved = saved + prior * self.later.acting(state) + self.later.standing
+        return np.asarray(self.later.config.relevance * saved)
 
     def _torque(self, one: Screened) -> tuple[Array, ...]:
         """Return the torque of a screened candidate, joint by joint, in units of the noise."""
@@ -233,13 +238,14 @@ class _Step:
     def _relevant(self, one: Candidate) -> bool:
         """Return whether a cause, refitted, saves more than the laws found before it are inexact.
 
-        A cause whose torque is within that of healthy machines is rejected. A joint where it saves
-        less counts for nothing, and one that it makes worse counts against it. What the standing
-        numbers have taken of it is a part of what it saves.
+        What it saves beyond that has to be above the threshold of chance. A cause whose torque is
+        within that of healthy machines is rejected. A joint where it saves less counts for nothing,
+        and one that it makes worse counts against it. What the standing numbers have taken of it is
+        a part of what it saves.
         """
         later, state, new = self.later, self.state, one.state
         if one.event:
-            return one.gain >= later.config.relevance * self.explained
+            return one.gain >= later.config.relevance * (self.start.cost - state.cost)
         if one.key not in self.significant:  # frequency responses name it
             return True
         both = [
@@ -249,14 +255,13 @@ class _Step:
             return False
         group = self.significant[one.key].group
         shares = later.shares[later.dictionary.groups.index(group)]
-        each = zip(state.residual, new.residual, strict=True)
-        saved = np.array([a @ a - b @ b for a, b in each])
+        saved = _power(state.residual) - _power(new.residual)
         more = later.taken(state, [group])[0]
         if one.key[1] is not None:  # of the whole arm base parameters are freed: that saves nothing
             more += state.cost - state.rss - new.cost + new.rss
         saved = saved + more * shares
         counted = np.where(saved > 0.0, np.maximum(saved - self._inexact, 0.0), saved)
-        return float(counted.sum()) > 0.0
+        return float(counted.sum()) > self._threshold(self.significant[one.key])
 
     def _promising(self) -> list[Screened]:
         """Return the significant causes that are the most promising ones, the best first.
@@ -467,6 +472,11 @@ def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause
         else:
             place += 1
     return causes, end
+
+
+def _power(residual: Sequence[Array]) -> Array:
+    """(joints,) sum of squares."""
+    return np.array([float(r @ r) for r in residual])
 
 
 def _scores(later: Later, state: State, numbers: int = 0) -> Array:
