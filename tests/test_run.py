@@ -14,6 +14,7 @@ from pipelines import estimate_bps, fit_friction, run, validate_writing
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
 from pipelines.log.sessions import apart
+from pipelines.report.boundary_card import CARD
 from pipelines.report.run_ledger import ledger_lines
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 from tests.cli.commands import rrrid
@@ -54,6 +55,18 @@ def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result
     assert "The model holds on the held-out log" in str(table.rows[4][1])  # in order: the headline has what is not
     assert table.tones[4] == "good"
     assert stages[4]["result"]["model"].startswith("estimate-bps")
+
+
+def test_what_the_logged_torque_is_comes_first(whole: Outcome[run.Result]) -> None:
+    """Of the run, of `inspect` and of `estimate-bps`: the card is the first section, and `boundary` a field of the result."""
+    stored = json.loads((whole.folder / "result.json").read_text())
+    assert whole.report.sections[0].title == CARD
+    assert stored["boundary"]["sign"] == "signed"
+    stages = {stage["name"]: stage["result"] for stage in stored["stages"]}
+    for step in whole.result.stages:
+        if step.name in ("inspect", "estimate-bps"):
+            assert step.report.sections[0].title == CARD
+            assert stages[step.name]["boundary"]["gravity"]["present"]
 
 
 def test_the_ledger_begins_with_no_model(whole: Outcome[run.Result]) -> None:
