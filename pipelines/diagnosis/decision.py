@@ -41,7 +41,7 @@ def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
     """Return the verdict by significance and goodness of fit.
 
     Causes lose their names where they explain less than half of what is more than noise at the
-    joints on which they act. What is left at others is told beside them.
+    joints on which they act. The residual at other joints is reported with them.
     """
     causes, end, config = selection.causes, selection.end, later.config
     left = end.mean_squares * later.dataset.noise_ratio
@@ -97,7 +97,7 @@ def _explained(later: Later, selection: Selection, beyond: Array, strained: bool
 def _rest(
     later: Later, last: Round, missing: Array, shapes: Sequence[str], left: Array, bound: float
 ) -> str:
-    """Return what the model leaves that is more than noise; "" where it is none."""
+    """Return how the residual exceeds the noise, in words; "" where it does not."""
     more = f"; it follows {last.follows}" if last.follows else ""
     if missing.any():
         return (
@@ -116,7 +116,7 @@ def _rest(
 
 def _wanders(slow: Array) -> str:
     joint = int(slow.argmax()) + 1
-    return f"{slow.max():.1%} of the torque of joint {joint} wanders, whatever the motion is"
+    return f"{slow.max():.1%} of the torque of joint {joint} wanders independently of the motion"
 
 
 def _too_large(left: Array, bound: float) -> str:
@@ -176,8 +176,8 @@ def _confused(later: Later, end: State) -> dict[int, str]:
     """Return {index of the effect: reason} of effects that wandering torque may look like.
 
     In closed loop the drive answers such a torque a moment later, and so do the motion and its
-    record (Ljung 1999, 13.4): only a load is told from it that comes again with the motion, or is
-    larger, at its moment, than chance makes it.
+    record (Ljung 1999, 13.4): only a load that recurs with the motion, or one that is
+    larger at its moment than chance allows, is distinguished from it.
     """
     slow, config = _wandering(later), later.config
     if slow.max() <= config.misfit:

@@ -35,7 +35,7 @@ _RESAMPLES = 400  # numerics: of the bootstrap
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What predicts each block of rows from all others, by the numbers of some columns."""
+    """Predictors of each block of rows from all others, by the numbers of some columns."""
 
     rows: tuple[tuple[Indices, ...], ...]  # of each block, of each joint
     inverse: tuple[npt.NDArray[np.float32], ...]  # of each block, (I - J_bᵀ P⁻¹ J_b)⁻¹

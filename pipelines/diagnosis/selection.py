@@ -72,7 +72,7 @@ class Round:
     after: Fit | None = None
     stopped: str = ""  # why a significant cause was not selected
     follows: str = ""  # what the rest follows
-    moment: str = ""  # what stands out at one moment, and no event explains
+    moment: str = ""  # an anomaly at one moment that no event explains
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +125,7 @@ def select(
 
     Args:
         responses: causes that frequency responses name, with their numbers; candidates like others.
-        before: what was selected before the noise was known beside it.
+        before: the selection of an earlier search, with less knowledge of the noise.
     """
     start = state = later.start()
     causes, rounds, most = list[Cause](), list[Round](), later.config.causes
@@ -208,8 +208,8 @@ class _Step:
     def _matters(self, one: Screened) -> bool:
         """Return whether a candidate gains more than laws are inexact, and healthy machines have.
 
-        At the joints of the causes found so far, and of what stands since the reference, what
-        remains of these is larger than the noise.
+        At the joints of the causes found so far, and of standing causes, the errors of their laws
+        are larger than the noise.
         """
         place = self.later.dictionary.groups.index(one.group)
         inexact = float(self.later.shares[place] @ self._inexact)
@@ -315,8 +315,8 @@ class _Step:
     def _apart(self, other: State) -> list[Key]:
         """Return the causes that explain something else than a shape without a name does.
 
-        Beside it they are significant, gain more than a share of what they gain alone, and more
-        than the shape leaves because no law is exact.
+        Fitted together with it they are significant, gain more than a share of what they gain
+        alone, and more than the shape leaves because no law is exact.
         """
         config, gains = self.later.config, {s.group: s.gain for s in self.later.screened(other)}
         inexact = config.relevance * (self.state.cost - other.cost)
@@ -457,7 +457,7 @@ def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
 def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause], State]:
     """Take out every cause without which the rest predicts as well.
 
-    What happened at one moment is not told by predictions of other times: it stood out of these.
+    An event is kept: predictions of other times do not depend on it.
     """
     place = 0
     while len(causes) > 1 and place < len(causes):
