@@ -135,7 +135,7 @@ def _missing(later: Later, state: State) -> Array:
     them the noise is what differs between rows of one state. Where both parts of a pair are noise,
     common over differing has an F distribution; 0 below its bound and below `config.misfit`.
     """
-    from scipy.stats import f as f_law
+    from scipy.special import fdtri
 
     rows, config = later.rows, later.config
     if later.dataset.reference is not None:
@@ -145,7 +145,7 @@ def _missing(later: Later, state: State) -> Array:
         left[rows.joint == j] = own
     pairs = Repeated.of(rows.data)
     common, differing = pairs.parts(left)
-    bound = f_law.isf(config.alpha / rows.n_joints, pairs.count, pairs.count)
+    bound = fdtri(pairs.count, pairs.count, 1.0 - config.alpha / rows.n_joints)
     torque = np.array([float(np.mean(y**2)) for y in rows.y])
     share = np.sqrt(np.maximum(common - differing, 0.0) / torque)
     return np.where((common > bound * differing) & (share > config.misfit), share, 0.0)
