@@ -26,10 +26,9 @@ from pipelines.log.doctor.summary import LogSummary, summary_of
 from pipelines.log.files import Opened
 from pipelines.log.robot import RobotDescription, format_robot
 from pipelines.model.plausibility import plausibility_findings
-from pipelines.report.boundary_card import boundary_card
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
-from pipelines.report.sections import checks_table, level_tone
+from pipelines.report.sections import boundary_card, checks_table, level_tone
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "report"]

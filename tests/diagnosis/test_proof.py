@@ -17,7 +17,7 @@ from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, prepare
-from pipelines.report.diagnosis_proof import proof_figures
+from pipelines.report.diagnosis_finding import proof_figures
 from tests.diagnosis.rotor import turned
 from tests.report.test_diagnosis_words import found
 
