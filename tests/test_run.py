@@ -14,7 +14,7 @@ from pipelines import estimate_bps, fit_friction, run, validate_writing
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
 from pipelines.log.sessions import apart
-from pipelines.report.run_stages import stage_lines
+from pipelines.report.run_report import stage_lines
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 from tests.cli.commands import rrrid
 from tests.diagnose.sessions import written

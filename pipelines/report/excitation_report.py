@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipelines.model.excitation.apart import Apart
 from pipelines.model.excitation.doubts import beyond_words
 from pipelines.model.excitation.result import DrawnPlan, Result
-from pipelines.report.excitation_figures import (
-    limited_figure,
-    relative_std_figure,
-    singular_value_figure,
-    spectrum_figure,
+from pipelines.report import style
+from pipelines.report.figures import (
+    Array,
+    envelope,
+    joint_signal_figure,
+    one_figure,
+    rows_figure,
 )
-from pipelines.report.figures import joint_signal_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sentences import paragraphs, sentence
-from pipelines.report.style import format_number, format_unit
+from pipelines.report.style import format_number, format_unit, printable
 from pipelines.report.words import unit_of, without_keys
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _WARNING = "Self-collision is not checked, nor is collision with anything around the robot."
 _DRAWN_PLANS = 6
@@ -29,6 +35,8 @@ _DEAR = 0.02  # share of the cost that is worth naming
 _RIVALS = 0.8  # similarity from which two causes explain the same
 _SHOWN = 5e-5  # of the size of a motion: a smaller change is not shown
 _MUCH = 0.01  # of the size of a motion: a larger change belongs into the verdict
+_WIDE = 30.0  # ratio from which a scale must be logarithmic
+_WORTH = 0.6  # of a limit: where a signal stays farther away, drawing it would flatten the signal
 
 _say, _paragraphs = partial(sentence, "excitation"), partial(paragraphs, "excitation")
 
@@ -206,11 +214,11 @@ def _motion(result: Result) -> Section | None:
         label = f"{quantity} [{unit_of(result.limits, quantity)}]"
         ends = _ends(result, quantity)
         figures.append(
-            limited_figure(f"{quantity}s", caption, c.t, values, ends, label, result.joints)
+            _limited_figure(f"{quantity}s", caption, c.t, values, ends, label, result.joints)
         )
     shown = c.amplitude.max(axis=1) > 1e-12
     caption = "Which frequencies move each joint: amplitude of its speed."
-    figures.append(spectrum_figure(caption, c.hertz[shown], c.amplitude[shown], result.joints))
+    figures.append(_spectrum_figure(caption, c.hertz[shown], c.amplitude[shown], result.joints))
     return Section("The motion", figures=tuple(figures))
 
 
@@ -248,10 +256,10 @@ def _shows(result: Result) -> Section:
     rows = tuple(
         (p.name, p.value, p.std, format_unit(p.unit), relative[p.name]) for p in result.parameters
     )
-    figures = [singular_value_figure(result.singular_values)]
+    figures = [_singular_value_figure(result.singular_values)]
     known = {name: x for name, x in relative.items() if x is not None}
     if known:
-        figures.append(relative_std_figure(list(known), list(known.values())))
+        figures.append(_relative_std_figure(list(known), list(known.values())))
     columns = ("parameter", "believed value", "predicted std", "unit", "relative [%]")
     text = _paragraphs("shows", result.noise, result.sample_time)
     return Section("What it will tell", text, (Table(columns, rows),), tuple(figures))
@@ -355,3 +363,76 @@ def _plan_figure(plan: DrawnPlan, result: Result) -> Figure:
         quantity="position",
         names=[name for name, moves in zip(result.joints, own, strict=True) if moves],
     )
+
+
+def _limited_figure(
+    name: str,
+    caption: str,
+    t: Array,
+    values: Array,
+    ends: tuple[Sequence[float], Sequence[float]],
+    label: str,
+    joints: Sequence[str],
+) -> Figure:
+    """A signal over one period, one row a joint, with the limits (low, high) it comes near to."""
+
+    def draw_row(axis: Axes, j: int) -> None:
+        axis.plot(*envelope(t, values[:, j]), color=style.BLUE, linewidth=1.0)
+        for end in (ends[0][j], ends[1][j]):
+            if np.isfinite(end) and np.abs(values[:, j]).max() > _WORTH * abs(end):
+                axis.axhline(end, color=style.VERMILLION, linewidth=0.9, linestyle=(0, (5, 2)))
+
+    return rows_figure(name, caption, joints, draw_row, label)
+
+
+def _spectrum_figure(caption: str, hertz: Array, amplitude: Array, joints: Sequence[str]) -> Figure:
+    """Amplitude of the speed at every harmonic, one row a joint."""
+
+    def draw_row(axis: Axes, j: int) -> None:
+        axis.vlines(hertz, 0.0, amplitude[:, j], color=style.BLUE, linewidth=1.2)
+        axis.set_ylim(bottom=0.0)
+
+    label, x = "amplitude of the speed [rad/s]", "frequency [Hz]"
+    return rows_figure("spectrum", caption, joints, draw_row, label, x=x)
+
+
+def _singular_value_figure(values: Sequence[float]) -> Figure:
+    """Singular values of Φ, the largest first; which parameters they belong to the table says."""
+
+    def draw(axis: Axes) -> None:
+        place = np.arange(1, len(values) + 1)
+        wide = max(values) > _WIDE * min(values)
+        low = 0.5 * min(values) if wide else 0.0
+        axis.vlines(place, low, values, color=style.GREY, linewidth=1.0)
+        axis.plot(place, values, "o", color=style.BLUE, markersize=4.5)
+        if wide:
+            axis.set_yscale("log")
+            style.log_ticks(axis.yaxis)
+        axis.set_ylim(low, (2.0 if wide else 1.1) * max(values))
+        axis.set_xlabel("direction of the parameters")
+        axis.set_ylabel("singular value of Φ / √n")
+        axis.locator_params(axis="x", integer=True)
+
+    caption = "Singular values of Φ: the smallest belongs to the direction known worst."
+    return one_figure("singular-values", caption, draw, 2.8)
+
+
+def _relative_std_figure(names: Sequence[str], percent: Sequence[float]) -> Figure:
+    """Predicted standard deviation of every parameter over its value, the best known on top."""
+    order = np.argsort(percent)[::-1]
+    values = np.array(percent)[order]
+    place = np.arange(len(values))
+
+    def draw(axis: Axes) -> None:
+        axis.hlines(place, 0.3 * values.min(), values, color=style.GREY, linewidth=1.0)
+        axis.plot(values, place, "o", color=style.BLUE, markersize=4.0)
+        axis.set_xscale("log")
+        axis.set_xlim(0.5 * values.min(), 2.0 * values.max())
+        style.log_ticks(axis.xaxis)
+        axis.set_yticks(place, [printable(names[k], 24) for k in order])
+        axis.set_ylim(-0.7, len(values) - 0.3)
+        axis.grid(axis="y", visible=False)
+        axis.set_xlabel("standard deviation over value [%]")
+
+    caption = "Predicted standard deviation of every parameter, relative to its value."
+    return one_figure("relative-std", caption, draw, 0.7 + 0.19 * len(names))

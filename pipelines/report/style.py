@@ -170,40 +170,30 @@ def log_ticks(axis: Axis) -> None:
     """
     from matplotlib.ticker import FuncFormatter
 
-    def seen() -> list[int]:
+    def in_view(multiple: int = 1) -> int:
+        """How many of `multiple` times a power of ten are in view."""
         low, high = sorted(axis.get_view_interval())
-        return [
-            k
-            for k in range(1, 10)
-            for power in _powers(low, high)
-            if low <= k * 10.0**power <= high
-        ]
+        if low <= 0.0:
+            return 0
+        first = math.ceil(math.log10(low / multiple) - 1e-9)
+        return math.floor(math.log10(high / multiple) + 1e-9) - first + 1
 
     def label(value: float, _position: int | None = None) -> str:
         if 1.0 <= value < 1e4:
             return format_number(int(value))
-        return (
-            f"10{_raised(round(math.log10(value)))}"
-            if seen().count(1) >= 2
-            else format_number(value, 1)
-        )
+        if in_view() < 2:
+            return format_number(value, 1)
+        return f"10{_raised(round(math.log10(value)))}"
 
     def between(value: float, _position: int | None = None) -> str:
-        if (there := seen()).count(1) >= 2:
+        if in_view() >= 2:
             return ""
-        wanted = (2, 5) if sum(there.count(k) for k in (1, 2, 5)) >= 2 else range(2, 10)
+        wanted = (2, 5) if sum(map(in_view, (1, 2, 5))) >= 2 else range(2, 10)
         multiple = round(value / 10.0 ** math.floor(math.log10(value)))
         return format_number(float(f"{value:.1g}"), 1) if multiple in wanted else ""
 
     axis.set_major_formatter(FuncFormatter(label))
     axis.set_minor_formatter(FuncFormatter(between))
-
-
-def _powers(low: float, high: float) -> range:
-    """Of ten, that a multiple between the two may have."""
-    if not 0.0 < low <= high:
-        return range(0)
-    return range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
 
 
 @contextmanager

@@ -15,7 +15,7 @@ from pipelines import diagnose, extend, run
 from pipelines.diagnosis.result import Rejected
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.log.model_file import read_model
-from pipelines.report.run_stages import stage_lines
+from pipelines.report.run_report import stage_lines
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written
 

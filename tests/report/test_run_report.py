@@ -16,8 +16,7 @@ from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
-from pipelines.report.run_report import run_report
-from pipelines.report.run_stages import Result, Step, stage_lines, stages_section
+from pipelines.report.run_report import Result, Step, run_report, stage_lines, stages_section
 
 
 def of_logs(count: int, figures: int) -> Report:

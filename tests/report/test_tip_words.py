@@ -11,7 +11,7 @@ import pytest
 from pipelines.diagnosis.result import BeforeAfter, Finding, TipError
 from pipelines.model.simulation.comparison import SimulatedSpan
 from pipelines.report.diagnosis_finding import all_together, gain_table, tip_change, tip_worth
-from pipelines.report.run_stages import Line, stages_section
+from pipelines.report.run_report import Line, stages_section
 from tests.report.test_diagnosis_finding import finding
 
 BOTH = (SimulatedSpan("writing-1", 5.0), SimulatedSpan("writing-2", 5.0))
