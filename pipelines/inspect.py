@@ -210,7 +210,7 @@ def _key_figures(result: Result) -> Table:
     for check in result.checks:
         count[check.level] += 1
     rows = (("logs", len(result.logs) + len(result.rejected)), ("checks made", len(result.checks)), ("passed", count["ok"]),
-            ("look at it", count["warn"]), ("mended", count["repair"]), ("not usable", count["reject"]),
+            ("warnings", count["warn"]), ("repaired", count["repair"]), ("not usable", count["reject"]),
             ("not tested", len(result.not_tested)))
     return Table(("what", "number"), rows)
 

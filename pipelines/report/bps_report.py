@@ -161,7 +161,7 @@ def _key_figures(result: Result) -> Table:
         ("condition number of the fit, unit columns", result.condition_number_fit),
         ("low-pass over torque and columns [Hz]", low_pass),
         ("friction", friction),
-        ("links that could exist", consistent),
+        ("physically consistent", consistent),
     ]
     return Table(("what", "figure"), tuple(rows))
 

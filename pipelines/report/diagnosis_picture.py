@@ -44,7 +44,7 @@ def picture_sections(
     for k, one in enumerate(found.evidence):
         figures = residual_figures(one, f"-{k + 1}" if k else "", units)
         tables = (_above_floor(found, one, rated, units), _signals(one))
-        title = f"What is wrong, before any name: {one.log}"
+        title = f"Residual analysis: {one.log}"
         sections.append(Section(title, (floor,), tables, tuple(figures)))
     return sections
 

@@ -341,7 +341,7 @@ def _limits(result: Diagnosis) -> list[Section]:
             for one in result.detection_limits
         )
         table = Table(("cause", "joint", "parameter", "smallest", "unit", "at"), rows)
-        sections.append(Section("What would have been found", _paragraphs("limits"), (table,)))
+        sections.append(Section("Detection limits", _paragraphs("limits"), (table,)))
     if result.not_identifiable:
         hidden = tuple(
             (title_of(one.cause), one.joint, without_keys(one.reason), without_keys(one.record))
@@ -354,7 +354,7 @@ def _limits(result: Diagnosis) -> list[Section]:
         rest = tuple((title_of(o.cause), without_keys(o.reason)) for o in result.without_limit)
         table = Table(("cause", "what is known of it"), rest)
         text = ("Of these no smallest size that would have been found is known.",)
-        sections.append(Section("Without a size to tell", text, (table,)))
+        sections.append(Section("No detection limit available", text, (table,)))
     return sections
 
 

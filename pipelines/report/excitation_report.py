@@ -21,6 +21,7 @@ from pipelines.report.figures import (
     rows_figure,
 )
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
+from pipelines.report.sections import NO_COLLISION_CHECK
 from pipelines.report.sentences import paragraphs, sentence
 from pipelines.report.style import format_number, format_unit, printable
 from pipelines.report.words import unit_of, without_keys
@@ -28,7 +29,6 @@ from pipelines.report.words import unit_of, without_keys
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_WARNING = "Self-collision is not checked, nor is collision with anything around the robot."
 _DRAWN_PLANS = 6
 _NEAR_BOUND = 1.5  # times: what is farther from the bound is no percentage of it
 _DEAR = 0.02  # share of the cost that is worth naming
@@ -152,7 +152,7 @@ def _key_figures(result: Result) -> Table:
 def _safety(result: Result) -> Section:
     text = _paragraphs("safety", result, _trouble(result))
     tables = (_rehearsal_table(result),) if result.rehearsal is not None else ()
-    return Section("Before the robot moves", text, tables, warning=_WARNING)
+    return Section("Before the robot moves", text, tables, warning=NO_COLLISION_CHECK)
 
 
 def _rehearsal_table(result: Result) -> Table:
@@ -329,7 +329,7 @@ def _plans_safety(result: Result) -> Section:
     """Of each plan the joint that is nearest to trouble in its rehearsal."""
     text = _paragraphs("plans_safety", result)
     if not result.rehearsals:
-        return Section("Before the robot moves", text, warning=_WARNING)
+        return Section("Before the robot moves", text, warning=NO_COLLISION_CHECK)
     rows = []
     for name, found in result.rehearsals:
         full = max(x / y for x, y in zip(found.torque_peak, found.torque_limit, strict=True))
@@ -349,7 +349,7 @@ def _plans_safety(result: Result) -> Section:
         "saturated [%]",
     )
     table = Table(columns, tuple(rows))
-    return Section("Before the robot moves", text, (table,), warning=_WARNING)
+    return Section("Before the robot moves", text, (table,), warning=NO_COLLISION_CHECK)
 
 
 def _plan_figure(plan: DrawnPlan, result: Result) -> Figure:

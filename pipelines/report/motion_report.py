@@ -32,6 +32,7 @@ from pipelines.report.figures import (
     rows_figure,
 )
 from pipelines.report.report import Figure, Report, Section, Table, Tone, columns_table
+from pipelines.report.sections import further_logs
 from pipelines.report.sentences import paragraphs, sentence
 from pipelines.report.style import format_number
 from pipelines.report.words import joined
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure as Drawing
 
 _CHANCE = 6.0  # standard deviations: noise is further off in one sample of 5e8
-_NAMED = 40  # names of further logs
 _STYLES: tuple[Any, ...] = ("-", DASHED, (0, (1.5, 1.2)))  # joints that lie on each other
 
 _say, _paragraphs = partial(sentence, "motion"), partial(paragraphs, "motion")
@@ -59,9 +59,7 @@ def motion_report(logs: Sequence[LogResult]) -> Report:
     for k, log in enumerate(logs):
         if log.series is not None:
             sections.append(_log_section(log, log.series, k == 0))
-    if more := [log.name for log in logs if log.series is None]:
-        names = f"Their figures are in result.json alone: {', '.join(more[:_NAMED])}."
-        sections.append(Section("Further logs", (names,)))
+    sections += further_logs(log.name for log in logs if log.series is None)
     return Report("Reconstructed motion", verdict, tone, _key_figures(logs), tuple(sections))
 
 

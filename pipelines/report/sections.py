@@ -11,6 +11,9 @@ from pipelines.log.codes import title_of
 from pipelines.report.report import Section, Table, Tone
 from pipelines.report.sentences import as_sentence, paragraphs, sentence
 
+NO_COLLISION_CHECK = (
+    "Self-collision is not checked, nor is collision with anything around the robot."
+)
 CARD = "What the logged torque is"
 
 _TONES: dict[Level, Tone] = {
@@ -21,11 +24,12 @@ _TONES: dict[Level, Tone] = {
 }
 _RESULTS: dict[Level, str] = {
     "ok": "passed",
-    "warn": "look at it",
-    "repair": "mended",
+    "warn": "warning",
+    "repair": "repaired",
     "reject": "not usable",
 }
 _ORDER: tuple[Level, ...] = ("reject", "repair", "warn", "ok")
+_LISTED = 40  # logs
 _UNKNOWN = "not identifiable"
 
 Row = tuple[str, str, str, Tone]  # quantity, estimate, meaning, tone
@@ -60,6 +64,13 @@ def data_quality(checks: Iterable[Check]) -> tuple[Section, ...]:
     """The section of the checks of the logs, where there are any."""
     found = tuple(checks)
     return (Section("Data quality", tables=(checks_table(found),)),) if found else ()
+
+
+def further_logs(names: Iterable[str]) -> tuple[Section, ...]:
+    """The section of the logs that have no figures, where there are any."""
+    listed = ", ".join(list(names)[:_LISTED])
+    text = f"Their figures are in result.json alone: {listed}."
+    return (Section("Further logs", (text,)),) if listed else ()
 
 
 def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:

@@ -11,6 +11,7 @@ template chooses words and formats numbers.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -49,6 +50,7 @@ def template(name: str) -> jinja2.Template:
     )
     environment.filters |= {
         "num": format_number,
+        "nums": format_numbers,
         "percent": _percent,
         "std": _with_its_std,
         "unit": format_unit,
@@ -87,6 +89,11 @@ def as_sentence(text: str) -> str:
     """`text` as a sentence: it begins large and ends in a full stop; nothing of nothing."""
     text = capital(text.strip())
     return text if text.endswith((".", "!", "?")) or not text else f"{text}."
+
+
+def format_numbers(values: Iterable[float], digits: int = 2) -> str:
+    """ "0.1, 0.2, 0.3", joint by joint."""
+    return ", ".join(format_number(float(x), digits) for x in values)
 
 
 def _percent(share: float, digits: int = 2) -> str:

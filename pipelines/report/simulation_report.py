@@ -19,13 +19,12 @@ from pipelines.report.figures import (
     one_figure,
 )
 from pipelines.report.report import Figure, Report, Section, Table
+from pipelines.report.sections import further_logs
 from pipelines.report.sentences import paragraphs, sentence
 from pipelines.report.style import format_number, format_unit, three_digits
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-_NAMED = 40  # further logs
 
 _say, _paragraphs = partial(sentence, "simulation"), partial(paragraphs, "simulation")
 
@@ -40,9 +39,7 @@ def simulation_report(
     """
     worst = _worst(logs, tracking)
     sections = [_section(one, one.course) for one in logs if one.course is not None]
-    if more := [one.name for one in logs if one.course is None]:
-        names = f"Their figures are in result.json alone: {', '.join(more[:_NAMED])}."
-        sections.append(Section("Further logs", (names,)))
+    sections += further_logs(one.name for one in logs if one.course is None)
     verdict = _say("verdict", model, faults, len(logs), worst)
     return Report("Simulation", verdict, "neutral", _key_figures(logs, tracking), tuple(sections))
 
@@ -119,79 +116,41 @@ def _section(one: Imitation, course: Course) -> Section:
 
 
 def _figures(one: Imitation, s: Course) -> list[Figure]:
-    unit, torque_unit, name = one.units[0], one.torque_units[0], one.name
-    figures = [
-        compared_figure(
-            f"position-{name}",
-            "Position, measured and simulated.",
-            s.t,
-            s.position,
-            s.position_simulated,
-            f"position [{unit}]",
-        ),
-        joint_signal_figure(
-            f"position-difference-{name}",
-            "What the simulation gets wrong: simulated minus measured position.",
-            s.t,
-            s.position_difference,
-            unit,
-            quantity="simulated − measured",
-        ),
-    ]
-    if s.frequency is not None and s.position_density is not None and one.law != "open-loop":
-        caption = (
-            "Spectrum of that difference. Low frequencies are model errors, peaks are vibrations "
-            "or ripples that the model lacks."
-        )
-        density = s.position_density  # of a drift it would say nothing
-        figures.append(
-            density_figure(f"position-spectrum-{name}", caption, s.frequency, density, unit)
-        )
+    unit, name = one.units[0], one.name
+    density = None if one.law == "open-loop" else s.position_density  # of a drift it says nothing
+    position = (s.position, s.position_simulated, s.position_difference, density)
+    figures = _signal_figures(name, "position", unit, s, *position)
     if s.elapsed is not None and s.drift is not None:
-        caption = "How the difference grows from the start of a window, over all windows."
         draw = partial(draw_drift, elapsed=s.elapsed, drift=s.drift, unit=unit)
-        figures.append(one_figure(f"drift-{name}", caption, draw, 2.6))
-    figures.append(
-        compared_figure(
-            f"speed-{name}",
-            "Speed, reconstructed from the measurement and simulated.",
-            s.t,
-            s.speed,
-            s.speed_simulated,
-            f"speed [{unit}/s]",
-        )
-    )
-    if s.torque is None or s.torque_simulated is None or s.torque_difference is None:
-        return figures
-    figures += [
-        compared_figure(
-            f"torque-{name}",
-            "Torque that the controller commanded, measured and simulated.",
-            s.t,
-            s.torque,
-            s.torque_simulated,
-            f"torque [{torque_unit}]",
-        ),
-        joint_signal_figure(
-            f"torque-difference-{name}",
-            "Simulated minus measured torque. A controller turns encoder steps and noise into "
-            "torque, which no model repeats sample by sample.",
-            s.t,
-            s.torque_difference,
-            torque_unit,
-            quantity="simulated − measured",
-        ),
-    ]
-    if s.frequency is not None and s.torque_density is not None:
-        caption = (
-            "Spectrum of that difference. At high frequencies it is what the controller makes of "
-            "encoder steps and noise."
-        )
-        density = s.torque_density
-        figures.append(
-            density_figure(f"torque-spectrum-{name}", caption, s.frequency, density, torque_unit)
-        )
+        figures.append(one_figure(f"drift-{name}", _say("drift"), draw, 2.6))
+    caption, speed = _say("measured", "speed"), (s.speed, s.speed_simulated)
+    figures.append(compared_figure(f"speed-{name}", caption, s.t, *speed, f"speed [{unit}/s]"))
+    if s.torque is not None and s.torque_simulated is not None and s.torque_difference is not None:
+        torque = (s.torque, s.torque_simulated, s.torque_difference, s.torque_density)
+        figures += _signal_figures(name, "torque", one.torque_units[0], s, *torque)
     return figures
+
+
+def _signal_figures(
+    log: str,
+    name: str,
+    unit: str,
+    s: Course,
+    measured: Array,
+    simulated: Array,
+    difference: Array,
+    density: Array | None,
+) -> list[Figure]:
+    """A signal measured and simulated, the difference over time, and its spectrum where known."""
+    caption, quantity = _say("measured", name), f"{name} [{unit}]"
+    both = compared_figure(f"{name}-{log}", caption, s.t, measured, simulated, quantity)
+    caption, quantity = _say("difference", name), "simulated − measured"
+    figure_name = f"{name}-difference-{log}"
+    error = joint_signal_figure(figure_name, caption, s.t, difference, unit, quantity=quantity)
+    if s.frequency is None or density is None:
+        return [both, error]
+    figure_name, caption = f"{name}-spectrum-{log}", _say("spectrum", name)
+    return [both, error, density_figure(figure_name, caption, s.frequency, density, unit)]
 
 
 def draw_drift(axes: Axes, elapsed: Array, drift: Array, unit: str) -> None:

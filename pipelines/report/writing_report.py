@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from functools import partial
 
 import numpy as np
@@ -15,7 +14,8 @@ from pipelines.model.writing.result import Result
 from pipelines.report import style
 from pipelines.report.figures import compared_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
-from pipelines.report.sentences import capital, paragraphs, sentence
+from pipelines.report.sections import NO_COLLISION_CHECK
+from pipelines.report.sentences import capital, format_numbers, paragraphs, sentence
 from pipelines.report.style import format_decimals, format_number, format_unit, three_digits
 from pipelines.report.words import each, joined
 from pipelines.report.writing_figures import (
@@ -75,10 +75,6 @@ def _verdict(result: Result) -> str:
 def _mm(case: Case) -> str:
     values = case.tip_error_std.values
     return ", ".join(f"{1e3 * x:.2f}" if x >= 1e-4 else format_number(1e3 * x, 2) for x in values)
-
-
-def _numbers(values: Iterable[float]) -> str:
-    return ", ".join(format_number(float(x), 2) for x in values)
 
 
 def _key_figures(result: Result) -> Table | None:
@@ -197,8 +193,8 @@ def _online_section(result: Result) -> Section:
         (
             log.name,
             log.online.observer,
-            _numbers(100 * log.online.relative_error),
-            _numbers(100 * log.online.relative_error_low_pass),
+            format_numbers(100 * log.online.relative_error),
+            format_numbers(100 * log.online.relative_error_low_pass),
         )
         for log in result.logs
         if log.online is not None
@@ -315,9 +311,8 @@ def _task_report(result: Result, task: Designed) -> Report:
         ("what", "value", "unit"),
         (("joints found", task.inverse, ""), ("sample time", task.sample_time, "s"), *page),
     )
-    warning = "Self-collision is not checked, nor is collision with anything around the robot."
     sections = (
-        Section("Before the robot moves", tables=(limits,), warning=warning),
+        Section("Before the robot moves", tables=(limits,), warning=NO_COLLISION_CHECK),
         Section("The task", figures=tuple(task_figures(task, result.joints))),
     )
     tone: Tone = "good" if task.torque_checked else "attention"

@@ -221,7 +221,7 @@ def test_limits_are_told_for_what_a_technician_can_see() -> None:
              DetectionLimit("presliding", 2, "force", Value(0.1, None, "N m"), {"elastic": Value(-1.0, None, "1")}),
              DetectionLimit("stribeck", 2, "amplitude", Value(0.1, None, "N m"), {"speed": Value(0.0341, None, "rad/s")}))
     page = diagnosis_report(Result(**(NOTHING | {"detection_limits": found})))
-    (table,) = (section.tables[0] for section in page.sections if section.title == "What would have been found")
+    (table,) = (section.tables[0] for section in page.sections if section.title == "Detection limits")
     assert [row[table.columns.index("at")] for row in table.rows] == [
         "107 waves a turn", "40 waves in 2π m", "", "speed 0.0341 rad/s"]
 
