@@ -24,6 +24,7 @@ from pipelines.log.atomic import remove_folder, temporary_folder
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
+STYLE_FILE: Final = Path(__file__).parent / "templates" / "report.mplstyle"
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BLACK: Final = "#1a1f24"
 GREY: Final = "#5b6670"
@@ -211,8 +212,8 @@ def figure_style(salt: str) -> Iterator[None]:
         # A glyph the font lacks, a panel too narrow for its labels: the reader sees it.
         warnings.simplefilter("ignore", UserWarning)
         matplotlib.rcdefaults()
-        own = Path(__file__).parent / "templates" / "report.mplstyle"
-        matplotlib.rcParams.update(matplotlib.rc_params_from_file(own, use_default_template=False))
+        own = matplotlib.rc_params_from_file(STYLE_FILE, use_default_template=False)
+        matplotlib.rcParams.update(own)
         matplotlib.rcParams["svg.hashsalt"] = salt
         yield
 
