@@ -436,12 +436,17 @@ class Later:
             out.append(float(state.theta[at] @ np.linalg.solve(spread, state.theta[at])))
         return out
 
+    def waves(self, key: Key) -> bool:
+        """Return whether the shapes of a cause differ in the order of a wave."""
+        family = self.dictionary.families.get(key)
+        return family is not None and any(q.several for q in family.shapes[0].parameters)
+
     def again(self, key: Key) -> bool:
         """Return whether a cause may act more than once at its place."""
-        family, motion = self.dictionary.families.get(key), self.rows.data.logs[0].motion
-        if family is None or not any(q.several for q in family.shapes[0].parameters):
-            return False
-        return family.shapes[0].goes_round(motion, NEARLY)
+        motion = self.rows.data.logs[0].motion
+        return self.waves(key) and self.dictionary.families[key].shapes[0].goes_round(
+            motion, NEARLY
+        )
 
     @cached_property
     def shares(self) -> Array:

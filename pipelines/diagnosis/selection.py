@@ -186,8 +186,9 @@ class _Step:
     def significant(self) -> dict[Key, Screened]:
         """The candidates above the family-wise threshold, the best shape of each.
 
-        What has no name is not refitted: it is judged by its relevance here, a cause by what it
-        saves when all its numbers are fitted, of which a step along its columns shows a part.
+        They matter beside the causes found. Of waves that is judged when they are fitted: on long
+        travel orders are resolved more finely than the shapes, and columns of a neighbouring order
+        show a part of the gain.
         """
         later, taken = self.later, {cause.key for cause in self.causes}
         return {
@@ -195,7 +196,7 @@ class _Step:
             for key, one in best_of(later.screened(self.state)).items()
             if (key not in taken or later.again(key))
             and one.gain > self._threshold(one)
-            and (one.group.kind == "named" or self._matters(one))
+            and (later.waves(key) or self._matters(one))
         }
 
     @property
@@ -203,6 +204,7 @@ class _Step:
         """The significant causes, the strongest first."""
         ranked = sorted(self.significant.values(), key=lambda one: -one.gain)
         ranked = [one for one in ranked if one.group.kind != "unnamed" and self._matters(one)]
+        ranked = [one for one in ranked if not self.later.slight(self._torque(one))]
         return tuple(one.group.key for one in ranked)
 
     def _matters(self, one: Screened) -> bool:
@@ -213,7 +215,8 @@ class _Step:
         """
         place = self.later.dictionary.groups.index(one.group)
         inexact = float(self.later.shares[place] @ self._inexact)
-        return one.gain > inexact and not self.later.slight(self._torque(one))
+        named = one.group.kind == "named"  # its torque is known when it is fitted
+        return one.gain > inexact and (named or not self.later.slight(self._torque(one)))
 
     def _threshold(self, one: Screened) -> float:
         return self.baseline.threshold(one.group, one.freedom, self.later.rows.count)
