@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from benchmarks.other_plants.drawn import drawn
 from benchmarks.torque_boundary import KINDS, judged
 from pipelines.estimation.checks.boundary import torque_boundary
+from pipelines.estimation.checks.config import BoundaryConfig
+from pipelines.estimation.checks.torque_sign import _touches
 from tests.seeds import rarely, usually
 
 SEEDS = (pytest.param(103, marks=pytest.mark.slow), 108)
@@ -48,3 +51,16 @@ def test_a_torque_that_dithers_is_no_magnitude() -> None:
     found = torque_boundary(list(drawn(6, 46)[-1].logs()))
     assert found is not None
     assert found.sign == "signed"
+
+
+@pytest.mark.parametrize("least", [9.0, 15.0])
+def test_a_weight_that_is_lowered_fast_is_no_magnitude(least: float) -> None:
+    """Its torque comes down to a few deviations of its noise, and not to zero; a magnitude is reflected there."""
+    rng, t = np.random.default_rng(1), np.arange(12_000) * 1e-3
+    course, q, noise = np.cos(2.0 * np.pi * t), np.sin(2.0 * np.pi * t), 2.0 * rng.standard_normal(len(t))
+    config = BoundaryConfig()
+    weight = 30.0 + least + 30.0 * course + noise
+    assert (_touches([(weight, q)], config) or 0) < config.touches
+    reflected = _touches([(np.abs(30.0 * course + noise), q)], config)
+    assert reflected is not None
+    assert reflected >= config.touches

@@ -55,11 +55,11 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
         if np.nansum(tau < -max(level, 1e-6 * size)) > max(2.0, 1e-3 * tau.size):
             return None
         # a magnitude is reflected at zero: it arrives there within one step of its own
-        step = np.abs(np.diff(tau, prepend=tau[:1]))
-        near = tau < np.maximum(np.minimum(step, _NEAR * size), level)
+        step = np.minimum(np.abs(np.diff(tau, prepend=tau[:1])), _NEAR * size)
+        near, there = (tau < np.maximum(step, least) for least in (level, noise))
         if near.any() and np.mean(tau[near] < 0.0) > _BELOW:
             return None
-        state = np.where(near & moving, 1, np.where(tau > _FAR * size, -1, 0))
+        state = np.where(there & moving, 1, np.where(tau > _FAR * size, -1, 0))
         state = state[state != 0]
         count += int(np.sum((state[1:] == 1) & (state[:-1] == -1)))
     return count
