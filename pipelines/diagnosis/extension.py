@@ -17,11 +17,12 @@ from pipelines.diagnosis.compliance import compliance
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import pose
 from pipelines.diagnosis.findings import Worth, extension_of, findings_of, weigh
-from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Extended, Rejected
 from pipelines.diagnosis.screening import best_of
 from pipelines.diagnosis.selection import Candidate, refit
 from pipelines.diagnosis.standing import standing_of
+from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import train
 from pipelines.model.arm import Acting
 from pipelines.model.rows.families import Wanted, usable

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from pipelines.diagnosis.compliance import Compliance
-from pipelines.diagnosis.refit import Fit, Later, State
+from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import (
     Alternative,
     Answer,
@@ -26,6 +26,7 @@ from pipelines.diagnosis.result import (
 )
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.selection import Round
+from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters, told
 from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Acting

@@ -23,7 +23,7 @@ import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.candidates import Group
-from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import (
     DetectionLimit,
     Diagnosis,
@@ -31,6 +31,7 @@ from pipelines.diagnosis.result import (
     Value,
     WithoutLimit,
 )
+from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
 from pipelines.fit.joint_table import Array
 from pipelines.model.effects import all_effects

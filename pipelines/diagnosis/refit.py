@@ -18,6 +18,7 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
 from pipelines.diagnosis.screening import Screened, price, screen, squares_of
+from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
 from pipelines.fit.joint_table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
@@ -26,7 +27,7 @@ from pipelines.model.rigid.body import Motion
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact
 
-__all__ = ["Fit", "Later", "State"]
+__all__ = ["Later"]
 
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
 _DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
@@ -37,78 +38,13 @@ _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has se
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
-    """A fitted model, its cost and its residual."""
-
-    model: Exact
-    cost: float
-    residual: tuple[Array, ...]  # of each joint, in units of the noise
-
-
-@dataclass(frozen=True, eq=False)
 class _Point:
-    """Where a fit has come to."""
+    """One step of a fit."""
 
     model: Exact
     theta: Array
     residual: tuple[Array, ...]
     cost: float
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """A model, its numbers, and what it leaves."""
-
-    model: Exact
-    theta: Array  # nominal and standing numbers, scaled
-    belief: Belief  # before the rows
-    known: Belief  # the same, with the slopes by nominal numbers as drives and drift make them
-    residual: tuple[Array, ...]  # of each joint, in units of the noise
-    effects: Table  # slopes by the numbers of the effects, of unit length
-    lasting: (
-        Indices  # of these, numbers that hold for all time; those of an event hold for its moment
-    )
-    read_off: float = 0.0  # price of rows that effects take from the log itself
-
-    @property
-    def fit(self) -> Fit:
-        """The fit without the columns of all numbers, which take the most memory."""
-        return Fit(self.model, self.cost, self.residual)
-
-    @property
-    def rss(self) -> float:
-        return sum(float(r @ r) for r in self.residual)
-
-    @cached_property
-    def cost(self) -> float:
-        """‖r‖² + (θ - m)ᵀ A (θ - m), and the price of rows that are read off."""
-        return self.belief.cost(self.theta, self.residual) + self.read_off
-
-    @cached_property
-    def losses(self) -> Array:
-        """(blocks,) squared error of each block, predicted from all the others.
-
-        The numbers of an event cannot be predicted from other times: they are taken as known, and
-        the selection charges them. Slopes by nominal numbers are those without effects, whose
-        blocks are known: effects change them by the share that they add.
-        """
-        return self.belief.losses(self.effects.take(self.lasting), self.residual)
-
-    @property
-    def slope(self) -> Array:
-        """(k,) of -cost / 2 by all numbers."""
-        own = self.known.slope(self.theta, self.residual)
-        return np.asarray(np.r_[own, self.effects.moments(self.residual)])
-
-    @cached_property
-    def factor(self) -> Arrow:
-        """The factor of the information P of all numbers, with the rows."""
-        return self.known.beside(self.effects)
-
-    @property
-    def mean_squares(self) -> Array:
-        """(joints,)"""
-        return np.array([float(np.mean(r**2)) for r in self.residual])
 
 
 @dataclass(frozen=True, eq=False)

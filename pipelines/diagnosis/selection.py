@@ -15,9 +15,10 @@ import numpy as np
 
 from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.events import Window, push_of
-from pipelines.diagnosis.refit import Fit, Later, State
+from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
+from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.unnamed import Key, in_words
 from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Acting

@@ -22,10 +22,11 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.prior import Prior
-from pipelines.diagnosis.refit import Later, State
+from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.result import Value
 from pipelines.diagnosis.score import confidence_set, log_scores
+from pipelines.diagnosis.state import State
 from pipelines.fit.joint_table import Array, Arrow, Table
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.rigid.body import Motion
