@@ -358,10 +358,10 @@ def _teleplot(run: Run) -> tuple:
 
 @layout(SEVEN, rate=200.0)
 def epoch_in_single_precision(folder: Path, run: Run) -> Answer:
-    """A script that held time.time() in a float32 array: every stamp of the run is the same number; no rate stands anywhere."""
+    """A script that held time.time() in a float32 array: all stamps are one number; the velocity alone tells the rate."""
     stamps = (EPOCH + run.t).astype(np.float32).astype(np.float64)
     right = recorded(folder, run, "run.csv", {}, "timestamp=stamps; *q{}=q; *dq{}=dq; *tau{}=tau", data={"stamps": stamps}).right
-    return Answer("run.csv", right=right, table=False)
+    return Answer("run.csv", rate=200.0, right=right, table=False)
 
 
 @layout(FOUR, rate=100.0)
@@ -374,6 +374,7 @@ def zeros_where_the_bus_failed(folder: Path, run: Run) -> Answer:
     columns, _ = wide(run, specs.replace("*", ""), seen=q, rate=dq, force=tau)
     table(folder / "servo.csv", columns)
     right: dict = {}
-    for role, name, units in (("q", "pos{}", RAD), ("dq", "vel{}", RADS), ("tau", "eff{}", NM)):
+    for role, name, units, v in (("q", "pos{}", RAD, q), ("dq", "vel{}", RADS, dq), ("tau", "eff{}", NM, tau)):
         also(right, role, name, range(1, 5), units)
+        also(right, role, name, range(1, 5), units, v)  # zeros and all: the import keeps them and warns (RRID-D06)
     return Answer("servo.csv", {"t": "s"}, right=right, table=False)
