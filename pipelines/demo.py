@@ -20,9 +20,9 @@ from pipelines.log.files import write_log
 from pipelines.log.results import NOT_STORED
 from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
-from pipelines.report.diagnosis_words import in_order, named, spoken, told_values, without_keys
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.style import format_number, unit_in_words
+from pipelines.report.words import format_values, in_order, named, spoken, without_keys
 from pipelines.stage import Inputs, Request, Stage
 
 __all__ = ["STAGE", "Recorded", "Result", "Settings", "compute", "ending", "hidden", "report"]
@@ -151,7 +151,7 @@ def _found(result: Result, found: Diagnosis | None) -> str:
     for one in found.findings:
         names = asked.get((one.cause, one.joint), {})
         shown = [(name, value) for name, value in in_order(one.cause, one.parameters) if name in names or not names][:_NUMBERS]
-        told.append(f"{named(one.cause, one.joint)} ({told_values(shown)})")
+        told.append(f"{named(one.cause, one.joint)} ({format_values(shown)})")
     return "; ".join(told) or "something that has no name here"
 
 

@@ -41,9 +41,9 @@ from pipelines.model.named_cause import refuse_unknown, wanted_cause
 from pipelines.model.rows.families import Wanted, place_of
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, prepare
-from pipelines.report.extension_report import extension_report
-from pipelines.report.model_words import fewer_words
+from pipelines.report.diagnosis_report import extension_report
 from pipelines.report.report import Report
+from pipelines.report.words import fewer_words
 from pipelines.stage import Inputs, Request, Stage, Uses, read_by_role, slug
 
 __all__ = ["STAGE", "Extension", "Settings", "compute", "read", "report"]

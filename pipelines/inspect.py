@@ -26,10 +26,9 @@ from pipelines.log.doctor.summary import LogSummary, summary_of
 from pipelines.log.files import Opened
 from pipelines.log.robot import RobotDescription, format_robot
 from pipelines.model.plausibility import plausibility_findings
-from pipelines.report.boundary_card import boundary_card
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
-from pipelines.report.sections import checks_table, level_tone
+from pipelines.report.sections import boundary_card, checks_table, level_tone
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "report"]
@@ -211,7 +210,7 @@ def _key_figures(result: Result) -> Table:
     for check in result.checks:
         count[check.level] += 1
     rows = (("logs", len(result.logs) + len(result.rejected)), ("checks made", len(result.checks)), ("passed", count["ok"]),
-            ("look at it", count["warn"]), ("mended", count["repair"]), ("not usable", count["reject"]),
+            ("warnings", count["warn"]), ("repaired", count["repair"]), ("not usable", count["reject"]),
             ("not tested", len(result.not_tested)))
     return Table(("what", "number"), rows)
 

@@ -31,8 +31,7 @@ from pipelines.recall.key import Key, digest_of_json
 from pipelines.recall.pictures import Pictures, pictures_of, with_pictures, write_drawing
 from pipelines.recall.store import CACHE, Kept, Missed, Store
 from pipelines.report.report import Report
-from pipelines.report.run_report import run_report
-from pipelines.report.run_result import Result, Step
+from pipelines.report.run_report import Result, Step, run_report
 from pipelines.stage import Beside, Inputs, Request, Stage, default_out, read_logs, result_type
 
 __all__ = ["MODULES", "STAGE", "STEPS", "Planned", "Result", "Settings", "Step", "compute", "plan", "report", "restored"]

@@ -122,7 +122,7 @@ def say_verdict(report: Report, stream: Any = None) -> None:
 
 def _say_table(table: Table, stream: Any) -> None:
     """The rows of a table; its head as well, where a row is more than a name and a figure."""
-    from pipelines.report.cells import column_texts, filled
+    from pipelines.report.report import column_texts, filled
     from pipelines.report.style import format_number, format_unit
 
     table = filled(table)
@@ -137,7 +137,7 @@ def _say_table(table: Table, stream: Any) -> None:
 
 def say_table(head: Sequence[str], rows: Sequence[Sequence[str]], stream: Any = None) -> None:
     """Words in columns, numbers to the right where there is a head; on standard output where nothing else is said."""
-    from pipelines.report.cells import are_numbers
+    from pipelines.report.report import are_numbers
 
     columns = [[clean(cell, 200) for cell in column] for column in zip(*rows, strict=True)]
     heads, widths = _laid_out(head if rows else (), [max(map(len, column)) for column in columns])

@@ -14,7 +14,8 @@ from pipelines import estimate_bps, fit_friction, run, validate_writing
 from pipelines.log.experiment import Signal
 from pipelines.log.files import open_log, write_log
 from pipelines.log.sessions import apart
-from pipelines.report.run_ledger import ledger_lines
+from pipelines.report.run_report import stage_lines
+from pipelines.report.sections import CARD
 from pipelines.stage import Outcome, Request, read_logs, run_stage
 from tests.cli.commands import rrrid
 from tests.diagnose.sessions import written
@@ -56,9 +57,21 @@ def test_every_stage_is_there_in_the_order_of_the_data(whole: Outcome[run.Result
     assert stages[4]["result"]["model"].startswith("estimate-bps")
 
 
+def test_what_the_logged_torque_is_comes_first(whole: Outcome[run.Result]) -> None:
+    """Of the run, of `inspect` and of `estimate-bps`: the card is the first section, and `boundary` a field of the result."""
+    stored = json.loads((whole.folder / "result.json").read_text())
+    assert whole.report.sections[0].title == CARD
+    assert stored["boundary"]["sign"] == "signed"
+    stages = {stage["name"]: stage["result"] for stage in stored["stages"]}
+    for step in whole.result.stages:
+        if step.name in ("inspect", "estimate-bps"):
+            assert step.report.sections[0].title == CARD
+            assert stages[step.name]["boundary"]["gravity"]["present"]
+
+
 def test_the_ledger_begins_with_no_model(whole: Outcome[run.Result]) -> None:
     """The torque itself, the rigid body alone, then with friction: each line builds on the one before, and every joint gains."""
-    nothing, rigid, friction = ledger_lines(whole.result.stages)
+    nothing, rigid, friction = stage_lines(whole.result.stages)
     assert (nothing.before, rigid.before, friction.before) == (None, nothing.rms, rigid.rms)
     assert all(f < r < n for n, r, f in zip(nothing.rms, rigid.rms, friction.rms, strict=True))
     tables = next(section for section in whole.report.sections if section.title.startswith("Error by model stage")).tables

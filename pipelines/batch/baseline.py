@@ -23,9 +23,8 @@ from pipelines.log.result_figures import name_in
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.parameter_names import quantity_of
-from pipelines.report.diagnosis_words import title_of
-from pipelines.report.figure_words import figure_in_words
 from pipelines.report.style import format_number, unit_in_words
+from pipelines.report.words import figure_in_words, title_of
 
 __all__ = ["against", "known_figures", "unheld"]
 

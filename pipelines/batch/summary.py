@@ -15,12 +15,11 @@ from pipelines.batch.parts import Part
 from pipelines.batch.record import Record, Status
 from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
-from pipelines.report.diagnosis_words import without_keys
 from pipelines.report.drift_figures import Panel, drift_figure
-from pipelines.report.figure_words import figure_in_words
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import checks_table
 from pipelines.report.style import Rounded, format_number
+from pipelines.report.words import figure_in_words, without_keys
 
 __all__ = ["KINDS", "Summary", "rows_of", "summary_report"]
 

@@ -49,7 +49,7 @@ def answer(
         whole: with figures, simulated arms and detection limits.
         exclude: causes that were not considered.
     """
-    tell("weighing what was found, and what these logs would have shown")
+    tell("estimating gains and detection limits")
     look, reference = found.look, prepared.reference is not None
     causes, worth, worse = _worth(prepared, found, blocks, whole)
     own = {id(one.cause): alternatives_of(one) for one in look.selection.rounds}
@@ -104,7 +104,7 @@ def _limits(found: Found, findings: Sequence[Finding], exclude: Sequence[str]) -
 def _worth(
     prepared: Prepared, found: Found, blocks: int, whole: bool
 ) -> tuple[tuple[Cause, ...], Worth, str]:
-    """Return the causes, what they are worth on held-out rows, and why the last of them are none.
+    """Return the causes, their worth on held-out rows, and why the last of them are dropped.
 
     A gain counts on rows that a model was not fitted to: a cause with which the torque of a
     held-out log is predicted worse than by the nominal model has no name.
@@ -127,7 +127,7 @@ def _rejected(found: Found, causes: Sequence[Cause], worse: str) -> tuple[Reject
     """Return the causes above their thresholds that are not named.
 
     Args:
-        worse: why some that were found are none.
+        worse: why some of the selected causes are dropped.
     """
     settled = {key for one in causes for key in (one.key, *one.alternatives)}
     doubtful = {one.key for one in found.look.selection.causes}

@@ -1,7 +1,7 @@
-"""What screening and residual are where nothing has changed: between parts of the known logs.
+"""Compute the screening statistic and residual between parts of logs in which nothing has changed.
 
-One family-wise error for all candidates. Where nothing has changed T_c exceeds the χ² bound by what
-models leave everywhere; that grows with the number of rows as the noise does not.
+One family-wise error holds for all candidates. Where nothing has changed, T_c exceeds the χ² bound
+because every model has errors; unlike noise, these grow with the number of rows.
 """
 
 from __future__ import annotations

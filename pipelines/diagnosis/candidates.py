@@ -68,7 +68,7 @@ class Dictionary:
 
     @property
     def known(self) -> Table:
-        """The columns over the rows that tell what is usual on this machine."""
+        """The columns over the rows of the reference, or over the later rows without one."""
         return self.later if self.reference is None else self.reference
 
     @classmethod
@@ -169,8 +169,7 @@ def _length(shape: Effect) -> float | None:
 def _standing(family: Family, dataset: Dataset) -> set[int]:
     """Return the shapes of a family, by number, that healthy machines have in small.
 
-    Of waves that differ in order they have all that the travel tells apart, 2π / travel from one to
-    the next, and all of whole orders.
+    Of waves, these are all whole orders, and orders that the travel resolves: 2π / travel apart.
     """
     shapes, parameters = family.shapes, family.shapes[0].parameters
     order = next((q.name for q in parameters if q.several), None)

@@ -33,7 +33,7 @@ _GIVES_WAY = "the frequency responses show compliance, and a gap is not distingu
 
 @dataclass(frozen=True)
 class Compliance:
-    """What frequency responses show."""
+    """Causes in the frequency responses."""
 
     named: tuple[Acting, ...]
     open: str  # what they leave open, in words; empty where they do not
@@ -87,7 +87,8 @@ def _moved(now: Acting, before: Acting) -> bool:
 def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIdentifiable, ...]:
     """Return causes that frequency responses would show, or let be named, and these do not.
 
-    They are missing or undecided; and a gap is told from a spring only by responses without one.
+    Responses are missing or undecided; a gap is distinguished from a spring only by responses that
+    show no spring.
     """
     missing = "only frequency responses tell it, and there is no frf log"
     open_by = {"frequency responses": missing if told is None else told.open}

@@ -60,9 +60,8 @@ class DiagnosisConfig:
     ) -> Recipe:
         """Return how rows are made: within the band that the motion and ripple of a turn fill.
 
-        In closed loop what lies above that is the drive's answer to noise: there the motion is late
-        behind the torque whatever the arm is, and a delay or a lag is found in any (Ljung 1999,
-        13.4).
+        In closed loop, motion above that band is the response of the drive to noise: it lags the
+        torque on every arm, and looks like a delay or a lag (Ljung 1999, 13.4).
         """
         return Recipe(
             cutoff_hz=self.cutoff_hz,

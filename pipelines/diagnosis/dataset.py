@@ -215,7 +215,7 @@ class Dataset:
 
     @property
     def known(self) -> Rows:
-        """The rows that tell what is usual on this machine."""
+        """The rows of the reference; without one, the later rows without the causes found."""
         return self.reference or self.cleared or self.later
 
     @property
@@ -238,7 +238,7 @@ class Dataset:
 def load(prepared: Prepared, frf: Sequence[ExperimentLog] = ()) -> Dataset:
     """Return the rows of prepared logs, with the nominal model of the reference or of themselves.
 
-    Logs that judge are rows like the others: the score predicts each block from all others.
+    Validation logs are rows like the others: the score predicts each block from all others.
 
     Raises:
         InputRejected: T08, a joint is held in all reference logs.
@@ -265,8 +265,8 @@ def _session_start(data: Data) -> float | None:
 def _columns(prepared: Prepared) -> Columns:
     """Return the nominal columns; without reference logs the sign change's curve is fitted too.
 
-    By which curve friction changes its sign nobody knows, and none is a fault. With reference logs
-    the form of friction (`prior`) holds what they show of it.
+    The curve of the sign change is not known, and no such curve is a fault. With reference logs the
+    form of friction (`prior`) contains it.
     """
     own = prepared.columns
     if prepared.reference is not None or any(speed > 0.0 for speed in prepared.recipe.min_speed):

@@ -41,7 +41,7 @@ def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
     """Return the verdict by significance and goodness of fit.
 
     Causes lose their names where they explain less than half of what is more than noise at the
-    joints on which they act. What is left at others is told beside them.
+    joints on which they act. The residual at other joints is reported with them.
     """
     causes, end, config = selection.causes, selection.end, later.config
     left = end.mean_squares * later.dataset.noise_ratio
@@ -97,7 +97,7 @@ def _explained(later: Later, selection: Selection, beyond: Array, strained: bool
 def _rest(
     later: Later, last: Round, missing: Array, shapes: Sequence[str], left: Array, bound: float
 ) -> str:
-    """Return what the model leaves that is more than noise; "" where it is none."""
+    """Return how the residual exceeds the noise, in words; "" where it does not."""
     more = f"; it follows {last.follows}" if last.follows else ""
     if missing.any():
         return (
@@ -116,7 +116,7 @@ def _rest(
 
 def _wanders(slow: Array) -> str:
     joint = int(slow.argmax()) + 1
-    return f"{slow.max():.1%} of the torque of joint {joint} wanders, whatever the motion is"
+    return f"{slow.max():.1%} of the torque of joint {joint} wanders independently of the motion"
 
 
 def _too_large(left: Array, bound: float) -> str:
@@ -135,7 +135,7 @@ def _missing(later: Later, state: State) -> Array:
     them the noise is what differs between rows of one state. Where both parts of a pair are noise,
     common over differing has an F distribution; 0 below its bound and below `config.misfit`.
     """
-    from scipy.stats import f as f_law
+    from scipy.special import fdtri
 
     rows, config = later.rows, later.config
     if later.dataset.reference is not None:
@@ -145,7 +145,7 @@ def _missing(later: Later, state: State) -> Array:
         left[rows.joint == j] = own
     pairs = Repeated.of(rows.data)
     common, differing = pairs.parts(left)
-    bound = f_law.isf(config.alpha / rows.n_joints, pairs.count, pairs.count)
+    bound = fdtri(pairs.count, pairs.count, 1.0 - config.alpha / rows.n_joints)
     torque = np.array([float(np.mean(y**2)) for y in rows.y])
     share = np.sqrt(np.maximum(common - differing, 0.0) / torque)
     return np.where((common > bound * differing) & (share > config.misfit), share, 0.0)
@@ -176,8 +176,8 @@ def _confused(later: Later, end: State) -> dict[int, str]:
     """Return {index of the effect: reason} of effects that wandering torque may look like.
 
     In closed loop the drive answers such a torque a moment later, and so do the motion and its
-    record (Ljung 1999, 13.4): only a load is told from it that comes again with the motion, or is
-    larger, at its moment, than chance makes it.
+    record (Ljung 1999, 13.4): only a load that recurs with the motion, or one that is
+    larger at its moment than chance allows, is distinguished from it.
     """
     slow, config = _wandering(later), later.config
     if slow.max() <= config.misfit:

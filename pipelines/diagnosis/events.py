@@ -44,11 +44,10 @@ def _standing_out(
 ) -> Window | None:
     """Return the best window on a residual (rows of each joint), None where it may be noise.
 
-    An event is of one moment: its window stands out of what is left at other times of the session.
-    The largest gain of m independent windows of white noise has a known law; what other times
-    exceed it by is measured, by the largest of each half of a log without its best window
-    (`upper_point`). No model of a torque is exact: a push has to be more than a share of the torque
-    at its moment.
+    An event has one moment: its window exceeds the residual at all other times of the session. The
+    largest gain of m independent windows of white noise has a known law; the excess at other times
+    is measured by the largest gain in each half of a log without its best window (`upper_point`).
+    No model of a torque is exact: a push has to be more than a share of the torque at its moment.
     """
     best, gains = None, list[float]()
     for log, one in enumerate(rows.data.logs):
@@ -73,7 +72,7 @@ def _standing_out(
 def push_of(
     rows: Rows, dictionary: Dictionary, arm: Arm, residual: Sequence[Array], config: DiagnosisConfig
 ) -> tuple[Window | None, str]:
-    """Return the push that stands out, or what does and is none.
+    """Return the push that exceeds all else, or in words an event that is not a push.
 
     A push on the tip acts on the joints in one proportion: where any other torque explains
     relevantly more, something else happened at that moment.

@@ -33,7 +33,7 @@ __all__ = ["extend"]
 
 _NOTHING = "it takes nothing off the held-out error"
 _NOT_MOVED = "since the reference logs the base parameters have not moved as it moves them"
-_IMPOSSIBLE = "fitted exactly, its numbers are none that it can have"
+_IMPOSSIBLE = "fitted exactly, its numbers are impossible"
 
 
 def extend(
@@ -117,7 +117,7 @@ def _doubt(worth: Worth, place: int) -> str:
 
 
 def _numbers(done: Candidate) -> str:
-    """Return ": order = 6.02 1/rev, …" of a cause whose numbers are none that it can have."""
+    """Return ": order = 6.02 1/rev, …" of a cause whose numbers are impossible."""
     one = done.state.model.effects[-1]
     joint, revolute = one.effect.joint, done.state.model.arm.robot.revolute
     turning = joint is None or revolute[joint - 1]

@@ -82,8 +82,8 @@ class Worth:
 def weigh(prepared: Prepared, trained: Trained, standing: Standing, whole: bool) -> Worth:
     """Return what the models are worth on held-out rows.
 
-    The floor is what a model leaves of the machine in order; without reference logs what the last
-    model leaves of the rows it was fitted to.
+    The floor is the residual of the healthy machine; without reference logs, the residual of the
+    last model on the rows that it was fitted to.
     """
     arms = [trained.arm(k) for k in range(len(trained.models))]
     simulated = (

@@ -1,4 +1,4 @@
-"""Prior of a healthy machine: what its reference logs, or its other joints, tell of it.
+"""Compute the prior of a healthy machine from its reference logs, or from its other joints.
 
     prior = prior_of(dataset, dictionary, config)
     prior.start                 information and mean of the numbers before the later logs
@@ -11,7 +11,7 @@
 With reference logs, the prior of later logs is their posterior N(m, V), plus what may drift between
 sessions without a fault: friction, by a relative standard deviation; rigid-body numbers not at all.
 Without them nominal numbers have a flat prior, and standing ones are as large as is typical of
-their family over the joints of this machine: a fault is what stands out of its family.
+their family over the joints of this machine: a fault exceeds its family.
 """
 
 from __future__ import annotations

@@ -162,7 +162,7 @@ class Later:
 
     @cached_property
     def belief(self) -> Belief:
-        """What is known before the rows."""
+        """The prior of all numbers."""
         return Belief(*self.prior.start, self.base, self.gram, self.prior.structure, self.block)
 
     def start(self, found: Exact | None = None) -> State:
@@ -285,7 +285,7 @@ class Later:
 
     @cached_property
     def _free(self) -> dict[Group, Belief]:
-        """What is known beside each candidate that moves base parameters by unknown numbers."""
+        """The prior for each candidate that moves base parameters by unknown numbers."""
         named = (g for g in self.dictionary.groups if g.kind == "named")
         every = {g: self.freed(self.belief, self._effect(g)) for g in named}
         return {g: belief for g, belief in every.items() if belief is not self.belief}
@@ -301,7 +301,7 @@ class Later:
     def _read_off(self, model: Exact) -> float:
         """Return the price Σ ln(1 + x²) of rows whose torque x an effect reads off the log itself.
 
-        Such a row is not predicted: it is told by a number of its own, of the size x [noise].
+        Such a row is not predicted: it costs a number of its own, of the size x [noise].
         """
         asked = self.rows.data.logs[0].motion.tau is not None
         effects = tuple(
@@ -385,7 +385,7 @@ class Later:
     def usual(self) -> Array:
         """Length (joints,) of a torque, in units of the noise, that any machine has.
 
-        It is nothing with reference logs, which tell what this machine has.
+        It is zero with reference logs: they contain what this machine has.
         """
         share = self.config.healthy_share if self.dataset.reference is None else 0.0
         return share * np.array([float(np.linalg.norm(y)) for y in self.y])
@@ -436,12 +436,17 @@ class Later:
             out.append(float(state.theta[at] @ np.linalg.solve(spread, state.theta[at])))
         return out
 
+    def waves(self, key: Key) -> bool:
+        """Return whether the shapes of a cause differ in the order of a wave."""
+        family = self.dictionary.families.get(key)
+        return family is not None and any(q.several for q in family.shapes[0].parameters)
+
     def again(self, key: Key) -> bool:
         """Return whether a cause may act more than once at its place."""
-        family, motion = self.dictionary.families.get(key), self.rows.data.logs[0].motion
-        if family is None or not any(q.several for q in family.shapes[0].parameters):
-            return False
-        return family.shapes[0].goes_round(motion, NEARLY)
+        motion = self.rows.data.logs[0].motion
+        return self.waves(key) and self.dictionary.families[key].shapes[0].goes_round(
+            motion, NEARLY
+        )
 
     @cached_property
     def shares(self) -> Array:

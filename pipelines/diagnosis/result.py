@@ -217,7 +217,7 @@ class Threshold:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """What the simulation gets wrong, and why."""
+    """The errors of the simulation, and their causes."""
 
     verdict: Verdict
     summary: str  # one sentence a technician understands

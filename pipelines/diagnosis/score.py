@@ -35,7 +35,7 @@ _RESAMPLES = 400  # numerics: of the bootstrap
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
-    """What predicts each block of rows from all others, by the numbers of some columns."""
+    """Predictors of each block of rows from all others, by the numbers of some columns."""
 
     rows: tuple[tuple[Indices, ...], ...]  # of each block, of each joint
     inverse: tuple[npt.NDArray[np.float32], ...]  # of each block, (I - J_bᵀ P⁻¹ J_b)⁻¹
@@ -150,9 +150,9 @@ def confidence_set(scores: Mapping[K, Array], config: DiagnosisConfig) -> list[K
 
 def chi2_bound(alpha: float, freedom: int) -> float:
     """Return the value that χ² of as many degrees of freedom exceeds with probability `alpha`."""
-    from scipy.stats import chi2
+    from scipy.special import chdtri
 
-    return float(chi2.isf(alpha, max(freedom, 1)))
+    return float(chdtri(max(freedom, 1), alpha))
 
 
 def upper_point(values: Sequence[float], alpha: float) -> float:

@@ -72,7 +72,7 @@ class Round:
     after: Fit | None = None
     stopped: str = ""  # why a significant cause was not selected
     follows: str = ""  # what the rest follows
-    moment: str = ""  # what stands out at one moment, and no event explains
+    moment: str = ""  # an anomaly at one moment that no event explains
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,16 +125,16 @@ def select(
 
     Args:
         responses: causes that frequency responses name, with their numbers; candidates like others.
-        before: what was selected before the noise was known beside it.
+        before: the selection of an earlier search, with less knowledge of the noise.
     """
     start = state = later.start()
     causes, rounds, most = list[Cause](), list[Round](), later.config.causes
     if before is not None:
         causes, rounds = list(before.causes), list(before.rounds)
         state = later.start(before.model)
-    explained, cut = max(start.cost - state.cost, 0.0), tuple[Key, ...]()
+    cut = tuple[Key, ...]()
     while True:
-        step = _Step(later.composed(state.model), state, baseline, causes, explained)
+        step = _Step(later.composed(state.model), start, state, baseline, causes)
         if len(causes) >= most:
             cut = step.relevant_keys
             break
@@ -142,9 +142,7 @@ def select(
         rounds.append(found)
         if found.cause is None or after is None:
             break
-        causes = [*causes, found.cause]
-        explained += max(state.cost - after.cost, 0.0)
-        state = after
+        causes, state = [*causes, found.cause], after
     causes, state = _backward(later, causes, state)
     return Selection(tuple(causes), start, state, tuple(rounds), cut)
 
@@ -154,10 +152,10 @@ class _Step:
     """One round of the forward selection: candidates for what a state leaves."""
 
     later: Later  # with the columns of drives and records beside the effects of the state
+    start: State  # without causes
     state: State
     baseline: Baseline
-    causes: Sequence[Cause]  # selected before
-    explained: float  # cost that these save
+    causes: Sequence[Cause]  # selected before, which the state has
 
     def round(self, responses: Sequence[Acting]) -> tuple[Round, State | None]:
         """Return the cause that explains most of the residual, and the state fitted with it.
@@ -188,8 +186,9 @@ class _Step:
     def significant(self) -> dict[Key, Screened]:
         """The candidates above the family-wise threshold, the best shape of each.
 
-        What has no name is not refitted: it is judged by its relevance here, a cause by what it
-        saves when all its numbers are fitted, of which a step along its columns shows a part.
+        They matter beside the causes found. Of waves that is judged when they are fitted: on long
+        travel orders are resolved more finely than the shapes, and columns of a neighbouring order
+        show a part of the gain.
         """
         later, taken = self.later, {cause.key for cause in self.causes}
         return {
@@ -197,7 +196,7 @@ class _Step:
             for key, one in best_of(later.screened(self.state)).items()
             if (key not in taken or later.again(key))
             and one.gain > self._threshold(one)
-            and (one.group.kind == "named" or self._matters(one))
+            and (later.waves(key) or self._matters(one))
         }
 
     @property
@@ -205,26 +204,35 @@ class _Step:
         """The significant causes, the strongest first."""
         ranked = sorted(self.significant.values(), key=lambda one: -one.gain)
         ranked = [one for one in ranked if one.group.kind != "unnamed" and self._matters(one)]
+        ranked = [one for one in ranked if not self.later.slight(self._torque(one))]
         return tuple(one.group.key for one in ranked)
 
     def _matters(self, one: Screened) -> bool:
         """Return whether a candidate gains more than laws are inexact, and healthy machines have.
 
-        At the joints of the causes found so far, and of what stands since the reference, what
-        remains of these is larger than the noise.
+        At the joints of the causes found so far, and of standing causes, the errors of their laws
+        are larger than the noise.
         """
         place = self.later.dictionary.groups.index(one.group)
         inexact = float(self.later.shares[place] @ self._inexact)
-        return one.gain > inexact and not self.later.slight(self._torque(one))
+        named = one.group.kind == "named"  # its torque is known when it is fitted
+        return one.gain > inexact and (named or not self.later.slight(self._torque(one)))
 
     def _threshold(self, one: Screened) -> float:
         return self.baseline.threshold(one.group, one.freedom, self.later.rows.count)
 
     @cached_property
     def _inexact(self) -> Array:
-        """Gain (joints,) that the causes found account for, because no law is exact."""
-        share = self.explained * self.later.acting(self.state) + self.later.standing
-        return self.later.config.relevance * share
+        """Gain (joints,) that the causes found account for, because no law is exact.
+
+        It is a share of what they save at each joint; what they save of the prior's cost belongs to
+        the joints where they act.
+        """
+        start, state = self.start, self.state
+        prior = max(start.cost - start.rss - state.cost + state.rss, 0.0)
+        saved = np.maximum(_power(start.residual) - _power(state.residual), 0.0)
+        saved = saved + prior * self.later.acting(state) + self.later.standing
+        return np.asarray(self.later.config.relevance * saved)
 
     def _torque(self, one: Screened) -> tuple[Array, ...]:
         """Return the torque of a screened candidate, joint by joint, in units of the noise."""
@@ -233,13 +241,14 @@ class _Step:
     def _relevant(self, one: Candidate) -> bool:
         """Return whether a cause, refitted, saves more than the laws found before it are inexact.
 
-        A cause whose torque is within that of healthy machines is rejected. A joint where it saves
-        less counts for nothing, and one that it makes worse counts against it. What the standing
-        numbers have taken of it is a part of what it saves.
+        What it saves beyond that has to be above the threshold of chance. A cause whose torque is
+        within that of healthy machines is rejected. A joint where it saves less counts for nothing,
+        and one that it makes worse counts against it. What the standing numbers have taken of it is
+        a part of what it saves.
         """
         later, state, new = self.later, self.state, one.state
         if one.event:
-            return one.gain >= later.config.relevance * self.explained
+            return one.gain >= later.config.relevance * (self.start.cost - state.cost)
         if one.key not in self.significant:  # frequency responses name it
             return True
         both = [
@@ -249,14 +258,13 @@ class _Step:
             return False
         group = self.significant[one.key].group
         shares = later.shares[later.dictionary.groups.index(group)]
-        each = zip(state.residual, new.residual, strict=True)
-        saved = np.array([a @ a - b @ b for a, b in each])
+        saved = _power(state.residual) - _power(new.residual)
         more = later.taken(state, [group])[0]
         if one.key[1] is not None:  # of the whole arm base parameters are freed: that saves nothing
             more += state.cost - state.rss - new.cost + new.rss
         saved = saved + more * shares
         counted = np.where(saved > 0.0, np.maximum(saved - self._inexact, 0.0), saved)
-        return float(counted.sum()) > 0.0
+        return float(counted.sum()) > self._threshold(self.significant[one.key])
 
     def _promising(self) -> list[Screened]:
         """Return the significant causes that are the most promising ones, the best first.
@@ -310,8 +318,8 @@ class _Step:
     def _apart(self, other: State) -> list[Key]:
         """Return the causes that explain something else than a shape without a name does.
 
-        Beside it they are significant, gain more than a share of what they gain alone, and more
-        than the shape leaves because no law is exact.
+        Fitted together with it they are significant, gain more than a share of what they gain
+        alone, and more than the shape leaves because no law is exact.
         """
         config, gains = self.later.config, {s.group: s.gain for s in self.later.screened(other)}
         inexact = config.relevance * (self.state.cost - other.cost)
@@ -452,7 +460,7 @@ def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
 def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause], State]:
     """Take out every cause without which the rest predicts as well.
 
-    What happened at one moment is not told by predictions of other times: it stood out of these.
+    An event is kept: predictions of other times do not depend on it.
     """
     place = 0
     while len(causes) > 1 and place < len(causes):
@@ -467,6 +475,11 @@ def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause
         else:
             place += 1
     return causes, end
+
+
+def _power(residual: Sequence[Array]) -> Array:
+    """(joints,) sum of squares."""
+    return np.array([float(r @ r) for r in residual])
 
 
 def _scores(later: Later, state: State, numbers: int = 0) -> Array:

@@ -1,4 +1,4 @@
-"""Variance components of what healthy machines have in small, and the noise that is left beside it.
+"""Estimate variance components of standing numbers, and the noise of each session.
 
     found = components(table, y, groups, n_nominal, config)
     dataset, dictionary = settle(dataset, dictionary, config)
@@ -111,9 +111,9 @@ def settle(
 ) -> tuple[Dataset, Dictionary]:
     """Return the rows of each session whitened, in units of its own noise, and their columns.
 
-    Sessions that are compared use the same columns, the first shapes: what is left of them is
-    alike. Rows alone use the best shape of each cause, and the best window of each log, or a fault
-    of another shape would be noise.
+    Sessions that are compared use the same columns, the first shapes, so that their residuals are
+    comparable. Rows alone use the best shape of each cause, and the best window of each log, or a
+    fault of another shape would be noise.
 
     Args:
         cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.

@@ -15,6 +15,7 @@ from pipelines.recall.code import code_of, libraries
 from pipelines.recall.key import digest_of_json
 from pipelines.recall.store import CACHE
 from pipelines.report.report import Report
+from pipelines.report.style import STYLE_FILE
 
 __all__ = ["DRAWING", "Pictures", "pictures_of", "with_pictures", "write_drawing"]
 
@@ -41,7 +42,8 @@ class Pictures:
 
 def drawing(modules: tuple[str, ...]) -> str:
     """All that the look of a figure depends on, its data apart."""
-    return digest_of_json([{module: code_of(module) for module in modules}, libraries(("matplotlib", "numpy"))])
+    code = {module: code_of(module) for module in modules}
+    return digest_of_json([code, libraries(("matplotlib", "numpy")), hash_file(STYLE_FILE)])
 
 
 def pictures_of(out: Path, modules: tuple[str, ...]) -> Pictures:

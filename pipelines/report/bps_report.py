@@ -1,45 +1,58 @@
-"""The report of an estimate: the verdict, Table V with standard deviations, and what the estimate rests on."""
+"""The report of an estimate: the verdict, Table V with deviations, and what it rests on."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.estimation.balance import ALONE
+from pipelines.model.estimation.balance import ALONE, CLOSED, TOGETHER, Balance
 from pipelines.model.estimation.compare import Compared
-from pipelines.model.estimation.floor import Beside
 from pipelines.model.estimation.outcome import Estimated
 from pipelines.model.estimation.result import Result
 from pipelines.model.estimation.words import column_in_words
-from pipelines.report.boundary_card import boundary_card
-from pipelines.report.bps import convergence_figure, torque_figure
-from pipelines.report.bps_balance import balance_table, balance_words
-from pipelines.report.figure_words import figure_in_words as plain
-from pipelines.report.model_words import friction_words
-from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.style import format_number, format_unit, with_std
+from pipelines.report import style
+from pipelines.report.figures import Array, compared_figure, legend_above, one_figure
+from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone, columns_table
+from pipelines.report.sections import boundary_card
+from pipelines.report.sentences import paragraphs, sentence
+from pipelines.report.style import enumerated, format_number, format_unit, printable, with_std
+from pipelines.report.words import figure_in_words, joined
 
-__all__ = ["bps_report"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _GOOD = 0.1  # relative torque error that is worth calling good
 _POOR = 0.5  # one that explains too little to be used
 _SURE = 3.0  # standard deviations: a value that is clearly visible
-_ABOVE_NOISE = 10.0  # times what the noise between periods leaves, as in a diagnosis: beyond it the model lacks something
+_ABOVE_NOISE = 10.0  # times the noise between periods, as in a diagnosis: the model lacks something
 _STANDS_OUT = 2.0  # times the overall relative error: a joint worth naming
 _ALIKE = 0.02  # of the better error: less is no difference worth speaking of
+_CURVES = 8  # in one axes
+_FAR = 4  # described values that are named
+
+_say, _paragraphs = partial(sentence, "bps"), partial(paragraphs, "bps")
+_within = partial(figure_in_words, within=True)
 
 
 def bps_report(result: Result) -> Report:
     """The verdict, Table V with standard deviations, and what the estimate rests on."""
-    sections = [_parameter_section(result), _course_section(result), _trust_section(result)]
+    sections = [
+        *boundary_card(result.boundary),
+        _parameter_section(result),
+        _course_section(result),
+    ]
     if result.noise_floor:
-        sections.insert(2, _noise_section(result))
-    sections = [*boundary_card(result.boundary), *sections]
+        sections.append(_noise_section(result))
+    sections.append(_trust_section(result))
     if result.comparison:
         sections.append(_comparison_section(result))
-    return Report("Base parameters", _verdict(result), _tone(result), _key_figures(result), tuple(sections),
-                  basis=(friction_words(result),))
+    basis, verdict = (_say("friction", result),), _verdict(result)
+    key, tone = _key_figures(result), _tone(result)
+    return Report("Base parameters", verdict, tone, key, tuple(sections), basis=basis)
 
 
 def _tone(result: Result) -> Tone:
@@ -51,20 +64,37 @@ def _tone(result: Result) -> Tone:
     return "good" if error < _GOOD and sound else "attention"
 
 
+def _verdict(result: Result) -> str:
+    together = [[column_in_words(name) for name in group] for group in result.not_separated]
+    if result.unresolved:
+        groups = (f"{enumerated(group)} are determined only together." for group in together)
+        return " ".join((f"These logs do not determine the model: {result.unresolved}.", *groups))
+    judged = "held-out logs"
+    if result.held_out != "logs":
+        judged = "blocks held out of the fitted logs (for none has role validate)"
+    error, (ratio, joint) = result.relative_error["validate"], _above_noise(result)
+    return _say(
+        "verdict",
+        result,
+        judged=judged,
+        error=error,
+        poor=not error < _POOR,
+        worst=_worst_joints(result),
+        noise={"ratio": ratio, "joint": joint},
+        seen=[_seen(p) for p in result.parameters],
+        parameters=len(result.parameters),
+        contradictions=_contradictions(result),
+        together=together,
+    )
+
+
 def _contradictions(result: Result) -> tuple[str, ...]:
-    """What the estimate's own checks say against its parameters or their standard deviations, a sentence each."""
-    found = []
-    if (balance := result.balance) is not None and not balance.agree:
-        found.append(f"The balance of power does not confirm the parameters: χ² {format_number(balance.chi_square, 2)} in "
-                     f"{balance.freedom} degrees of freedom.")
-    moved, name = _settling(result)
-    if moved > ALONE:
-        found.append(f"The two halves of the samples contradict each other: {name} differs by {moved:.1f} standard deviations.")
-    return tuple(found)
+    """What the estimate's own checks say against its parameters or their standard deviations."""
+    return _paragraphs("contradictions", result.balance, *_settling(result), ALONE)
 
 
 def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
-    """Joints that the model explains far worse than the whole arm, and not well, and their relative error; the worst first."""
+    """(joint, relative error) of those that are explained far worse than the arm; worst first."""
     pairs = zip(result.torque_rms["validate"], result.torque_signal_rms["validate"], strict=True)
     errors = [left / whole if whole > 0.0 else 0.0 for left, whole in pairs]
     least = max(_GOOD, _STANDS_OUT * result.relative_error["validate"])
@@ -72,8 +102,25 @@ def _worst_joints(result: Result) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(far, key=lambda pair: -pair[1]))
 
 
-def _percent(share: float) -> str:
-    return f"{format_number(100.0 * share, 2)} %"
+def _above_noise(result: Result) -> tuple[float, str]:
+    """The largest residual of the fitted logs over the noise between periods, and its joint."""
+    ratios = [
+        (float(ratio), result.joints[j])
+        for log in result.noise_floor
+        if log.role == "identify"
+        for j, ratio in enumerate(log.ratio)
+        if math.isfinite(ratio)
+    ]
+    return max(ratios, default=(0.0, ""))
+
+
+def _seen(p: Estimated) -> str:
+    """Known to be small: its deviation is small beside its like."""
+    if p.value is None or p.std is None:
+        return "no"
+    if not p.visible:
+        return "barely"
+    return "clearly" if abs(p.value) > _SURE * p.std else "known to be small"
 
 
 def _signed(x: float) -> str:
@@ -82,231 +129,299 @@ def _signed(x: float) -> str:
 
 def _formula(text: str) -> str:
     """A combination of parameters as it is written: a2² m3 − √(p5² + p6²) ≥ 0."""
-    return text.replace("^2", "²").replace(">=", "≥").replace("- ", "− ").replace("sqrt(", "√(")
+    for plain, sign in (("^2", "²"), (">=", "≥"), ("- ", "− "), ("sqrt(", "√(")):
+        text = text.replace(plain, sign)
+    return text
 
 
-def _seen(p: Estimated) -> str:
-    """"clearly", "known to be small" (its deviation is small beside its like), "barely", or "no"."""
-    if p.value is None or p.std is None:
-        return "no"
-    return "barely" if not p.visible else "clearly" if abs(p.value) > _SURE * p.std else "known to be small"
+def _estimate(p: Estimated) -> str:
+    return "not determined" if p.value is None or p.std is None else with_std(p.value, p.std)
 
 
-def _verdict(result: Result) -> str:
-    judged = "held-out logs" if result.held_out == "logs" else "blocks held out of the fitted logs (for none has role validate)"
-    if result.unresolved:
-        return " ".join((f"These logs do not determine the model: {result.unresolved}.", *_together(result)))
-    seen = [_seen(p) for p in result.parameters]
-    small, error, noise = seen.count("known to be small"), result.relative_error["validate"], _beside_noise(result)
-    worst = ", ".join(f"{name} {_percent(own)}" for name, own in _worst_joints(result))
-    below = "" if result.filter_hz is None else f" below {format_number(result.filter_hz, 2)} Hz"
-    sentences = (*(("No links that could exist have these parameters: some would need negative mass or inertia.",)
-                   if result.physically_consistent is False else ()), *_contradictions(result),
-                 f"{'The model predicts' if error < _POOR else 'The model does not explain these logs: it predicts'} the torque of "
-                 f"{judged}{below} with an error of {_percent(error)} (rms){f', in single joints more: {worst}' if worst else ''}"
-                 f"{f'; {noise}' if noise else ''}.",
-                 f"{seen.count('clearly')} of {len(seen)} parameters are clearly visible"
-                 f"{f', {small} known to be small' if small else ''}.", *_together(result))
-    return " ".join(sentences)
+def _key_figures(result: Result) -> Table:
+    rows: list[tuple[Cell, ...]] = [
+        ("relative torque error, fitted logs [%]", 100 * result.relative_error["identify"]),
+        (
+            f"relative torque error, held-out {result.held_out} [%]",
+            100 * result.relative_error["validate"],
+        ),
+    ]
+    for log in result.noise_floor:
+        if all(map(math.isfinite, log.ratio)):
+            ratios = ", ".join(f"{ratio:.2g}" for ratio in log.ratio)
+            rows.append((f"residual over noise floor, {log.log}, joint by joint", ratios))
+    friction = f"that of {result.friction_of or 'a given model'}"
+    if result.friction == "fitted":
+        friction = "fitted with the rest"
+    consistent = {True: "yes", False: "no", None: "cannot be said"}[result.physically_consistent]
+    low_pass: Cell = "none" if result.filter_hz is None else result.filter_hz
+    rows += [
+        ("equations, joint by joint", ", ".join(map(str, result.equations))),
+        ("condition number of the rigid columns", result.condition_number),
+        ("condition number of the fit, unit columns", result.condition_number_fit),
+        ("low-pass over torque and columns [Hz]", low_pass),
+        ("friction", friction),
+        ("physically consistent", consistent),
+    ]
+    return Table(("what", "figure"), tuple(rows))
 
 
-def _together(result: Result) -> tuple[str, ...]:
-    """"mz5 and torque offset at joint 5 are determined only together.", a sentence for each group."""
-    groups = [[column_in_words(name) for name in group] for group in result.not_separated]
-    return tuple(f"{', '.join(group[:-1])} and {group[-1]} are determined only together." for group in groups)
+def _parameter_section(result: Result) -> Section:
+    parameters = result.parameters
+    described = any(p.known is not None for p in parameters)
+    columns: dict[str, Sequence[Cell]] = {
+        "parameter": [figure_in_words(p.name) for p in parameters],
+        "value ± std": [_estimate(p) for p in parameters],
+        "unit": [format_unit(p.unit) for p in parameters],
+        "seen": [_seen(p) for p in parameters],
+        "described": [p.known for p in parameters],
+        "stands for": [_formula(p.combination) for p in parameters],
+    }
+    caption = "As Table V of Kostić et al. 2004, with what each stands for."
+    if described:
+        caption = f"{caption.removesuffix('.')}, and the value of the described links."
+    else:
+        del columns["described"]
+    tones: tuple[Tone, ...] = tuple(
+        "good" if p.visible else "bad" if p.value is None else "attention" for p in parameters
+    )
+    apart = {
+        p.name: abs(p.value - p.known) / p.std
+        for p in parameters
+        if p.value is not None and p.known is not None and p.std
+    }
+    far = sorted((name for name in apart if apart[name] > ALONE), key=lambda name: -apart[name])
+    farthest = [_within(name) for name in far[:_FAR]]
+    text = _paragraphs(
+        "parameters", _SURE, len(apart), len(far), farthest, ALONE, _rotors_within_links(result)
+    )
+    return Section("Parameters", text, (columns_table(columns, caption, tones),))
 
 
-def _beside_noise(result: Result) -> str:
-    """"the residual of the fitted logs is at most 1.1 times what the noise between periods leaves"; empty without periods."""
-    worst, joint = _above_noise(result)
-    if not joint:
-        return ""
-    several = len(result.joints) > 1
-    return (f"the residual of the fitted logs is {'at most ' if several else ''}{worst:.2g} times what the noise between periods "
-            f"leaves"
-            f"{f' ({joint})' if several else ''}")
-
-
-def _above_noise(result: Result) -> tuple[float, str]:
-    """Return the largest residual of the fitted logs over the noise between periods, and its joint; (0, "") without periods."""
-    return max(((float(ratio), result.joints[j]) for log in result.noise_floor if log.role == "identify"
-                for j, ratio in enumerate(log.ratio) if math.isfinite(ratio)), default=(0.0, ""))
-
-
-def _periods_of(log: Beside) -> str:
-    """Which periods make the equations, and what is unlike the others: left out of a mean, else kept."""
-    fate = "left out" if log.averaged else "kept"
-    unlike = f"; period {', '.join(map(str, log.left_out))} differs and is {fate}" if log.left_out else ""
-    unlike += f"; its first {log.settling_time:.2g} s, in which the motion settled, are {fate}" if log.settling_time else ""
-    unlike += "; how long its motion took to settle is not known" if log.settling_time is None else ""
-    return (f"{log.log}: the mean of {log.periods} periods makes the equations{unlike}." if log.averaged else
-            f"{log.log}: its periods are not averaged, {log.why_not}{unlike}.")
+def _rotors_within_links(result: Result) -> list[int]:
+    """Joints whose rotor inertia has no row of its own, beside others that have one."""
+    names = [p.name for p in result.parameters if p.name.startswith("rotor_inertia:")]
+    own = {int(name.split(":")[1]) for name in names}
+    return [j for j in range(1, len(result.joints) + 1) if own and j not in own]
 
 
 def _noise_section(result: Result) -> Section:
     """Residual and noise floor side by side, and which periods were averaged."""
-    text, rows = [], []
+    rows = []
     for log in result.noise_floor:
-        text.append(_periods_of(log))
-        rows += [(log.log, name, log.position[j], log.torque[j], log.torque_low_pass[j], log.motion[j], log.noise_floor[j],
-                  log.residual[j], log.ratio[j]) for j, name in enumerate(result.joints)]
-    unit, position = _torque_unit(result), " or ".join(dict.fromkeys("m" if own == "N" else "rad" for own in result.torque_units))
-    columns = ("log", "joint", f"position, one sample [{position}]", f"torque, one sample [{unit}]",
-               f"after the low-pass [{unit}]", f"by noise of the motion [{unit}]", f"noise floor [{unit}]", f"residual [{unit}]",
-               "residual / floor")
-    values = tuple(tuple(x if isinstance(x, str) or math.isfinite(x) else None for x in row) for row in rows)
-    text.append("What differs from one period to the next is noise, which no model explains. A residual well above it is what "
-                "this model lacks; where it is no larger, more experiments help, not more model.")
-    return Section("Residual beside the noise floor", tuple(text),
-                   (Table(columns, values, "Root mean squares, of the mean period: an error of the model is the same in all, noise "
-                                           "is not. Where periods are not alike, of every sample."),))
-
-
-def _key_figures(result: Result) -> Table:
-    beside = tuple((f"residual over noise floor, {log.log}, joint by joint", ", ".join(f"{ratio:.2g}" for ratio in log.ratio))
-                   for log in result.noise_floor if all(map(math.isfinite, log.ratio)))
-    rows: tuple[tuple[str, str | float | None], ...] = (
-        ("relative torque error, fitted logs [%]", 100 * result.relative_error["identify"]),
-        (f"relative torque error, held-out {result.held_out} [%]", 100 * result.relative_error["validate"]),
-        *beside,
-        ("equations, joint by joint", ", ".join(map(str, result.equations))),
-        ("condition number of the rigid columns", result.condition_number),
-        ("condition number of the fit, unit columns", result.condition_number_fit),
-        ("low-pass over torque and columns [Hz]", "none" if result.filter_hz is None else result.filter_hz),
-        ("friction", "fitted with the rest" if result.friction == "fitted" else f"that of {result.friction_of or 'a given model'}"),
-        ("links that could exist", {True: "yes", False: "no", None: "cannot be said"}[result.physically_consistent]))
-    return Table(("what", "figure"), rows)
-
-
-def _parameter_section(result: Result) -> Section:
-    known = any(p.known is not None for p in result.parameters)
-    columns = ("parameter", "value ± std", "unit", "seen", *(("described",) if known else ()), "stands for")
-    rows = [(plain(p.name), "not determined" if p.value is None or p.std is None else with_std(p.value, p.std),
-             format_unit(p.unit), _seen(p), *((p.known,) if known else ()), _formula(p.combination))
-            for p in result.parameters]
-    tones: tuple[Tone, ...] = tuple(
-        "good" if p.visible else "bad" if p.value is None else "attention" for p in result.parameters)
-    legend = (f"Seen clearly: more than {_SURE:g} standard deviations from zero. Known to be small: the standard deviation is "
-              "small beside parameters of its kind, the value may be zero. Barely: the value says little. Standard deviations "
-              "allow for a residual whose samples depend on one another.")
-    return Section("Parameters", (legend, *_described_words(result), *_rotor_words(result)),
-                   (Table(columns, tuple(rows), "As Table V of Kostić et al. 2004, with what each stands for"
-                          f"{', and the value of the described links' if known else ''}.", tones),))
-
-
-def _described_words(result: Result) -> tuple[str, ...]:
-    """How many estimates contradict the described links, and which most."""
-    apart = {p.name: abs(p.value - p.known) / p.std for p in result.parameters
-             if p.value is not None and p.known is not None and p.std}
-    if not apart:
-        return ()
-    far = sorted((name for name in apart if apart[name] > ALONE), key=lambda name: -apart[name])
-    if not far:
-        return (f"All {len(apart)} values of the described links lie within {ALONE:g} standard deviations of the estimate.",)
-    return (f"{len(far)} of {len(apart)} values of the described links lie more than {ALONE:g} standard deviations from the "
-            f"estimate, those of {', '.join(plain(name, True) for name in far[:4])} farthest.",)
-
-
-def _rotor_words(result: Result) -> tuple[str, ...]:
-    """Where the inertia of a rotor has gone that has no row of its own beside others that have one."""
-    own = {int(p.name.split(":")[1]) for p in result.parameters if p.name.startswith("rotor_inertia:")}
-    rest = [str(j) for j in range(1, len(result.joints) + 1) if own and j not in own]
-    return (f"The rotor inertia of joint {', '.join(rest)} cannot be separated from that of the links: it is contained in their "
-            "parameters, and not in the described values.",) if rest else ()
+        values = [log.position, log.torque, log.torque_low_pass, log.motion]
+        values += [log.noise_floor, log.residual, log.ratio]
+        for j, name in enumerate(result.joints):
+            numbers = (x[j] if math.isfinite(x[j]) else None for x in values)
+            rows.append((log.log, name, *numbers))
+    unit = joined(result.torque_units)
+    position = joined("m" if own == "N" else "rad" for own in result.torque_units)
+    columns = (
+        "log",
+        "joint",
+        f"position, one sample [{position}]",
+        f"torque, one sample [{unit}]",
+        f"after the low-pass [{unit}]",
+        f"by noise of the motion [{unit}]",
+        f"noise floor [{unit}]",
+        f"residual [{unit}]",
+        "residual / floor",
+    )
+    caption = (
+        "Root mean squares, of the mean period: an error of the model is the same in all, noise is "
+        "not. Where periods are not alike, of every sample."
+    )
+    text = (*(_say("periods", log) for log in result.noise_floor), _say("noise"))
+    title = "Residual beside the noise floor"
+    return Section(title, text, (Table(columns, tuple(rows), caption),))
 
 
 def _course_section(result: Result) -> Section:
     left, whole = result.torque_rms, result.torque_signal_rms["validate"]
-    rows = tuple((name, left["identify"][j], left["validate"][j], whole[j],
-                  100 * left["validate"][j] / whole[j] if whole[j] else None) for j, name in enumerate(result.joints))
-    unit = _torque_unit(result)
-    table = Table(("joint", f"residual, fitted [{unit}]", f"residual, held out [{unit}]", f"torque, held out [{unit}]",
-                   "relative [%]"), rows, "Root mean squares, after the low-pass.")
-    passed = "" if result.filter_hz is None else f", all after the low-pass of {result.filter_hz:.3g} Hz"
-    figures = [torque_figure(f"torque-{c.name}", f"{c.name} ({c.role}): measured torque, the model's, its friction, "
-                                                 f"and the residual{passed}.",
-                             c.t, c.measured, c.model, c.friction, c.left, result.joints, unit) for c in result.courses]
-    worst = ", ".join(f"{name} ({format_number(left['validate'][result.joints.index(name)], 2)} "
-                      f"{result.torque_units[result.joints.index(name)]} rms)" for name, _ in _worst_joints(result))
-    words = (f"More is left than of the others: {worst}. Where it follows the motion, the model lacks an effect there: drives that "
-             "are coupled, friction that depends on load or position, a column that belongs to another joint.",) if worst else ()
-    return Section("Torque along the experiment", words, (table,), tuple(figures))
-
-
-def _torque_unit(result: Result) -> str:
-    """"N m", "N", or "N m or N" where each joint has its own."""
-    return " or ".join(dict.fromkeys(result.torque_units))
+    unit, joints = joined(result.torque_units), result.joints
+    held_out = left["validate"]
+    relative = [100 * x / y if y else None for x, y in zip(held_out, whole, strict=True)]
+    columns: dict[str, Sequence[Cell]] = {
+        "joint": joints,
+        f"residual, fitted [{unit}]": left["identify"],
+        f"residual, held out [{unit}]": held_out,
+        f"torque, held out [{unit}]": whole,
+        "relative [%]": relative,
+    }
+    table = columns_table(columns, "Root mean squares, after the low-pass.")
+    passed = ""
+    if result.filter_hz is not None:
+        passed = f", all after the low-pass of {result.filter_hz:.3g} Hz"
+    figures = tuple(
+        compared_figure(
+            f"torque-{c.name}",
+            f"{c.name} ({c.role}): measured torque, the model's, its friction, and the residual"
+            f"{passed}.",
+            c.t,
+            c.measured,
+            c.model,
+            f"torque [{unit}]",
+            "model",
+            joints,
+            (("friction", c.friction, style.GREEN), ("left", c.left, style.BLACK)),
+        )
+        for c in result.courses
+    )
+    worst = []
+    for name, _ in _worst_joints(result):
+        j = joints.index(name)
+        worst.append({"name": name, "left": held_out[j], "unit": result.torque_units[j]})
+    return Section("Torque along the experiment", _paragraphs("course", worst), (table,), figures)
 
 
 def _trust_section(result: Result) -> Section:
-    weak = Table(("singular value", "combination"), tuple(
-        (d.singular_value, " ".join(f"{_signed(weight)} {plain(name, True)}" for name, weight in d.parameters[:4]))
-        for d in result.hard_to_see),
-        "The directions that these logs show worst; 1 is a column on its own.")
-    tables = [weak]
+    weak = tuple(
+        (
+            d.singular_value,
+            " ".join(f"{_signed(weight)} {_within(name)}" for name, weight in d.parameters[:4]),
+        )
+        for d in result.hard_to_see
+    )
+    caption = "The directions that these logs show worst; 1 is a column on its own."
+    tables = [Table(("singular value", "combination"), weak, caption)]
     if result.consistency is not None and result.consistency.inequalities:
-        tables.append(Table(("condition", "value", "holds"), tuple(
-            (_formula(i.condition), with_std(i.value, i.std), "yes" if i.holds else "no") for i in result.consistency.inequalities),
-            "What positive mass demands of these parameters."))
-    if (balance := balance_table(result)) is not None:
-        tables.append(balance)
-    growth = convergence_figure(
-        "convergence", "Estimates as samples come in, each in units of its final value; every one ends at 1. What matters is "
-        "the second half: the frame is set by it, and cuts earlier parts off. Parameters that move least are grey.",
-        result.convergence_samples, result.convergence, result.convergence_std, tuple(plain(p.name) for p in result.parameters))
-    return Section("What the estimate rests on", (friction_words(result), *balance_words(result), *_settling_words(result)),
-                   tuple(tables), (growth,))
+        rows = tuple(
+            (_formula(i.condition), with_std(i.value, i.std), "yes" if i.holds else "no")
+            for i in result.consistency.inequalities
+        )
+        caption = "What positive mass demands of these parameters."
+        tables.append(Table(("condition", "value", "holds"), rows, caption))
+    if result.balance is not None:
+        tables.append(_balance_table(result, result.balance))
+    text = (
+        _say("friction", result),
+        *_balance_words(result.balance),
+        *_paragraphs("settling", *_settling(result), ALONE),
+    )
+    title = "What the estimate rests on"
+    return Section(title, text, tuple(tables), (_convergence_figure(result),))
+
+
+def _balance_words(balance: Balance | None) -> tuple[str, ...]:
+    """What the balance of power says, and what a difference would mean."""
+    if balance is None:
+        return ()
+    closed = balance.closure > CLOSED
+    late = abs(balance.delay) > ALONE * balance.delay_std
+    in_time = abs(balance.delay) < ALONE * balance.delay_std
+    pairs = zip(balance.names, balance.apart, strict=True)
+    differing = [_within(name) for name, apart in pairs if apart > ALONE]
+    alike = max(balance.apart) < ALONE and balance.deviate < TOGETHER
+    return _paragraphs("balance", balance, closed and alike and in_time, closed, late, differing)
+
+
+def _balance_table(result: Result, balance: Balance) -> Table:
+    fitted = {p.name: p for p in result.parameters}
+    delay = (1e3 * balance.delay, 1e3 * balance.delay_std)
+    apart = [*balance.apart, abs(balance.delay) / balance.delay_std]
+    values = zip(balance.value, balance.std, strict=True)
+    columns: dict[str, Sequence[Cell]] = {
+        "parameter": [*map(figure_in_words, balance.names), "torque behind position"],
+        "by the torques": [*(_estimate(fitted[name]) for name in balance.names), "taken for 0"],
+        "by the balance of power": [*(with_std(x, s) for x, s in values), with_std(*delay)],
+        "unit": [*(format_unit(fitted[name].unit) for name in balance.names), "ms"],
+        "apart [std]": [round(x, 1) for x in apart],
+    }
+    tones: tuple[Tone, ...] = tuple("attention" if round(x, 1) > ALONE else "good" for x in apart)
+    chance = f"Above {ALONE:g} standard deviations a difference is not chance."
+    return columns_table(columns, f"{balance.windows} balances of work and energy. {chance}", tones)
 
 
 def _settling(result: Result) -> tuple[float, str]:
-    """By how many deviations the second half of the samples moved an estimate, and which: Var(β_n - β_N) = Var β_n - Var β_N."""
+    """By how many deviations the second half of the samples moved an estimate, and which.
+
+    Var(β_n - β_N) = Var β_n - Var β_N for the estimates of n of N samples.
+    """
     half = len(result.convergence) // 2
-    beta, std = (np.asarray(series)[[half, -1]] for series in (result.convergence, result.convergence_std))
+    beta = np.asarray(result.convergence)[[half, -1]]
+    variance = np.square(np.asarray(result.convergence_std)[[half, -1]])
     with np.errstate(invalid="ignore", divide="ignore"):
-        moved = np.nan_to_num(np.abs(beta[1] - beta[0]) / np.sqrt(np.square(std[0]) - np.square(std[1])), posinf=0.0)
+        moved = np.abs(beta[1] - beta[0]) / np.sqrt(variance[0] - variance[1])
+    moved = np.nan_to_num(moved, posinf=0.0)
     k = int(np.argmax(moved))
-    return float(moved[k]), plain(result.parameters[k].name, True)
+    return float(moved[k]), _within(result.parameters[k].name)
 
 
-def _settling_words(result: Result) -> tuple[str, ...]:
-    """Return whether the second half of the samples moved the estimates more than noise does."""
-    moved, most = _settling(result)
-    if not moved > 0.0:
-        return ()
-    words = f"The second half of the samples moves {most} most, by {moved:.1f} standard deviations"
-    return (f"{words}; below {ALONE:g} the largest of so many may be chance." if moved < ALONE else
-            f"{words}: more than noise explains. The model lacks something, or it changed during the experiment.",)
+def _convergence_figure(result: Result) -> Figure:
+    """Each estimate over its last value while samples come in (Fig. 12); most moved are named."""
+    names = [figure_in_words(p.name) for p in result.parameters]
+    samples = np.array(result.convergence_samples, dtype=np.float64)
+    beta, std = result.convergence, result.convergence_std
+
+    def draw(axis: Axes) -> None:
+        draw_convergence(axis, samples, beta, std, names)
+
+    return one_figure("convergence", _say("convergence"), draw, 3.8)
 
 
-def _winner(comparison: tuple[Compared, ...]) -> str:
-    """Return whether another way explains measurably better what was held out, and by how much."""
+def draw_convergence(
+    axis: Axes, samples: Array, beta: Array, std: Array, names: Sequence[str]
+) -> None:
+    """Estimates in units of their final value; only those that exceed their noise have one."""
+    last, sigma = beta[-1], std[-1]
+    shown = np.flatnonzero(np.isfinite(last) & (np.abs(last) > 5.0 * sigma))
+    ratio = beta[:, shown] / last[shown]
+    half = ratio[len(ratio) // 2 :]
+    highest, lowest = np.nanmax(half, axis=0, initial=0.0), np.nanmin(half, axis=0, initial=2.0)
+    travel = np.nan_to_num(highest - lowest)
+    loud = set(np.argsort(-travel)[:_CURVES].tolist())
+    colors = (*style.COLOURS, style.GREY, style.BLACK)
+    for k in range(len(shown)):
+        if k not in loud:
+            axis.plot(samples, ratio[:, k], color=style.GREY, linewidth=0.6, alpha=0.5)
+    for color, k in zip(colors, sorted(loud), strict=False):
+        name = printable(names[shown[k]], 40)
+        axis.plot(samples, ratio[:, k], color=color, linewidth=1.2, label=name)
+    reach = np.clip(1.5 * np.nanmax(np.abs(half - 1.0), initial=0.0), 0.01, 1.0)
+    axis.set_ylim(1.0 - reach, 1.0 + reach)  # earlier parts may leave the frame
+    middle = samples[len(samples) // 2]
+    axis.axvline(middle, color=style.GREY, linewidth=0.8, linestyle=(0, (4, 3)))
+    axis.set_xlabel("equations a joint")
+    axis.set_ylabel("estimate / final estimate")
+    if len(shown):
+        legend_above(axis, 3)
+
+
+def _winner(comparison: tuple[Compared, ...]) -> tuple[str, ...]:
+    """Whether another way explains measurably better what was held out, and by how much."""
     ranked = sorted((c for c in comparison if c.value), key=lambda c: c.validate)
-    if len(ranked) < 2:
-        return "Only one way gives an estimate." if ranked else "No way gives an estimate."
     used = next((c for c in ranked if c.used), None)
-    if used is None:
-        return f"The way that was asked for gives no estimate; held out, {ranked[0].method} explains the torque best."
-    better = [c for c in ranked if c.apart[1] < 0.0]
-    if better and better[0].validate < (1.0 - _ALIKE) * used.validate:
-        low, high = (100 * bound for bound in better[0].apart)
-        return (f"Held out, {better[0].method} is measurably better than {used.method}, which was used: its error is lower by "
-                f"{-high:.2g} to {-low:.2g} percentage points (95 %). To use it, say --method {better[0].method}.")
+    better = next((c for c in ranked if c.apart[1] < 0.0), None)
+    clearly = better
+    if used is None or better is None or not better.validate < (1.0 - _ALIKE) * used.validate:
+        clearly = None
+    low, high = (
+        (0.0, 0.0) if clearly is None else (-100 * clearly.apart[1], -100 * clearly.apart[0])
+    )
     worse = [c.method for c in ranked if not c.used and c.apart[0] > 0.0]
-    rest = f"; {' and '.join(worse)} {'is' if len(worse) == 1 else 'are'} measurably worse" if worse else ""
-    how = "better by more than a trifle" if better else "measurably better"
-    return f"Held out, no way is {how} than {used.method}, which was used{rest}."
+    return _paragraphs("winner", ranked, used, clearly, low, high, better is not None, worse)
 
 
 def _comparison_section(result: Result) -> Section:
-    rows = tuple((c.method, 100 * c.identify, 100 * c.validate,
-                  "" if c.used or not c.value else f"{_signed(100 * c.apart[0])} … {_signed(100 * c.apart[1])}",
-                  c.failed or ", ".join(filter(None, ("used here" if c.used else "", "as good as the best" if c.tied else ""))))
-                 for c in result.comparison)
-    errors = Table(("motion by", "fitted [%]", "held out [%]", "held out, minus the one used [%]", ""), rows,
-                   "Relative torque error on the same equations. The differences are intervals of 95 %, by drawing the held-out "
-                   "stretches of time anew, the same ones for both.")
-    good = [c for c in result.comparison if c.value]
-    values = tuple((plain(p.name), *(with_std(c.value[k], c.std[k]) for c in good))
-                   for k, p in enumerate(result.parameters[:len(good[0].value) if good else 0]))
-    beside = Table(("parameter", *(c.method for c in good)), values, "The same parameters, value ± std.")
-    return Section("Four ways to reconstruct the motion", (_winner(result.comparison),), (errors, beside) if good else (errors,))
+    rows = []
+    for c in result.comparison:
+        apart = f"{_signed(100 * c.apart[0])} … {_signed(100 * c.apart[1])}"
+        notes = [(c.used, "used here"), (c.tied, "as good as the best")]
+        said = c.failed or ", ".join(words for true, words in notes if true)
+        errors = (100 * c.identify, 100 * c.validate)
+        rows.append((c.method, *errors, "" if c.used or not c.value else apart, said))
+    columns = ("motion by", "fitted [%]", "held out [%]", "held out, minus the one used [%]", "")
+    caption = (
+        "Relative torque error on the same equations. The differences are intervals of 95 %, by "
+        "drawing the held-out stretches of time anew, the same ones for both."
+    )
+    tables = [Table(columns, tuple(rows), caption)]
+    if good := [c for c in result.comparison if c.value]:
+        values: dict[str, Sequence[Cell]] = {
+            c.method: [with_std(x, s) for x, s in zip(c.value, c.std, strict=True)] for c in good
+        }
+        count = len(good[0].value)
+        names = {"parameter": [figure_in_words(p.name) for p in result.parameters[:count]]}
+        tables.append(columns_table(names | values, "The same parameters, value ± std."))
+    title = "Four ways to reconstruct the motion"
+    return Section(title, _winner(result.comparison), tuple(tables))

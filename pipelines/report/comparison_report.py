@@ -1,28 +1,33 @@
-"""The report of a comparison: the verdict, what only one has, every figure by how far it moved, residuals, what was said."""
+"""The report of a comparison: every figure of two results, the farthest moved first."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
-from pipelines.report.diagnosis_words import at_places, unit_or_dash, without_keys
-from pipelines.report.figure_words import figure_in_words
+from pipelines.report.figures import one_figure
 from pipelines.report.report import Figure as Picture
 from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.style import BLUE, VERMILLION, format_number, three_digits, with_std
+from pipelines.report.sentences import paragraphs, sentence
+from pipelines.report.style import BLUE, VERMILLION, three_digits, with_std
+from pipelines.report.words import at_places, figure_in_words, unit_or_dash, without_keys
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
-
-__all__ = ["Answer", "Comparison", "Figure", "Residual", "comparison_report"]
+    from matplotlib.axes import Axes
 
 _SHOWN = 40  # lines of a table or a figure
-_VERDICTS = {"no-fault-found": "nothing wrong", "cause": "a cause is named", "unknown": "something wrong without a name",
-             "cannot-judge": "cannot be judged"}
-_CIRCLE = "A phase or a direction is the same again after a whole turn: it is away by the shorter way around."
-_MODELS = "The nominal model is the one before any extension; the extended model has the findings and the baseline effects as well."
+_NAMED = 3  # figures in the verdict
+_VERDICTS = {
+    "no-fault-found": "nothing wrong",
+    "cause": "a cause is named",
+    "unknown": "something wrong without a name",
+    "cannot-judge": "cannot be judged",
+}
+
+_paragraphs = partial(paragraphs, "comparison")
 
 
 @dataclass(frozen=True)
@@ -37,7 +42,7 @@ class Figure:
     b_std: float
     away: float  # [std of the difference] b - a
     beyond: bool  # farther than chance moves the farthest of all
-    period: float | None = None  # [unit] of an angle on a circle, of which b - a is the shorter way around; None: of no circle
+    period: float | None = None  # [unit] of an angle: b - a is the shorter way around
 
 
 @dataclass(frozen=True)
@@ -77,54 +82,60 @@ class Comparison:
     only_b: tuple[str, ...]
     residuals: tuple[Residual, ...]
     answers: tuple[Answer, ...]
-    effects_a: tuple[str, ...] = ()  # laws and effects that only the first was fitted with, as commands take them
-    effects_b: tuple[str, ...] = ()  # that only the second was fitted with
+    effects_a: tuple[
+        str, ...
+    ] = ()  # laws and effects that only the first was fitted with, as commands take them
+    effects_b: tuple[str, ...] = ()  # that only the second has
     same: bool = False  # the two are one, to the last digit
-    robots: tuple[str, str] = ("", "")  # whose results they are; empty where one does not say
+    robots: tuple[str, str] = ("", "")  # whose results they are; empty where unknown
 
 
 def comparison_report(result: Comparison) -> Report:
     """The verdict first, then the evidence."""
     tone: Tone = "attention" if result.differ else "good"
-    sections = (_effects(result), _answers(result), _figures(result), _residuals(result), _alone(result))
-    return Report(f"Comparison of two results of {result.compared}", _verdict(result), tone, None,
-                  tuple(section for section in sections if section))
+    sections = [
+        *_effects(result),
+        *_answers(result),
+        *_figures(result),
+        *_residuals(result),
+        *_only_one_has(result),
+    ]
+    title = f"Comparison of two results of {result.compared}"
+    return Report(title, _verdict(result), tone, None, tuple(sections))
 
 
 def _verdict(result: Comparison) -> str:
-    a, b = result.names
-    if result.same:
-        return f"{a} and {b} are the same result, digit by digit: there is nothing to compare."
-    one, other = result.robots
-    two = bool(one and other and one != other)
-    apart = f"They are of two robots, {one} and {other}: a difference is no change of one machine." if two else ""
-    if not result.differ:
-        agree = f"{a} and {b} agree: none of {len(result.figures)} figures differs beyond its uncertainty."
-        return " ".join(filter(None, (agree, apart)))
-    has = [f"{mine} has {words}, which {other} has not." for mine, other, words in (
-        (a, b, _in_words(result.effects_a)), (b, a, _in_words(result.effects_b))) if words]
-    beyond, words = [one for one in result.figures if one.beyond], []
-    if beyond:
-        named = ", ".join(f"{figure_in_words(one.name)} by {format_number(abs(one.away), 2)} std" for one in beyond[:3])
-        more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
-        words.append(f"{len(beyond)} of {len(result.figures)} figures differ beyond their uncertainty: {named}{more}")
-    told = [f"{one.what} ({_spoken(one.a)} in {a}, {_spoken(one.b)} in {b})" for one in result.answers
-            if one.differs and not _said_by(one, result)]
-    if told:
-        words.append(f"their conclusions differ: {'; '.join(told[:2])}")
-    rest = "; ".join(words)
-    return " ".join(filter(None, (f"{a} and {b} differ.", apart, *has, f"{rest[:1].upper()}{rest[1:]}." if rest else "")))
+    (a, b), (one, other) = result.names, result.robots
+    sides = ((a, b, result.effects_a), (b, a, result.effects_b))
+    beyond = [x for x in result.figures if x.beyond]
+    moved = [(figure_in_words(x.name), abs(x.away)) for x in beyond[:_NAMED]]
+    conclusions = [
+        {"what": x.what, "a": _spoken(x.a), "b": _spoken(x.b)}
+        for x in result.answers
+        if x.differs and not _follows_from_effects(x, result)
+    ]
+    return sentence(
+        "comparison",
+        "verdict",
+        result,
+        two_robots=bool(one and other and one != other),
+        effects=[(mine, of, _in_words(effects)) for mine, of, effects in sides if effects],
+        beyond=moved,
+        more=len(beyond) - len(moved),
+        conclusions=conclusions[:2],
+    )
 
 
 def _in_words(effects: Sequence[str]) -> str:
-    """"Coulomb friction at joints 1 and 3, and cogging at joint 2"."""
+    """ "Coulomb friction at joints 1 and 3, and cogging at joint 2"."""
     places = (place.partition(":") for place in effects)
-    *first, last = [words for _, words in at_places((cause, joint) for cause, _, joint in places)] or [""]
+    words = [words for _, words in at_places((cause, joint) for cause, _, joint in places)]
+    *first, last = words or [""]
     return f"{', '.join(first)}, and {last}" if first else last
 
 
-def _said_by(one: Answer, result: Comparison) -> bool:
-    """Return whether two lists of findings differ by nothing but the effects that only one was fitted with."""
+def _follows_from_effects(one: Answer, result: Comparison) -> bool:
+    """Whether two lists of findings differ by the effects that only one has, and nothing else."""
     apart = set(one.a.split(", ")) ^ set(one.b.split(", "))
     return apart - {"none"} <= {*result.effects_a, *result.effects_b}
 
@@ -133,22 +144,23 @@ def _spoken(answer: str) -> str:
     return _VERDICTS.get(answer) or without_keys(answer)
 
 
-def _effects(result: Comparison) -> Section | None:
-    if not (result.effects_a or result.effects_b):
-        return None
-    rows = tuple((name, _in_words(effects) or "none")
-                 for name, effects in zip(result.names, (result.effects_a, result.effects_b), strict=True))
-    text = ("They weigh more than any figure: what the other numbers of such a joint mean changes with them. A Coulomb level "
-            "beside Stribeck friction is not the one without.",)
-    return Section("Laws and effects that only one has", text, (Table(("result", "laws and effects"), rows),))
+def _effects(result: Comparison) -> list[Section]:
+    both = (result.effects_a, result.effects_b)
+    if not any(both):
+        return []
+    rows = tuple((n, _in_words(e) or "none") for n, e in zip(result.names, both, strict=True))
+    table = Table(("result", "laws and effects"), rows)
+    return [Section("Laws and effects that only one has", _paragraphs("effects"), (table,))]
 
 
-def _answers(result: Comparison) -> Section | None:
+def _answers(result: Comparison) -> list[Section]:
     if not result.answers:
-        return None
+        return []
     rows = tuple((one.what, _spoken(one.a), _spoken(one.b)) for one in result.answers)
-    tones: tuple[Tone, ...] = tuple("attention" if one.differs else "neutral" for one in result.answers)
-    return Section("Conclusions", (), (Table(("what", *_heads(result)), rows, tones=tones),))
+    tones: tuple[Tone, ...] = tuple(
+        "attention" if one.differs else "neutral" for one in result.answers
+    )
+    return [Section("Conclusions", (), (Table(("what", *_heads(result)), rows, tones=tones),))]
 
 
 def _heads(result: Comparison) -> tuple[str, str]:
@@ -157,63 +169,66 @@ def _heads(result: Comparison) -> tuple[str, str]:
     return a, b
 
 
-def _figures(result: Comparison) -> Section | None:
+def _figures(result: Comparison) -> list[Section]:
     if not result.figures:
-        return None
-    shown = result.figures[:_SHOWN]
-    rows = tuple((figure_in_words(one.name), with_std(one.a, one.a_std), with_std(one.b, one.b_std), unit_or_dash(one.unit),
-                  round(one.away, 1) if math.isfinite(one.away) else None, "differs" if one.beyond else "") for one in shown)
-    tones: tuple[Tone, ...] = tuple("attention" if one.beyond else "neutral" for one in shown)
-    more = len(result.figures) - len(shown)
-    text = (f"A figure differs where it moved by more than {format_number(result.limit, 3)} std of the difference. Where nothing "
-            f"has changed, that happens to any of these {len(result.figures)} with a probability of "
-            f"{format_number(100.0 * result.alpha, 2)} % at most; the errors of the two are taken to be independent, and the "
-            "stated standard deviations to be right.", *((_CIRCLE,) if any(one.period for one in shown) else ()),
-            *((f"{more} more, all nearer, are in result.json.",) if more > 0 else ()))
-    table = Table(("figure", *_heads(result), "unit", "away [std]", "verdict"), rows, "The farthest first.", tones)
-    return Section("Figures", text, (table,), (_picture(result),))
+        return []
+    shown, rows, tones = result.figures[:_SHOWN], [], list[Tone]()
+    for x in shown:
+        values = (with_std(x.a, x.a_std), with_std(x.b, x.b_std), unit_or_dash(x.unit))
+        away = round(x.away, 1) if math.isfinite(x.away) else None
+        rows.append((figure_in_words(x.name), *values, away, "differs" if x.beyond else ""))
+        tones.append("attention" if x.beyond else "neutral")
+    circle, more = any(x.period for x in shown), len(result.figures) - len(shown)
+    columns = ("figure", *_heads(result), "unit", "away [std]", "verdict")
+    table = Table(columns, tuple(rows), "The farthest first.", tuple(tones))
+    text = _paragraphs("figures", result, circle, more)
+    return [Section("Figures", text, (table,), (_picture(result),))]
 
 
 def _picture(result: Comparison) -> Picture:
     shown = [one for one in result.figures if math.isfinite(one.away)][:_SHOWN]
 
-    def draw(drawing: Drawing) -> None:
-        axes = drawing.subplots()
-        places = range(len(shown))
+    def draw(axes: Axes) -> None:
+        rows = range(len(shown))
         axes.axvspan(-result.limit, result.limit, color="0.92", lw=0)
         axes.axvline(0.0, color="0.6", lw=0.8)
         colours = [VERMILLION if one.beyond else BLUE for one in shown]
-        axes.scatter([one.away for one in shown], places, c=colours, s=14, zorder=3)
-        axes.set_yticks(list(places), [figure_in_words(one.name) for one in shown], fontsize=7)
+        axes.scatter([one.away for one in shown], rows, c=colours, s=14, zorder=3)
+        axes.set_yticks(list(rows), [figure_in_words(one.name) for one in shown], fontsize=7)
         axes.invert_yaxis()
         axes.margins(y=0.02)
         axes.set_xlabel("moved by [std of the difference]")
 
-    height = 0.8 + 0.17 * max(1, len(shown))
-    return Picture("moved", "How far every figure moved; grey is what chance explains.", draw, (6.0, height))
+    caption = "How far every figure moved; grey is what chance explains."
+    return one_figure("moved", caption, draw, 0.8 + 0.17 * max(1, len(shown)))
 
 
-def _residuals(result: Comparison) -> Section | None:
+def _residuals(result: Comparison) -> list[Section]:
     if not result.residuals:
-        return None
+        return []
     changed = sorted(result.residuals, key=lambda one: -abs(_change(one) or 0.0))[:_SHOWN]
-    rows = tuple((figure_in_words(one.name), three_digits(one.a), three_digits(one.b), unit_or_dash(one.unit),
-                  three_digits(_change(one))) for one in changed)
-    more = len(result.residuals) - len(changed)
-    text = ("No standard deviation is known of these, so that they are not judged.",
-            *((_MODELS,) if any("extended model" in one.name for one in changed) else ()),
-            *((f"{more} more are in result.json.",) if more > 0 else ()))
-    table = Table(("residual", *_heads(result), "unit", "change [%]"), rows, "The greatest change first.")
-    return Section("Residuals", text, (table,))
+    rows = []
+    for x in changed:
+        values = (three_digits(x.a), three_digits(x.b), unit_or_dash(x.unit))
+        rows.append((figure_in_words(x.name), *values, three_digits(_change(x))))
+    models = any("extended model" in one.name for one in changed)
+    text = _paragraphs("residuals", models, len(result.residuals) - len(changed))
+    columns = ("residual", *_heads(result), "unit", "change [%]")
+    return [
+        Section("Residuals", text, (Table(columns, tuple(rows), "The greatest change first."),))
+    ]
 
 
 def _change(one: Residual) -> float | None:
     return 100.0 * (one.b / one.a - 1.0) if one.a > 0.0 else None
 
 
-def _alone(result: Comparison) -> Section | None:
-    if not (result.only_a or result.only_b):
-        return None
-    both = zip(result.names, (result.only_a, result.only_b), strict=True)
-    rows = tuple((name, "; ".join(map(figure_in_words, names[:_SHOWN])) or "none") for name, names in both)
-    return Section("Figures that only one has", (), (Table(("result", "figures"), rows),))
+def _only_one_has(result: Comparison) -> list[Section]:
+    both = (result.only_a, result.only_b)
+    if not any(both):
+        return []
+    rows = tuple(
+        (name, "; ".join(map(figure_in_words, names[:_SHOWN])) or "none")
+        for name, names in zip(result.names, both, strict=True)
+    )
+    return [Section("Figures that only one has", (), (Table(("result", "figures"), rows),))]

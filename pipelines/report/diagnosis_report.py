@@ -1,264 +1,435 @@
-"""The report of a diagnosis: verdict, what to check, proof, residual analysis, alternatives, candidates, limits."""
+"""The reports of a diagnosis and of an extension: verdict, proof, residual, candidates, limits."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
 from pipelines.diagnosis.answer import WEAKER
-from pipelines.diagnosis.result import Finding, Rejected, Result, Trial
+from pipelines.diagnosis.result import (
+    DetectionLimit,
+    Diagnosis,
+    Extension,
+    Finding,
+    Rejected,
+    ResidualRms,
+    Result,
+    Trial,
+    Value,
+)
+from pipelines.log.experiment import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.words import within
-from pipelines.report.boundary_card import boundary_card
-from pipelines.report.diagnosis_finding import finding_section, numbers_section
-from pipelines.report.diagnosis_floor import (
-    floor_name,
-    floor_words,
-    held_out_words,
-    judge_words,
-    what_stays,
+from pipelines.report.diagnosis_finding import (
+    all_together,
+    finding_section,
+    gain_table,
+    numbers_section,
+    tip_change,
+    torque_of,
 )
-from pipelines.report.diagnosis_floor import torque_errors as errors_table
-from pipelines.report.diagnosis_limits import limits_sections
 from pipelines.report.diagnosis_picture import picture_sections
-from pipelines.report.diagnosis_words import (
-    as_sentence,
+from pipelines.report.finding_words import how_much, of_any_size, taken_in, where
+from pipelines.report.report import Report, Section, Table, Tone
+from pipelines.report.sections import boundary_card, data_quality
+from pipelines.report.sentences import as_sentence, paragraphs, sentence
+from pipelines.report.style import format_number, format_unit, three_digits, to_one_place
+from pipelines.report.words import (
+    Units,
     at_places,
+    format_value,
+    format_values,
     in_order,
     is_cause,
+    laws_words,
     named,
+    spoken,
+    threshold_words,
     title_of,
     together,
-    told_values,
-    torque_of,
+    unit_or_dash,
+    units_in,
     without_keys,
 )
-from pipelines.report.finding_words import how_much, of_any_size, taken_in, where
-from pipelines.report.joint_units import units_in
-from pipelines.report.model_words import laws_words, threshold_words
-from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number, three_digits
-from pipelines.report.tip_words import all_together, tip_change
 
-__all__ = ["diagnosis_report"]
-
-_LEDGER = 40  # lines
+_CANDIDATES = 40  # lines
 _IN_RUN = "--set diagnose.model=FILE"
-_OUT_OF_REACH = "A threshold above 100 % is shown as a dash: a healthy arm leaves so much of it that such logs cannot show it."
-_TONES: dict[str, Tone] = {"no-fault-found": "good", "cause": "bad", "unknown": "attention", "cannot-judge": "attention"}
+_NEAR = 5  # explanations that are named where none is found
+# Ratio to the noise floor from which the residual of a joint is mentioned: of reference logs, and
+# where the floor is the noise of the residual itself, above which healthy arms lie as well.
+_MENTIONED, _MENTIONED_ABOVE_NOISE = 1.3, 10.0
+_TONES: dict[str, Tone] = {
+    "no-fault-found": "good",
+    "cause": "bad",
+    "unknown": "attention",
+    "cannot-judge": "attention",
+}
+# What of a cause's shape a technician can use; the rest is the form of its law.
+_AT = {
+    "order": "{size} waves {per}",
+    "from_joint": "from joint {size}",
+    "with_joint": "with joint {size}",
+    "link": "of link {size}",
+    "speed": "speed {size} {unit}",
+    "distance": "travel {size} {unit}",
+    "time_constant": "time constant {size} {unit}",
+    "duration": "lasting {size} {unit}",
+    "frequency": "{size} {unit}",
+    "gap": "free play {size} {unit}",
+    "limit": "at {size} {unit}",
+}
+
+_say, _paragraphs = partial(sentence, "diagnosis"), partial(paragraphs, "diagnosis")
 
 
 def diagnosis_report(result: Result) -> Report:
     """Verdict, key figures, findings with their proof, evidence, limits."""
-    units, nominal = units_in(result), result.residual_rms
-    found = [section for number, one in enumerate(result.findings, 1)
-             for section in (finding_section(number, one, nominal, units=units, beside=result.findings,
-                                             left=result.after_rms.validate),
-                             numbers_section(number, one, units, result.findings))]
-    sections = [*boundary_card(result.boundary), *found, *_unknown(result),
-                *picture_sections(result, result.rated, units), *_standing(result), *_others(result),
-                *limits_sections(result), _basis(result), *_doctor(result)]
-    return Report(f"Diagnosis of {result.robot}" if result.robot else "Diagnosis", _verdict(result), _tone(result),
-                  errors_table(nominal, result.after_rms, result.rated, nominal.noise_floor, floor_name(result),
-                               floor_words(result), units),
-                  tuple(sections), _advice(result),
-                  (laws_words(result.laws_of, _IN_RUN, result.fewer_terms), threshold_words(result)))
+    units, nominal, after = units_in(result), result.residual_rms, result.after_rms
+    sections = [*boundary_card(result.boundary)]
+    for number, one in enumerate(result.findings, 1):
+        left = {"beside": result.findings, "left": after.validate}
+        sections.append(finding_section(number, one, nominal, units=units, **left))  # type: ignore[arg-type]
+        sections.append(numbers_section(number, one, units, result.findings))
+    sections += _unknown(result)
+    sections += picture_sections(result, result.rated, units, floor_words(result))
+    sections += [*_baseline(result), *_rejected(result), *_candidates(result)]
+    sections += [*_limits(result), _basis(result), *data_quality(result.data_quality)]
+    name = "noise of the residual" if _is_noise(result) else "left by reference logs"
+    errors = torque_errors(
+        nominal, after, result.rated, nominal.noise_floor, name, floor_words(result), units
+    )
+    title = f"Diagnosis of {result.robot}" if result.robot else "Diagnosis"
+    basis = (laws_words(result.laws_of, _IN_RUN, result.fewer_terms), threshold_words(result))
+    shown, advice = tuple(sections), _advice(result)
+    return Report(title, _verdict(result), _tone(result), errors, shown, advice, basis)
 
 
 def _tone(result: Result) -> Tone:
-    """What machines in order have as well is no fault of this one, unless it has changed, or may be something else."""
-    causes = [cause for one in result.findings for cause in (one.cause, *(alternative.cause for alternative in one.alternatives))]
-    ordinary = result.question != "what has changed" and all(find_effect(cause).parameters.healthy == math.inf for cause in causes)
-    return "attention" if result.verdict == "cause" and ordinary else _TONES[result.verdict]
+    """What healthy machines have as well is a fault only where it changed or may be another."""
+    causes = [one.cause for one in result.findings]
+    causes += [other.cause for one in result.findings for other in one.alternatives]
+    ordinary = all(find_effect(cause).parameters.healthy == math.inf for cause in causes)
+    if result.verdict == "cause" and ordinary and result.question != "what has changed":
+        return "attention"
+    return _TONES[result.verdict]
 
 
 def _verdict(result: Result) -> str:
-    """One sentence; by what it was judged where that is no log of its own; what was not looked for. What to check stands in the
-    first section."""
-    blocks = "" if result.held_out == "logs" else f" Judged by {judge_words(result.held_out)}."
-    causes = ", ".join(dict.fromkeys(within(title_of(cause)) for cause in result.without if is_cause(cause)))
-    return f"{_said(result)}{blocks}{f' Not looked for, because you said so: {causes}.' if causes else ''}"
+    """One sentence; what judged where no log did; what was not looked for."""
+    first, *more = result.findings or (None,)
+    named_first: dict[str, object] = {"first": "", "size": "", "tip": "", "alone": False}
+    if result.verdict == "cause" and first is not None:
+        whole = all_together(result.findings)
+        alone = whole is first.gain  # of the first alone it says nothing of them all
+        named_first = {
+            "first": f"{first.title}{how_much(first)}{where(first)}",
+            "size": _size(first, result) if math.isfinite(first.torque_rms) else "",
+            "tip": "" if alone and more else tip_change(whole),
+            "alone": alone,
+        }
+    unseen = at_places((one.cause, str(one.joint or "")) for one in result.not_identifiable)
+    without = dict.fromkeys(within(title_of(c)) for c in result.without if is_cause(c))
+    return _say(
+        "verdict",
+        result,
+        changed=result.question == "what has changed",
+        reason=without_keys(result.reason),
+        others=_further(more),
+        stays=what_stays(result),
+        unseen=[words for _, words in unseen],
+        without=list(without),
+        **named_first,
+    )
 
 
-def _said(result: Result) -> str:
-    if result.verdict == "no-fault-found":
-        since = " has changed since the reference logs" if result.question == "what has changed" else " is wrong with this arm"
-        caveat = f" {as_sentence(without_keys(result.reason))}" if result.reason else ""
-        beyond = f"{_untold(result)}; what they would have shown, the report lists"
-        return f"Nothing{since}, as far as these logs can tell{beyond}.{caveat}"
-    if result.verdict == "unknown":
-        return f"Something is wrong, and no cause is named: {without_keys(result.reason)}."
-    if result.verdict == "cannot-judge":
-        anything = "has changed since the reference logs" if result.question == "what has changed" else "is wrong with this arm"
-        return f"Whether anything {anything} cannot be judged: {without_keys(result.reason)}."
-    first, *more = result.findings
-    changed = "What has changed: " if result.question == "what has changed" else ""
-    others = f"; and {', '.join(_beside(more))}" if more else ""
-    size = f", {_size(first, result)}" if math.isfinite(first.torque_rms) else ""
-    whole = all_together(result.findings)
-    alone = whole is first.gain
-    change = tip_change(whole) if not (alone and more) else ""  # of the first alone it says nothing of them all
-    moved = f"; with {'it' if alone else 'them'} {change}" if change else ""
-    rest = f" In addition, {without_keys(result.reason)}." if result.reason else ""
-    cause = f"{first.title}{how_much(first)}{where(first)}"
-    return f"{changed}{cause}{size}{moved + others if alone else others + moved}.{rest}{what_stays(result)}"
-
-
-def _untold(result: Result) -> str:
-    """What nobody should take for looked at: of it these logs say nothing."""
-    places = [words for _, words in at_places((one.cause, str(one.joint or "")) for one in result.not_identifiable)]
-    if not places:
-        return ""
-    return f", and they say nothing of {' and '.join(filter(None, (', '.join(places[:-1]), places[-1])))}"
-
-
-def _beside(more: Sequence[Finding]) -> Iterator[str]:
-    """Every further cause once: with its joints, or, where it is at one place alone, with how much of it there is."""
+def _further(more: Sequence[Finding]) -> list[str]:
+    """Every further cause once: with its joints, or with its size where it is at one place."""
+    found = []
     for cause, words in together(more):
         own = [one for one in more if one.cause == cause]
-        yield f"{within(own[0].title)}{how_much(own[0])}{where(own[0])}" if len(own) == 1 else words
-
-
-def _advice(result: Result) -> tuple[str, ...]:
-    """What to look at on the machine, cause by cause."""
-    causes = together(result.findings)
-    several = len(result.findings) > 1
-    return tuple(f"What to check{f' for {words}' if several else ''}: {as_sentence(find_effect(cause).words.remedy)}"
-                 for cause, words in causes)
+        one = own[0]
+        single = f"{within(one.title)}{how_much(one)}{where(one)}"
+        found.append(single if len(own) == 1 else words)
+    return found
 
 
 def _size(one: Finding, result: Result) -> str:
     """Of its torque, and whether the model hid most of it."""
-    if of_any_size(one):
-        return "of a size that these logs do not tell"
-    rated = f" ({format_number(100.0 * one.of_rated, 2)} % of the rated torque)" if math.isfinite(one.of_rated) else ""
-    return f"{torque_of(one, units_in(result))} rms of torque{rated}{taken_in(one, result.residual_rms.identify)}"
+    rated = one.of_rated if math.isfinite(one.of_rated) else None
+    torque, hidden = torque_of(one, units_in(result)), taken_in(one, result.residual_rms.identify)
+    return _say("size", of_any_size(one), torque, rated, hidden)
+
+
+def _advice(result: Result) -> tuple[str, ...]:
+    """What to look at on the machine, cause by cause."""
+    several = len(result.findings) > 1
+    return tuple(
+        f"What to check{f' for {words}' if several else ''}: "
+        f"{as_sentence(find_effect(cause).words.remedy)}"
+        for cause, words in together(result.findings)
+    )
+
+
+def _is_noise(found: Diagnosis) -> bool:
+    """Whether the floor is the noise of the residual: there are no reference logs."""
+    return found.noise_floor_origin == "blocks"
+
+
+def floor_words(found: Diagnosis) -> str:
+    """Return where the noise floor comes from."""
+    return _say("floor", _is_noise(found))
+
+
+def what_stays(found: Diagnosis) -> str:
+    """Return the joints whose residual is still above the noise floor; or nothing."""
+    limit = _MENTIONED_ABOVE_NOISE if _is_noise(found) else _MENTIONED
+    ratio = found.after_rms.validate / np.maximum(found.residual_rms.noise_floor, 1e-300)
+    high = [(j + 1, float(ratio[j])) for j in np.flatnonzero(ratio > limit).tolist()]
+    return _say("stays", _is_noise(found), high)
+
+
+def torque_errors(
+    before: ResidualRms,
+    after: ResidualRms,
+    rated: Sequence[float],
+    floor: Array,
+    name: str,
+    words: str,
+    units: Units = Units(),  # noqa: B008
+) -> Table:
+    """Return the held-out torque error of each joint before and after, beside the noise floor.
+
+    Where nothing extends the model there is no column of the extended one.
+
+    Args:
+        floor: (joints,) [N m]; `name`: what it is called; `words`: where it comes from.
+    """
+    extended = not np.array_equal(before.validate, after.validate, equal_nan=True)
+    errors = [before.validate, after.validate] if extended else [before.validate]
+    joints = len(floor)
+    limits = [x if math.isfinite(x) else math.nan for x in [*rated, *[math.nan] * joints][:joints]]
+    shares = to_one_place(
+        [100.0 * float(x) / y for e in errors for x, y in zip(e, limits, strict=True)]
+    )
+    torques = to_one_place([float(x) for values in (*errors, floor) for x in values])
+    rows = tuple((j + 1, *torques[j::joints], *shares[j::joints]) for j in range(joints))
+    unit = units.torque
+    heads: tuple[str, ...] = (f"torque error [{unit}]", f"{name} [{unit}]", "error [% of rated]")
+    if extended:
+        heads = (f"torque error now [{unit}]", f"extended [{unit}]", f"{name} [{unit}]")
+        heads += ("now [% of rated]", "extended [% of rated]")
+    return Table(("joint", *heads), rows, f"Held out, root mean square. {words}".strip())
+
+
+def _percent(x: float) -> float | None:
+    return round(100.0 * x, 2) if math.isfinite(x) else None
 
 
 def _reachable(threshold: float) -> float | None:
-    """[%] a threshold, where anything could exceed it: no gain is more than the whole residual."""
-    return _hundredths(100.0 * threshold) if threshold <= 1.0 else None
-
-
-def _hundredths(x: float) -> float | None:
-    return round(x, 2) if math.isfinite(x) else None
+    """[%] a threshold, where anything could exceed it: no gain is more than all the residual."""
+    return _percent(threshold) if threshold <= 1.0 else None
 
 
 def _unknown(result: Result) -> list[Section]:
+    """The nearest explanations, and which signals the residual goes with, where none is named."""
     if result.verdict != "unknown":
         return []
-    near = sorted(_nearest(result.candidate_causes).items(), key=lambda one: -one[1])[:5]
-    names = ", ".join(f"{named(*place)} ({format_number(100.0 * gain, 3)} % of the residual)" for place, gain in near)
-    tried = f" The nearest explanations, not named: {names}." if near else ""
-    return [Section("Why there is no name", (
-        as_sentence(without_keys(result.reason)) + tried, *_follows(result),
-        "A wrong name costs more than none. The residual analysis shows where and when the residual exceeds the noise floor."))]
-
-
-def _follows(result: Result) -> Iterator[str]:
-    """Which signals the joint that is farthest above its floor goes with most."""
-    for one in result.evidence[:1]:
+    gains = sorted(_nearest(result.candidate_causes).items(), key=lambda item: -item[1])[:_NEAR]
+    near = [(named(*place), gain) for place, gain in gains]
+    joint, curves = 0, []
+    if result.evidence:
+        one = result.evidence[0]
         joint = int(np.argmax(np.nan_to_num(one.above_noise_floor))) + 1
-        curves = sorted((c for c in one.curves if c.joint == joint), key=lambda c: -c.explained)[:3]
-        if curves:
-            said = ", ".join(f"{c.against} ({format_number(100.0 * c.explained, 2)} % of its power)" for c in curves)
-            yield f"The residual of joint {joint} goes most with {said}."
+        own = [c for c in one.curves if c.joint == joint]
+        curves = sorted(own, key=lambda c: -c.explained)[:3]
+    text = _paragraphs("unknown", without_keys(result.reason), near, joint, curves)
+    return [Section("Why there is no name", text)]
 
 
-def _nearest(ledger: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
-    """What each cause takes off the residual at most; to first order where it was not fitted, for it stayed below its threshold."""
+def _nearest(candidates: Iterable[Trial]) -> dict[tuple[str, int | None], float]:
+    """What each cause takes off the residual at most; to first order where it was not fitted."""
     found: dict[tuple[str, int | None], float] = {}
-    for t in ledger:
+    for t in candidates:
         gain = t.exact_gain if math.isfinite(t.exact_gain) else t.gain
         if gain > found.get((t.cause, t.joint), 0.0):
             found[t.cause, t.joint] = gain
     return found
 
 
-def _standing(result: Result) -> list[Section]:
+def _baseline(result: Result) -> list[Section]:
     if not result.baseline_effects:
         return []
-    rows = tuple((title_of(one.cause), one.joint, told_values(in_order(one.cause, one.parameters)),
-                  three_digits(100.0 * one.explained)) for one in result.baseline_effects)
-    return [Section("Baseline effects", ("The reference logs show them as well; the extended model has them.",),
-                    (Table(("effect", "joint", "parameters", "explains [%]"), rows),))]
+    rows = []
+    for one in result.baseline_effects:
+        parameters = format_values(in_order(one.cause, one.parameters))
+        share = three_digits(100.0 * one.explained)
+        rows.append((title_of(one.cause), one.joint, parameters, share))
+    table = Table(("effect", "joint", "parameters", "explains [%]"), tuple(rows))
+    text = "The reference logs show them as well; the extended model has them."
+    return [Section("Baseline effects", (text,), (table,))]
 
 
-def _others(result: Result) -> list[Section]:
-    """Rejected hypotheses and the ledger."""
-    sections = []
-    if result.rejected:
-        sections.append(Section("Rejected", (_refused(result.rejected),), (Table(("causes", "why"), _folded(result.rejected)),)))
-    shown = [t for t in result.candidate_causes if t.accepted or math.isfinite(t.exact_gain)]
-    shown += [t for t in sorted(result.candidate_causes, key=lambda t: -t.gain) if t not in shown][:max(0, _LEDGER - len(shown))]
-    if shown:
-        rows = tuple((t.step, title_of(t.cause), t.joint, _hundredths(100.0 * t.gain), _reachable(t.threshold),
-                      _hundredths(100.0 * t.exact_gain), _outcome(t, result))
-                     for t in sorted(shown[:_LEDGER], key=lambda t: (t.step, -t.gain)))
-        tones: tuple[Tone, ...] = tuple("good" if row[-1] == "accepted" else "neutral" for row in rows)
-        more = len(result.candidate_causes) - len(rows)
-        text = (f"{more} more, all weaker, are in result.json.",) if more > 0 else ()
-        sections.append(Section("Candidate causes", text, (Table(
-            ("search", "cause", "joint", "gain in square [%]", "threshold [%]", "gain in square, fitted exactly [%]",
-             "outcome"), rows,
-            "Gain in square: share of the squared residual of the fitted logs that each takes away; what does not exceed its "
-            f"threshold is not accepted, nor what held-out time does not confirm. {_OUT_OF_REACH} "
-            "So is that of a cause that takes next to nothing: none was computed."
-            f"{_alike(len(result.residual_rms.identify))}", tones),)))
-    return sections
+def _rejected(result: Result) -> list[Section]:
+    """A line for each reason with all causes it holds for, those that are only weaker last."""
+    rejected: Sequence[Rejected] = result.rejected
+    if not rejected:
+        return []
+    reasons = sorted({one.reason: None for one in rejected}, key=lambda reason: reason == WEAKER)
+    rows = []
+    for reason in reasons:
+        causes = together(one for one in rejected if one.reason == reason)
+        rows.append(("; ".join(words for _, words in causes), without_keys(reason)))
+    weaker = sum(one.reason == WEAKER for one in rejected)
+    text = _paragraphs("rejected", weaker, len(rejected) - weaker, WEAKER)
+    return [Section("Rejected", text, (Table(("causes", "why"), tuple(rows)),))]
+
+
+def _candidates(result: Result) -> list[Section]:
+    """Those that were fitted, and of the others the best."""
+    everything = result.candidate_causes
+    shown = [t for t in everything if t.accepted or math.isfinite(t.exact_gain)]
+    others = sorted((t for t in everything if t not in shown), key=lambda t: -t.gain)
+    shown = [*shown, *others[: max(0, _CANDIDATES - len(shown))]]
+    if not shown:
+        return []
+    rows = []
+    for t in sorted(shown[:_CANDIDATES], key=lambda t: (t.step, -t.gain)):
+        gains = (_percent(t.gain), _reachable(t.threshold), _percent(t.exact_gain))
+        rows.append((t.step, title_of(t.cause), t.joint, *gains, _outcome(t, result)))
+    tones: tuple[Tone, ...] = tuple("good" if r[-1] == "accepted" else "neutral" for r in rows)
+    more = len(everything) - len(rows)
+    text = (f"{more} more, all weaker, are in result.json.",) if more > 0 else ()
+    columns: tuple[str, ...] = ("search", "cause", "joint", "gain in square [%]", "threshold [%]")
+    columns += ("gain in square, fitted exactly [%]", "outcome")
+    caption = _say("candidates", len(result.residual_rms.identify))
+    return [Section("Candidate causes", text, (Table(columns, tuple(rows), caption, tones),))]
 
 
 def _outcome(trial: Trial, result: Result) -> str:
-    """What a search has taken up is not named for that: the time held out has its say."""
+    """A cause that the search took is not named for that: held-out time decides."""
     if not trial.accepted:
         return without_keys(trial.reason)
-    named = any((one.cause, one.joint) == (trial.cause, trial.joint) for one in result.findings)
-    return "accepted" if named else "fitted by the search, not named"
-
-
-def _refused(rejected: Sequence[Rejected]) -> str:
-    """How close they came: most were not even tried, for others took more off the residual."""
-    weaker = sum(one.reason == WEAKER for one in rejected)
-    if not weaker:
-        return "They came close, and were not accepted."
-    more = len(rejected) - weaker
-    rest = f" The other {more if more > 1 else 'one'} came close, and {'were' if more > 1 else 'was'} not accepted." if more else ""
-    which = "Each of these" if not more else f"{weaker} of these are {WEAKER}: each" if weaker > 1 else f"One is {WEAKER}: it"
-    return (f"{which} takes more than its threshold off the residual in some search, but others take more and were tried "
-            f"instead.{rest}")
-
-
-def _folded(rejected: Sequence[Rejected]) -> tuple[tuple[str, str], ...]:
-    """A line for each reason with all causes it holds for, those that are only weaker last: every one stands in result.json."""
-    reasons = sorted(dict.fromkeys(one.reason for one in rejected), key=lambda reason: reason == WEAKER)
-    return tuple(("; ".join(words for _, words in together(one for one in rejected if one.reason == reason)), without_keys(reason))
-                 for reason in reasons)
-
-
-def _alike(joints: int) -> str:
-    """Why the share of a cause that explains everything at its joint is far from 100 %."""
-    if joints < 2:
-        return ""
-    return (f" Each joint is weighed by its own residual: of {joints} joints, what explains all at one and nothing elsewhere takes "
-            f"away {format_number(100.0 / joints, 2)} %.")
+    is_named = any((f.cause, f.joint) == (trial.cause, trial.joint) for f in result.findings)
+    return "accepted" if is_named else "fitted by the search, not named"
 
 
 def _basis(result: Result) -> Section:
     """Where floor and thresholds come from, and what judged."""
-    text = [laws_words(result.laws_of, _IN_RUN, result.fewer_terms), floor_words(result), held_out_words(result.held_out),
-            threshold_words(result)]
-    best: dict[tuple[str, int | None], float] = {(one.cause, one.joint): one.gain for one in result.thresholds
-                                                    if math.isfinite(one.gain)}
-    rows = tuple((title_of(cause), joint, _reachable(gain)) for (cause, joint), gain in sorted(
-        best.items(), key=lambda item: (item[0][0], item[0][1] or 0)))
-    table = Table(("cause", "joint", "share of the squared residual to exceed [%]"), rows,
-                  f"Thresholds of what these logs can show. {_OUT_OF_REACH}")
-    return Section("What this rests on", tuple(text), (table,) if rows else ())
+    text = (
+        laws_words(result.laws_of, _IN_RUN, result.fewer_terms),
+        floor_words(result),
+        _say("held_out", result.held_out),
+        threshold_words(result),
+    )
+    best = {(t.cause, t.joint): t.gain for t in result.thresholds if math.isfinite(t.gain)}
+    ordered = sorted(best.items(), key=lambda item: (item[0][0], item[0][1] or 0))
+    rows = tuple((title_of(cause), joint, _reachable(gain)) for (cause, joint), gain in ordered)
+    columns = ("cause", "joint", "share of the squared residual to exceed [%]")
+    caption = f"Thresholds of what these logs can show. {_say('out_of_reach')}"
+    return Section("What this rests on", text, (Table(columns, rows, caption),) if rows else ())
 
 
-def _doctor(result: Result) -> Iterable[Section]:
-    if result.data_quality:
-        yield Section("Data quality", (), (checks_table(result.data_quality),))
+def _limits(result: Diagnosis) -> list[Section]:
+    """The smallest of each cause that would have been found, and what to record for the others."""
+    sections = []
+    if result.detection_limits:
+        rows = tuple(
+            (title_of(one.cause), one.joint, spoken(one.parameter), *_smallest(one))
+            for one in result.detection_limits
+        )
+        table = Table(("cause", "joint", "parameter", "smallest", "unit", "at"), rows)
+        sections.append(Section("Detection limits", _paragraphs("limits"), (table,)))
+    if result.not_identifiable:
+        hidden = tuple(
+            (title_of(one.cause), one.joint, without_keys(one.reason), without_keys(one.record))
+            for one in result.not_identifiable
+        )
+        table = Table(("cause", "joint", "why", "what to record"), hidden)
+        text = ("Neither found nor excluded.",)
+        sections.append(Section("What these logs cannot tell", text, (table,)))
+    if result.without_limit:
+        rest = tuple((title_of(o.cause), without_keys(o.reason)) for o in result.without_limit)
+        table = Table(("cause", "what is known of it"), rest)
+        text = ("Of these no smallest size that would have been found is known.",)
+        sections.append(Section("No detection limit available", text, (table,)))
+    return sections
+
+
+def _shape(at: Mapping[str, Value]) -> str:
+    """For which waves, joint, speed or time it is, in words."""
+    return ", ".join(
+        _AT[name].format(
+            size=format_number(value.value, 3),
+            unit=format_unit(value.unit),
+            per="a turn" if value.unit == "1/rev" else "in 2π m",
+        )
+        for name, value in at.items()
+        if name in _AT and isinstance(value.value, int | float)
+    )
+
+
+def _smallest(one: DetectionLimit) -> tuple[str, ...]:
+    """Value, unit, and for what it is; words where nothing that is expected would show."""
+    value = one.minimum.value
+    parameters = [q for q in find_effect(one.cause).parameters if q.name == one.parameter]
+    ends = [abs(end) for q in parameters for end in (q.low, q.high) if end]
+    if isinstance(value, float) and ends and not one.or_less and value >= min(ends):
+        return "cannot be seen", "", ""
+    shown = format_number(value, 2) if isinstance(value, float) else format_value(one.minimum)
+    unit = unit_or_dash(one.minimum.unit)
+    return shown, unit, "this or less" if one.or_less else _shape(one.at)
+
+
+def extension_report(result: Extension) -> Report:
+    """Verdict, key figures, one section a cause, what was refused."""
+    units, before = units_in(result), result.residual_rms
+    sections = [*_not_accepted(result)]
+    for number, one in enumerate(result.findings, 1):
+        sections.append(finding_section(number, one, before, False, "the noise", units))
+        sections.append(numbers_section(number, one, units))
+    sections += [_extension_basis(result, units), *data_quality(result.data_quality)]
+    tone: Tone = "good" if result.accepted else "attention" if result.findings else "bad"
+    words = f"{_extension_now(result)} {_say('extension_noise')}".strip()
+    floor, name = before.noise_floor, "noise of the residual"
+    errors = torque_errors(before, result.after_rms, result.rated, floor, name, words, units)
+    title = f"Extension of {result.robot}" if result.robot else "Extension"
+    basis = (laws_words(result.laws_of, fewer=result.fewer_terms),)
+    return Report(title, _extension_verdict(result), tone, errors, tuple(sections), basis=basis)
+
+
+def _extension_now(result: Extension) -> str:
+    """Whose error "now" is, as the same figure of `diagnose` may differ from it."""
+    if not result.findings:
+        return ""
+    loads = [o for o in result.findings if o.origin == "base parameters"]
+    return _say("extension_now", named(loads[0].cause, loads[0].joint) if loads else "")
+
+
+def _extension_verdict(result: Extension) -> str:
+    refused = [words for _, words in together(result.rejected)]
+    found = [words for _, words in together(result.findings)]
+    reason = result.rejected[0].reason if result.rejected else "no cause was named"
+    tip = "" if result.gain is None else tip_change(result.gain)
+    return _say("extension", result, found, refused, without_keys(reason), tip)
+
+
+def _not_accepted(result: Extension) -> list[Section]:
+    if not result.rejected:
+        return []
+    rows = tuple((title_of(o.cause), o.joint, without_keys(o.reason)) for o in result.rejected)
+    text = "The held-out logs do not bear it out. There is no way around that."
+    return [Section("Not accepted", (text,), (Table(("cause", "joint", "why"), rows),))]
+
+
+def _extension_basis(result: Extension, units: Units) -> Section:
+    laws = laws_words(result.laws_of, fewer=result.fewer_terms)
+    baseline = [without_keys(name) for name in result.baseline_effects]
+    text = _paragraphs("extension_basis", laws, result, baseline)
+    tables: tuple[Table, ...] = ()
+    if result.gain is not None and len(result.findings) > 1:
+        caption = "Gain of all accepted causes together, on held-out time, root mean square."
+        tables = (gain_table(result.gain, caption, units),)
+    return Section("What this rests on", text, tables)

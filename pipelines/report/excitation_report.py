@@ -1,129 +1,187 @@
-"""The report on a designed experiment: what it will tell, how near it comes to its limits, and what was not checked."""
+"""The report on a designed experiment: what it will show, how near it comes to its limits."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipelines.model.excitation.apart import Apart
 from pipelines.model.excitation.doubts import beyond_words
 from pipelines.model.excitation.result import DrawnPlan, Result
-from pipelines.report.excitation_apart import alike_words, apart_section, are_rivals
-from pipelines.report.excitation_figures import limited_figure, relative_std_figure, singular_value_figure, spectrum_figure
-from pipelines.report.excitation_smaller import much_smaller, smaller_words
-from pipelines.report.joint_units import unit_of
-from pipelines.report.report import Figure, Report, Section, Table, Tone
-from pipelines.report.sections import joint_signal_figure
-from pipelines.report.style import format_number, format_unit
+from pipelines.report import style
+from pipelines.report.figures import (
+    Array,
+    envelope,
+    joint_signal_figure,
+    one_figure,
+    rows_figure,
+)
+from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
+from pipelines.report.sections import NO_COLLISION_CHECK
+from pipelines.report.sentences import paragraphs, sentence
+from pipelines.report.style import format_number, format_unit, printable
+from pipelines.report.words import unit_of, without_keys
 
-__all__ = ["excitation_report"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-_UNCHECKED = "Self-collision is not checked, nor is collision with anything around the robot."
-_AIMS = {"A": "smallest relative std", "D": "smallest confidence ellipsoid", "E": "best known worst direction",
-         "condition": "smallest condition number", "frobenius": "smallest Frobenius condition number"}
 _DRAWN_PLANS = 6
 _NEAR_BOUND = 1.5  # times: what is farther from the bound is no percentage of it
 _DEAR = 0.02  # share of the cost that is worth naming
+_RIVALS = 0.8  # similarity from which two causes explain the same
+_SHOWN = 5e-5  # of the size of a motion: a smaller change is not shown
+_MUCH = 0.01  # of the size of a motion: a larger change belongs into the verdict
+_WIDE = 30.0  # ratio from which a scale must be logarithmic
+_WORTH = 0.6  # of a limit: where a signal stays farther away, drawing it would flatten the signal
+
+_say, _paragraphs = partial(sentence, "excitation"), partial(paragraphs, "excitation")
 
 
 def excitation_report(result: Result) -> Report:
-    """The motion, its limits, what it tells; of other experiments their plans."""
+    """The motion, its limits, what it shows; of other experiments their plans."""
     if result.purpose != "excitation":
         return _plans_report(result)
-    sections = (_safety(result), _motion(result), _limits(result), _told(result), apart_section(result.apart), _certificate(result),
-                _comparison(result))
-    return Report("Excitation", _verdict(result), _tone(result), _key_figures(result), tuple(s for s in sections if s is not None),
-                  basis=(_robot(result),))
+    sections = (
+        _safety(result),
+        _motion(result),
+        _limits(result),
+        _shows(result),
+        _apart_section(result.apart),
+        _certificate(result),
+        _comparison(result),
+    )
+    smaller = _smaller(result) if result.shrunk < 1.0 - _MUCH else ""
+    alike = "" if result.apart is None else _alike(result.apart)
+    verdict = _say("verdict", result, alike, smaller, _trouble(result))
+    shown = tuple(section for section in sections if section is not None)
+    basis, key = (_say("robot", result),), _key_figures(result)
+    return Report("Excitation", verdict, _tone(result), key, shown, basis=basis)
 
 
 def _tone(result: Result) -> Tone:
     found = result.rehearsal
-    if not result.reached or result.interrupted or result.rehearsal_failed or (found is not None and not found.safe):
-        return "attention"
-    if are_rivals(result.apart):
-        return "attention"
-    return "good" if result.torque_checked else "attention"
+    open_ = not result.reached or result.interrupted or bool(result.rehearsal_failed)
+    unsafe = (found is not None and not found.safe) or not result.torque_checked
+    return "attention" if open_ or unsafe or _are_rivals(result.apart) else "good"
 
 
-def _verdict(result: Result) -> str:
-    said = [f"The excitation has the condition number {format_number(result.condition_number)}"]
-    if result.predicted_relative_std is not None and result.torque_checked:
-        said.append(f"and will show the parameters to {format_number(100 * result.predicted_relative_std, 3)} % (predicted, root "
-                    "mean square of their relative standard deviations)")
-    text = " ".join(said)
-    if result.apart is not None:
-        text += f"; {alike_words(result.apart)}"
-    if much_smaller(result):
-        text += f"; {smaller_words(result)}"
-    if not result.reached and result.ceiling is not None:
-        dear = result.dearest
-        text += f"; a condition number of {result.ceiling:g} was not reached{f', the {dear} is most in the way' if dear else ''}"
-    if not result.torque_checked:
-        text += "; torque limits could not be checked, for neither a model nor the links are known"
-    if result.rehearsal is not None and (trouble := beyond_words(result.joints, result.rehearsal)):
-        text += f"; in the rehearsal {', '.join(trouble)}"
-    if result.interrupted:
-        text += "; the work was interrupted, this is its best by then"
-    return text + "."
+def _trouble(result: Result) -> list[str]:
+    if result.rehearsal is None:
+        return []
+    return list(beyond_words(result.joints, result.rehearsal))
 
 
-def _robot(result: Result) -> str:
-    """For which robot, and why that one where none was named."""
-    return f"For the robot {result.robot}{f' ({result.robot_from})' if result.robot_from else ''}."
+def _smaller(result: Result) -> str:
+    """By how much the motion was made smaller after its search; empty where it was not."""
+    less = 1.0 - result.shrunk
+    return "" if less < _SHOWN else _say("smaller", less, result.shrunk_for)
+
+
+def _are_rivals(found: Apart | None) -> bool:
+    """Whether a diagnosis of the log would call the two causes alternatives."""
+    return found is not None and found.after.similarity > _RIVALS
+
+
+def _alike(found: Apart) -> str:
+    """How alike two causes look, and whether the plain design was kept."""
+    before, after = (_similarity(one.similarity) for one in (found.before, found.after))
+    a, b = map(without_keys, found.causes)
+    return _say("alike", a, b, before, after, found.changed, _RIVALS, _are_rivals(found))
+
+
+def _similarity(similarity: float) -> str:
+    """With as many digits as it takes to be on its own side of what makes alternatives."""
+    for digits in (2, 3):
+        shown = float(f"{similarity:.{digits}g}")
+        if shown != _RIVALS and (shown > _RIVALS) == (similarity > _RIVALS):
+            return format_number(similarity, digits)
+    return format_number(similarity, 4)
+
+
+def _apart_section(found: Apart | None) -> Section | None:
+    """How well two causes can be told apart in it."""
+    if found is None:
+        return None
+    judged = [("this design", found.after)]
+    if found.changed:
+        judged.insert(0, ("design for the parameters alone", found.before))
+    a, b = map(without_keys, found.causes)
+    table = Table(
+        ("motion", "similarity", f"{a}, visible", f"{b}, visible", "condition number"),
+        tuple((n, x.similarity, *x.identifiability, x.condition_number) for n, x in judged),
+    )
+    return Section(f"Telling {a} from {b}", _paragraphs("apart", _RIVALS), (table,))
 
 
 def _key_figures(result: Result) -> Table:
-    start = "at rest at home" if result.home is not None and not result.run_in else (
-        f"run-in and run-out of {result.run_in:.3g} s" if result.run_in else "at rest")
-    rows: list[tuple[str, str | float | int | None]] = [
-        ("aim", _aim(result)), ("condition number of Φ", result.condition_number)]
+    run_in = f"{result.run_in:.3g} s" if result.run_in else ""
+    start = f"run-in and run-out of {run_in}" if run_in else "at rest"
+    if result.home is not None and not run_in:
+        start = "at rest at home"
+    duration = f"{result.periods} × {result.period:g} s"
+    rows: list[tuple[str, Cell]] = [
+        ("aim", _say("aim", result)),
+        ("condition number of Φ", result.condition_number),
+    ]
     if result.lower_bound is not None:
         rows.append(("no motion of this arm can be below", result.lower_bound))
     if result.torque_checked:
-        rows.append(("relative standard deviation, predicted [%]", 100 * (result.predicted_relative_std or math.nan)))
-    rows += [("Frobenius condition number", result.frobenius), ("smallest singular value of Φ/√n", result.smallest_singular_value),
-             ("log det of the information matrix", result.log_determinant),
-             ("duration", f"{result.periods} × {result.period:g} s{f' and twice {result.run_in:.3g} s' if result.run_in else ''}"),
-             ("highest harmonic [Hz]", result.top_hz), ("start and end", start),
-             ("evaluations, seed", f"{result.evaluations}, {result.seed}")]
+        predicted = 100 * (result.predicted_relative_std or math.nan)
+        rows.append(("relative standard deviation, predicted [%]", predicted))
+    rows += [
+        ("Frobenius condition number", result.frobenius),
+        ("smallest singular value of Φ/√n", result.smallest_singular_value),
+        ("log det of the information matrix", result.log_determinant),
+        ("duration", f"{duration} and twice {run_in}" if run_in else duration),
+        ("highest harmonic [Hz]", result.top_hz),
+        ("start and end", start),
+        ("evaluations, seed", f"{result.evaluations}, {result.seed}"),
+    ]
     if result.after:
         rows.append(("information added of", ", ".join(result.after[:6])))
     if result.first_mode is not None:
-        rows.append((f"first mode known; no harmonic above 1/{result.mode_factor:g} of it [Hz]", result.first_mode))
+        name = f"first mode known; no harmonic above 1/{result.mode_factor:g} of it [Hz]"
+        rows.append((name, result.first_mode))
     return Table(("what", "figure"), tuple(rows))
 
 
-def _aim(result: Result) -> str:
-    aim = _AIMS["A" if result.criterion == "default" else result.criterion]
-    return aim if result.ceiling is None else f"{aim}, condition ≤ {result.ceiling:g}"
-
-
 def _safety(result: Result) -> Section:
-    text, tables = [_robot(result)], []
+    text = _paragraphs("safety", result, _trouble(result))
+    tables = (_rehearsal_table(result),) if result.rehearsal is not None else ()
+    return Section("Before the robot moves", text, tables, warning=NO_COLLISION_CHECK)
+
+
+def _rehearsal_table(result: Result) -> Table:
     found = result.rehearsal
-    if found is None:
-        text.append(f"The rehearsal in simulation failed: {result.rehearsal_failed}." if result.rehearsal_failed else
-                    "It was not rehearsed in simulation, for no model of the arm is known."
-                    if not result.torque_checked or result.torque_bounded else
-                    "It was not rehearsed in simulation.")
-    else:
-        end = ", ".join(beyond_words(result.joints, found)) or "no drive saturates, no joint exceeds its speed or its range"
-        part = f"one of its {result.periods} periods, {found.seconds:.3g} s" if result.periods > 1 else f"its {found.seconds:.3g} s"
-        part += " with run-in and run-out" if result.periods > 1 and result.run_in else ""
-        text.append(f"Rehearsed in simulation, {part}, under PD control of 8 Hz a joint, without feed-forward: {end}. Another "
-                    "controller will follow otherwise.")
-        if found.position_beyond is None:
-            text.append("How near the joints came to the ends of their ranges is not known.")
-        position, torque, speed = (unit_of(result.limits, quantity) for quantity in ("position", "torque", "speed"))
-        past = found.position_beyond or (math.nan,) * len(result.joints)
-        tables.append(Table(("joint", f"away, rms [{position}]", f"away, most [{position}]", f"torque, peak [{torque}]",
-                             f"limit [{torque}]", "used [%]", f"speed, peak [{speed}]", f"limit [{speed}]", "used [%]",
-                             f"left of its range [{position}]", "saturated [%]"), tuple(
-            (name, found.position_rms[j], found.position_max[j], found.torque_peak[j], found.torque_limit[j],
-             100 * found.torque_peak[j] / found.torque_limit[j], found.speed_peak[j], found.speed_limit[j],
-             100 * found.speed_peak[j] / found.speed_limit[j], None if math.isnan(past[j]) else -past[j],
-             100 * found.saturated[j]) for j, name in enumerate(result.joints))))
-    return Section("Before the robot moves", tuple(text), tuple(tables), warning=_UNCHECKED)
+    assert found is not None
+    position, torque, speed = (unit_of(result.limits, q) for q in ("position", "torque", "speed"))
+    rows = []
+    for j, name in enumerate(result.joints):
+        beyond = math.nan if found.position_beyond is None else found.position_beyond[j]
+        peak, limit = found.torque_peak[j], found.torque_limit[j]
+        fastest, allowed = found.speed_peak[j], found.speed_limit[j]
+        away = (found.position_rms[j], found.position_max[j])
+        used = (peak, limit, 100 * peak / limit, fastest, allowed, 100 * fastest / allowed)
+        left = None if math.isnan(beyond) else -beyond
+        rows.append((name, *away, *used, left, 100 * found.saturated[j]))
+    columns = (
+        "joint",
+        f"away, rms [{position}]",
+        f"away, most [{position}]",
+        f"torque, peak [{torque}]",
+        f"limit [{torque}]",
+        "used [%]",
+        f"speed, peak [{speed}]",
+        f"limit [{speed}]",
+        "used [%]",
+        f"left of its range [{position}]",
+        "saturated [%]",
+    )
+    return Table(columns, tuple(rows))
 
 
 def _ends(result: Result, quantity: str) -> tuple[list[float], list[float]]:
@@ -131,9 +189,10 @@ def _ends(result: Result, quantity: str) -> tuple[list[float], list[float]]:
     low, high = [-math.inf] * len(result.joints), [math.inf] * len(result.joints)
     for one in result.limits:
         if one.quantity == quantity and one.joint is not None:
-            (high if one.limit > 0.0 else low)[one.joint - 1] = one.limit
+            own, other = (high, low) if one.limit > 0.0 else (low, high)
+            own[one.joint - 1] = one.limit
             if quantity != "position":  # the other end is as far
-                (low if one.limit > 0.0 else high)[one.joint - 1] = -one.limit
+                other[one.joint - 1] = -one.limit
     return low, high
 
 
@@ -141,156 +200,239 @@ def _motion(result: Result) -> Section | None:
     c = result.course
     if c is None:
         return None
-    own = {quantity: format_unit(unit_of(result.limits, quantity)) for quantity in ("position", "speed", "acceleration", "torque")}
-    kinds = [("position", "positions", c.q, f"position [{own['position']}]", "Positions over one period."),
-             ("speed", "speeds", c.dq, f"speed [{own['speed']}]", "Speeds; dashed, limits that are near."),
-             ("acceleration", "accelerations", c.ddq, f"acceleration [{own['acceleration']}]",
-              "Accelerations; dashed, limits that are near.")]
+    near = "dashed, limits that are near"
+    share = f"{100 * result.torque_share:.0f} % of the limits, what the plan may use"
+    kinds = [
+        ("position", c.q, "Positions over one period."),
+        ("speed", c.dq, f"Speeds; {near}."),
+        ("acceleration", c.ddq, f"Accelerations; {near}."),
+    ]
     if c.tau is not None:
-        kinds.append(("torque", "torques", c.tau, f"torque [{own['torque']}]", f"Torques that the model expects; dashed, "
-                      f"{100 * result.torque_share:.0f} % of the limits, what the plan may use."))
-    figures: list[Figure] = []
-    for quantity, name, values, label, caption in kinds:
-        low, high = _ends(result, quantity)
-        figures.append(limited_figure(name, caption, c.t, values, low, high, label, result.joints))
+        kinds.append(("torque", c.tau, f"Torques that the model expects; dashed, {share}."))
+    figures = []
+    for quantity, values, caption in kinds:
+        label = f"{quantity} [{unit_of(result.limits, quantity)}]"
+        ends = _ends(result, quantity)
+        figures.append(
+            _limited_figure(f"{quantity}s", caption, c.t, values, ends, label, result.joints)
+        )
     shown = c.amplitude.max(axis=1) > 1e-12
-    figures.append(spectrum_figure("spectrum", "Which frequencies move each joint: amplitude of its speed.", c.hertz[shown],
-                                   c.amplitude[shown], result.joints))
-    return Section("The motion", (), (), tuple(figures))
+    caption = "Which frequencies move each joint: amplitude of its speed."
+    figures.append(_spectrum_figure(caption, c.hertz[shown], c.amplitude[shown], result.joints))
+    return Section("The motion", figures=tuple(figures))
 
 
 def _limits(result: Result) -> Section:
-    rows = tuple(("tip" if one.joint is None else result.joints[one.joint - 1], one.quantity, one.peak, one.limit,
-                  format_unit(one.unit),
-                  100 * one.share, 100 * one.cost) for one in result.limits)
-    dear = [one for one in sorted(result.limits, key=lambda one: -one.cost) if one.cost > _DEAR][:3]
-    named = ", ".join(f"{one.quantity} of {'the tip' if one.joint is None else result.joints[one.joint - 1]}" for one in dear)
-    text = ["Limits hold between samples too: positions, speeds and accelerations are trigonometric polynomials, and on a grid of "
-            "0.1 ms these exceed their largest sample by a known factor at most; of torque and tip half a step between samples is "
-            "added."]
-    if smaller := smaller_words(result):
-        text.append(f"{smaller[0].upper()}{smaller[1:]}.")
-    if named:
-        text.append(f"What limits the design most: {named}. The cost is the share of what the criterion would gain, were that "
-                    "limit a little wider.")
-    if not result.torque_checked:
-        text.append("Torque limits were not checked: give a model, or describe the links.")
-    if result.torque_bounded:
-        text.append("No model is known: torque limits hold for any parameters between the bounds given.")
-        if not result.friction_columns:
-            text.append("Friction is not counted in that torque.")
-    if result.speed_share < 1.0:
-        text.append(f"Of every speed limit the plan uses {100 * result.speed_share:.0f} %, for a loop overshoots.")
-    if result.torque_checked and result.torque_share < 1.0:
-        text.append(f"Of every torque limit the plan uses {100 * result.torque_share:.0f} %; the rest is left to the controller.")
-    return Section("Limits", tuple(text), (Table(("joint", "of", "peak", "limit used", "unit", "of it [%]", "cost [%]"), rows),))
+    def place(joint: int | None) -> str:
+        return "tip" if joint is None else result.joints[joint - 1]
+
+    rows = tuple(
+        (
+            place(one.joint),
+            one.quantity,
+            one.peak,
+            one.limit,
+            format_unit(one.unit),
+            100 * one.share,
+            100 * one.cost,
+        )
+        for one in result.limits
+    )
+    costly = sorted(result.limits, key=lambda one: -one.cost)
+    dear = [
+        f"{one.quantity} of {'the tip' if one.joint is None else place(one.joint)}"
+        for one in costly
+        if one.cost > _DEAR
+    ]
+    columns = ("joint", "of", "peak", "limit used", "unit", "of it [%]", "cost [%]")
+    text = _paragraphs("limits", result, _smaller(result), dear[:3])
+    return Section("Limits", text, (Table(columns, rows),))
 
 
-def _told(result: Result) -> Section:
-    rows = tuple((p.name, p.value, p.std, format_unit(p.unit),
-                  None if not p.value else 100 * p.std / abs(p.value)) for p in result.parameters)
-    relative = [(p.name, 100 * p.std / abs(p.value)) for p in result.parameters if p.value]
-    noise = ", ".join(format_number(value, 3) for value in result.noise)
-    text = (f"Standard deviations are those of one experiment whose torque has white noise of {noise} N m (standard deviation, "
-            f"joint by joint), sampled every {1e3 * result.sample_time:g} ms. What the model lacks adds to them.",
-            "A small condition number is no aim in itself: it presses all singular values down to the smallest.",
-            "The condition number is the largest singular value of Φ over the smallest; the Frobenius condition number, "
-            "‖Φ‖ ‖Φ⁺‖, counts those between as well: the root of the sum of their squares times that of their inverses' squares.")
-    figures = [singular_value_figure("singular-values", "Singular values of Φ: the smallest belongs to the direction known worst.",
-                                     result.singular_values)]
-    if relative:
-        names, percent = zip(*relative, strict=True)
-        figures.append(relative_std_figure(
-            "relative-std", "Predicted standard deviation of every parameter, relative to its value.", names, percent))
+def _shows(result: Result) -> Section:
+    relative = {
+        p.name: None if not p.value else 100 * p.std / abs(p.value) for p in result.parameters
+    }
+    rows = tuple(
+        (p.name, p.value, p.std, format_unit(p.unit), relative[p.name]) for p in result.parameters
+    )
+    figures = [_singular_value_figure(result.singular_values)]
+    known = {name: x for name, x in relative.items() if x is not None}
+    if known:
+        figures.append(_relative_std_figure(list(known), list(known.values())))
     columns = ("parameter", "believed value", "predicted std", "unit", "relative [%]")
+    text = _paragraphs("shows", result.noise, result.sample_time)
     return Section("What it will tell", text, (Table(columns, rows),), tuple(figures))
 
 
 def _certificate(result: Result) -> Section | None:
     if result.lower_bound is None or result.condition_number is None:
         return None
-    ratio = result.condition_number / result.lower_bound
-    beyond = f"{100 * (ratio - 1.0):.3g} % above" if ratio < _NEAR_BOUND else f"{ratio:.3g} times as much"
-    return Section("Certificate", (
-        f"No motion of this arm has a condition number below √(3/2) = {result.lower_bound:.5f}; this one has "
-        f"{result.condition_number:.4f}, {beyond}.",
-        "Why: let M = ΦᵀΦ/n, λ its smallest eigenvalue, and b the acceleration of the third link, q̈₂ + q̈₃, with the mean square Z.",
-        "First, Z is at least λ. Take the parameter vector that has 1/√2 at p12 and p13 and zero elsewhere. Its torque is "
-        "(q̈₂ + q̈₃)/√2 at joint 2 and the same at joint 3: p12's column is q̈₂ at joint 2, p13's is q̈₃ at joint 2 and b at joint 3. "
-        "The mean square of that torque is Z/2 + Z/2 = Z, and no unit vector gives less than λ.",
-        "Second, the columns of p7, p8 and p9. At joint 1, the mean squares of p8's and p9's column add up to that of b² + "
-        "(q̇₂ + q̇₃)⁴, for their sines and cosines complete each other: at least Z. At joints 2 and 3 both columns are q̈₁ times a "
-        "cosine and a sine, which complete each other too: twice the mean square of q̈₁, and that mean square is the diagonal "
-        "element of p7. So M₈₈ + M₉₉ ≥ 2 M₇₇ + Z.",
-        "Every diagonal element is at least λ, so M₇₇ ≥ λ, and with Z ≥ λ the sum is at least 3 λ. The larger of the two is at "
-        "least 1.5 λ, and so is the largest eigenvalue. The condition number of Φ is the root of their ratio.",
-        "The argument holds for any motion, periodic or not, and with further columns as well, for these only widen "
-        "the range of the eigenvalues."))
+    bound, number = result.lower_bound, result.condition_number
+    return Section("Certificate", _paragraphs("certificate", bound, number, _NEAR_BOUND))
 
 
 def _comparison(result: Result) -> Section | None:
     r = result.random
     if r is None or result.predicted_relative_std is None:
         return None
-    rows = (("this design", result.condition_number, 100 * result.predicted_relative_std),
-            (f"random, median of {r.count}", r.condition_median, 100 * r.relative_std_median),
-            (f"random, best condition of {r.count}", r.condition_best, None))
-    times = r.relative_std_median / result.predicted_relative_std
-    return Section("Beside random motions", (
-        f"Random coefficients, scaled until a limit is met: their standard deviation is "
-        f"{format_number(times, 2)} times this design's.",),
-        (Table(("motion", "condition number", "relative std, predicted [%]"), rows),))
+    rows = (
+        ("this design", result.condition_number, 100 * result.predicted_relative_std),
+        (f"random, median of {r.count}", r.condition_median, 100 * r.relative_std_median),
+        (f"random, best condition of {r.count}", r.condition_best, None),
+    )
+    text = _paragraphs("random", r.relative_std_median / result.predicted_relative_std)
+    table = Table(("motion", "condition number", "relative std, predicted [%]"), rows)
+    return Section("Beside random motions", text, (table,))
 
 
 def _plans_report(result: Result) -> Report:
-    what = {"friction": "friction", "frf": "frequency responses", "hold": "static postures"}[result.purpose]
-    verdict = f"{len(result.plans)} experiments for {what} are planned, {result.duration:.3g} s altogether."
-    rows = tuple((p.name, p.joint, p.seconds, p.speed_peak, p.acceleration_peak, p.words) for p in result.plans)
-    table = Table(("experiment", "joint", "duration [s]", "speed, peak [rad/s]", "acceleration, peak [rad/s^2]", "what"), rows)
-    kept = Table(("experiment", "nearest limit", "joint", "peak", "limit used", "unit", "of it [%]"), tuple(
-        (p.name, n.quantity, n.joint, n.peak, n.limit, format_unit(n.unit), 100 * n.share)
-        for p in result.plans if (n := p.nearest) is not None))
-    words = "Position, speed, acceleration and tip are looked at sample by sample, half a step added"
-    words += ", torque with the excitation as well." if result.torque_checked else "; torque is not, for neither a model nor the " \
-        "links are known."
+    """The plans of other experiments, their limits and their rehearsals."""
+    plans = Table(
+        (
+            "experiment",
+            "joint",
+            "duration [s]",
+            "speed, peak [rad/s]",
+            "acceleration, peak [rad/s^2]",
+            "what",
+        ),
+        tuple(
+            (p.name, p.joint, p.seconds, p.speed_peak, p.acceleration_peak, p.words)
+            for p in result.plans
+        ),
+    )
+    limits = Table(
+        ("experiment", "nearest limit", "joint", "peak", "limit used", "unit", "of it [%]"),
+        tuple(
+            (p.name, n.quantity, n.joint, n.peak, n.limit, format_unit(n.unit), 100 * n.share)
+            for p in result.plans
+            if (n := p.nearest) is not None
+        ),
+    )
+    sections = [
+        _plans_safety(result),
+        Section("Experiments", tables=(plans,)),
+        Section("Limits", _paragraphs("plan_limits", result.torque_checked), (limits,)),
+    ]
     moving = [p for p in result.plans if p.speed_peak > 0.0][:_DRAWN_PLANS]
-    sections = [_plans_safety(result), Section("Experiments", (), (table,)), Section("Limits", (words,), (kept,))]
     if moving:
-        sections.append(Section("Motions", (), (), tuple(_plan_figure(p, result) for p in moving)))
+        figures = tuple(_plan_figure(p, result) for p in moving)
+        sections.append(Section("Motions", figures=figures))
     troubled = [name for name, found in result.rehearsals if not found.safe]
-    if troubled:
-        verdict += f" In the rehearsal of {', '.join(troubled)} a limit is not kept."
-    safe = not result.rehearsal_failed and not troubled
-    return Report("Planned experiments", verdict, "neutral" if safe else "attention", None, tuple(sections),
-                  basis=(_robot(result),))
+    tone: Tone = "attention" if result.rehearsal_failed or troubled else "neutral"
+    verdict, basis = _say("plans", result, troubled), (_say("robot", result),)
+    return Report("Planned experiments", verdict, tone, None, tuple(sections), basis=basis)
 
 
 def _plans_safety(result: Result) -> Section:
     """Of each plan the joint that is nearest to trouble in its rehearsal."""
+    text = _paragraphs("plans_safety", result)
     if not result.rehearsals:
-        return Section("Before the robot moves", (_robot(result), f"The rehearsal in simulation failed: {result.rehearsal_failed}."
-                                                  if result.rehearsal_failed else "They were not rehearsed in simulation.",), (),
-                       warning=_UNCHECKED)
+        return Section("Before the robot moves", text, warning=NO_COLLISION_CHECK)
     rows = []
     for name, found in result.rehearsals:
-        full = [x / limit for x, limit in zip(found.torque_peak, found.torque_limit, strict=True)]
-        fast = [x / limit for x, limit in zip(found.speed_peak, found.speed_limit, strict=True)]
-        rows.append((name, found.seconds, max(found.position_rms), max(found.position_max), 100 * max(full), 100 * max(fast),
-                     100 * max(found.saturated)))
-    text = [_robot(result), "Each was rehearsed in simulation under PD control of 8 Hz a joint, without feed-forward; of all "
-            "joints the worst is listed. Another controller will follow otherwise."]
-    if result.purpose == "frf":
-        text.append("The excitation moves the arm away from its slow turn, as it is to.")
-    if result.rehearsal_failed:
-        text.append(f"The rest failed: {result.rehearsal_failed}.")
+        full = max(x / y for x, y in zip(found.torque_peak, found.torque_limit, strict=True))
+        fast = max(x / y for x, y in zip(found.speed_peak, found.speed_limit, strict=True))
+        away = (max(found.position_rms), max(found.position_max))
+        rows.append(
+            (name, found.seconds, *away, 100 * full, 100 * fast, 100 * max(found.saturated))
+        )
     position = unit_of(result.limits, "position")
-    head = ("experiment", "rehearsed [s]", f"away, rms [{position}]", f"away, most [{position}]", "torque, of its limit [%]",
-            "speed, of its limit [%]", "saturated [%]")
-    return Section("Before the robot moves", tuple(text), (Table(head, tuple(rows)),), warning=_UNCHECKED)
+    columns = (
+        "experiment",
+        "rehearsed [s]",
+        f"away, rms [{position}]",
+        f"away, most [{position}]",
+        "torque, of its limit [%]",
+        "speed, of its limit [%]",
+        "saturated [%]",
+    )
+    table = Table(columns, tuple(rows))
+    return Section("Before the robot moves", text, (table,), warning=NO_COLLISION_CHECK)
 
 
 def _plan_figure(plan: DrawnPlan, result: Result) -> Figure:
     own = np.ptp(plan.q, axis=0) > 0.0
-    names = tuple(name for name, moves in zip(result.joints, own, strict=True) if moves)
-    return joint_signal_figure(plan.name, f"{plan.name}: {plan.words}.", plan.t, plan.q[:, own], unit_of(result.limits, "position"),
-                               quantity="position", names=names)
+    return joint_signal_figure(
+        plan.name,
+        f"{plan.name}: {plan.words}.",
+        plan.t,
+        plan.q[:, own],
+        unit_of(result.limits, "position"),
+        quantity="position",
+        names=[name for name, moves in zip(result.joints, own, strict=True) if moves],
+    )
+
+
+def _limited_figure(
+    name: str,
+    caption: str,
+    t: Array,
+    values: Array,
+    ends: tuple[Sequence[float], Sequence[float]],
+    label: str,
+    joints: Sequence[str],
+) -> Figure:
+    """A signal over one period, one row a joint, with the limits (low, high) it comes near to."""
+
+    def draw_row(axis: Axes, j: int) -> None:
+        axis.plot(*envelope(t, values[:, j]), color=style.BLUE, linewidth=1.0)
+        for end in (ends[0][j], ends[1][j]):
+            if np.isfinite(end) and np.abs(values[:, j]).max() > _WORTH * abs(end):
+                axis.axhline(end, color=style.VERMILLION, linewidth=0.9, linestyle=(0, (5, 2)))
+
+    return rows_figure(name, caption, joints, draw_row, label)
+
+
+def _spectrum_figure(caption: str, hertz: Array, amplitude: Array, joints: Sequence[str]) -> Figure:
+    """Amplitude of the speed at every harmonic, one row a joint."""
+
+    def draw_row(axis: Axes, j: int) -> None:
+        axis.vlines(hertz, 0.0, amplitude[:, j], color=style.BLUE, linewidth=1.2)
+        axis.set_ylim(bottom=0.0)
+
+    label, x = "amplitude of the speed [rad/s]", "frequency [Hz]"
+    return rows_figure("spectrum", caption, joints, draw_row, label, x=x)
+
+
+def _singular_value_figure(values: Sequence[float]) -> Figure:
+    """Singular values of Φ, the largest first; which parameters they belong to the table says."""
+
+    def draw(axis: Axes) -> None:
+        place = np.arange(1, len(values) + 1)
+        wide = max(values) > _WIDE * min(values)
+        low = 0.5 * min(values) if wide else 0.0
+        axis.vlines(place, low, values, color=style.GREY, linewidth=1.0)
+        axis.plot(place, values, "o", color=style.BLUE, markersize=4.5)
+        if wide:
+            axis.set_yscale("log")
+            style.log_ticks(axis.yaxis)
+        axis.set_ylim(low, (2.0 if wide else 1.1) * max(values))
+        axis.set_xlabel("direction of the parameters")
+        axis.set_ylabel("singular value of Φ / √n")
+        axis.locator_params(axis="x", integer=True)
+
+    caption = "Singular values of Φ: the smallest belongs to the direction known worst."
+    return one_figure("singular-values", caption, draw, 2.8)
+
+
+def _relative_std_figure(names: Sequence[str], percent: Sequence[float]) -> Figure:
+    """Predicted standard deviation of every parameter over its value, the best known on top."""
+    order = np.argsort(percent)[::-1]
+    values = np.array(percent)[order]
+    place = np.arange(len(values))
+
+    def draw(axis: Axes) -> None:
+        axis.hlines(place, 0.3 * values.min(), values, color=style.GREY, linewidth=1.0)
+        axis.plot(values, place, "o", color=style.BLUE, markersize=4.0)
+        axis.set_xscale("log")
+        axis.set_xlim(0.5 * values.min(), 2.0 * values.max())
+        style.log_ticks(axis.xaxis)
+        axis.set_yticks(place, [printable(names[k], 24) for k in order])
+        axis.set_ylim(-0.7, len(values) - 0.3)
+        axis.grid(axis="y", visible=False)
+        axis.set_xlabel("standard deviation over value [%]")
+
+    caption = "Predicted standard deviation of every parameter, relative to its value."
+    return one_figure("relative-std", caption, draw, 0.7 + 0.19 * len(names))

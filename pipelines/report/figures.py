@@ -1,49 +1,59 @@
-"""Drawings the reports share. Axes first, nothing returned; long logs are drawn by their envelopes.
+"""Drawings the reports share. Axes first, nothing returned; long logs are drawn by envelopes.
 
-Every function stands up to a damaged log: time that runs backwards, samples that are missing, names that are mark-up.
+Every function stands up to a damaged log: time that runs backwards, samples that are missing, names
+that are mark-up. What ends in `_figure` is a whole figure of a report.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.report import style
+from pipelines.report.report import Figure
 from pipelines.report.style import format_number, format_unit, printable
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure, SubFigure
-
-__all__ = ["broken_at_gaps", "draw_intervals", "draw_joint_signals", "draw_measured", "draw_modelled", "draw_timeline", "envelope",
-           "joint_axes", "joint_size", "merge_spans", "true_spans"]
+    from matplotlib.figure import Figure as Drawing
+    from matplotlib.figure import SubFigure
 
 Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
 Span = tuple[float, float]
+Look = dict[str, Any]  # of a line or an area, as matplotlib takes it
 
 _LARGEST = 1e150  # beyond it the axis limits overflow; a damaged sample may be that large
 _SCALES = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
+_POINTS = 800  # of a curve among others
+_ROW = 0.8  # [inch] height of the axes of one joint
+DASHED = (0, (5, 1.5))
 
 
 def envelope(t: Array, x: Array, points: int = 1200) -> tuple[Array, Array]:
-    """Lowest and highest sample of each stretch of a long signal: what the eye would see, in about `points` points.
+    """Lowest and highest sample of each stretch of a long signal: what the eye would see.
 
-    Samples that are not finite become NaN and break the line; where they do, a sample is given twice, because a line
-    needs two points and a sample alone between two gaps would not be drawn.
+    Samples that are not finite become NaN and break the line; where they do, a sample is given
+    twice, because a line needs two points and a sample alone between two gaps would not be drawn.
     """
     x = np.where(np.isfinite(x), np.clip(x, -_LARGEST, _LARGEST), np.nan)
     if x.size == 0 or (x.size <= points and np.isfinite(x).all()):
         return t, x
     width = -(-x.size // max(1, points // 2))
     rows = -(-x.size // width)
-    index = np.minimum(np.arange(rows * width), x.size - 1).reshape(rows, width)  # the last sample fills the last row
+    samples = np.arange(rows * width)
+    index = np.minimum(samples, x.size - 1).reshape(rows, width)  # the last one fills the last row
     part = x[index]
     bad = np.isnan(part)
     row = np.arange(rows)
-    extremes = (np.where(bad, np.inf, part).argmin(axis=1), np.where(bad, -np.inf, part).argmax(axis=1))
+    extremes = (
+        np.where(bad, np.inf, part).argmin(axis=1),
+        np.where(bad, -np.inf, part).argmax(axis=1),
+    )
     first, second = np.minimum(*extremes), np.maximum(*extremes)
     missing = bad.cumsum(axis=1)
     before, until, total = missing[row, first], missing[row, second], missing[:, -1]
@@ -56,14 +66,14 @@ def envelope(t: Array, x: Array, points: int = 1200) -> tuple[Array, Array]:
     return t[times], np.where(order[keep] < 0, np.nan, x[order[keep]])
 
 
-def true_spans(t: Array, mask: npt.NDArray[np.bool_]) -> list[Span]:
+def true_spans(t: Array, mask: Mask) -> list[Span]:
     """From-to times of the runs of samples where `mask` holds."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(np.int8)))
     return [(float(t[start]), float(t[stop - 1])) for start, stop in edges.reshape(-1, 2)]
 
 
 def merge_spans(spans: Iterable[Span], reach: float) -> list[Span]:
-    """Spans in order of time, those nearer than `reach` joined; so a thousand short ones do not make a huge figure."""
+    """Spans in order of time, those nearer than `reach` joined: a thousand would be a huge file."""
     merged: list[Span] = []
     for start, stop in sorted((min(span), max(span)) for span in spans if np.isfinite(span).all()):
         if merged and start - merged[-1][1] <= reach:
@@ -73,56 +83,186 @@ def merge_spans(spans: Iterable[Span], reach: float) -> list[Span]:
     return merged
 
 
-def joint_size(joints: int) -> tuple[float, float]:
-    """Size of a figure with one row a joint. [inch]"""
-    return 6.0, 0.65 + 0.8 * max(1, joints)
+def broken_at_gaps(t: Array, x: Array) -> tuple[Array, Array]:
+    """A NaN where five samples or more are missing in time, (samples,) or (samples, joints)."""
+    step = np.diff(t)
+    rising = step[step > 0.0]
+    if rising.size == 0:
+        return t, x
+    at = np.flatnonzero(step > 5.0 * np.median(rising)) + 1
+    return np.insert(t, at, t[at]), np.insert(x, at, np.nan, axis=0)
 
 
-def joint_axes(figure: Figure | SubFigure, joints: int) -> list[Axes]:
+def joint_axes(figure: Drawing | SubFigure, joints: int, sharey: bool = False) -> list[Axes]:
     """One row of axes a joint over a common time axis."""
-    return list(figure.subplots(max(1, joints), 1, sharex=True, squeeze=False)[:, 0])
+    grid = figure.subplots(max(1, joints), 1, sharex=True, sharey=sharey, squeeze=False)
+    return list(grid[:, 0])
 
 
-def draw_joint_signals(axes: Sequence[Axes], t: Array, values: Array, unit: str, *, quantity: str = "",
-                       names: Sequence[str] = (), flagged: npt.NDArray[np.bool_] | None = None,
-                       flag_name: str = "flagged") -> None:
-    """A signal over time, one row a joint, with the flagged samples marked.
+def joint_names(joints: int) -> list[str]:
+    """ "joint 1", "joint 2", …"""
+    return [f"joint {number}" for number in range(1, joints + 1)]
+
+
+def joint_colour(joint: int) -> str:
+    """Of joint 0, 1, …"""
+    return style.COLOURS[joint % len(style.COLOURS)]
+
+
+def legend_above(axis: Axes, columns: int = 1) -> None:
+    """A legend outside the axes, to the right of the title."""
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=columns)
+
+
+def label_rows(
+    axes: Sequence[Axes], names: Sequence[str], quantity: str, x: str = "time [s]", legend: int = 0
+) -> None:
+    """Titles, margins and common labels of rows of axes; a `legend` of so many columns."""
+    for axis, name in zip(axes, names, strict=True):
+        axis.set_title(printable(name, 60), pad=3.0)
+        axis.margins(x=0.01, y=0.1)
+        axis.locator_params(axis="y", nbins=4)
+    axes[-1].set_xlabel(x)
+    if figure := axes[0].get_figure():
+        figure.supylabel(printable(format_unit(quantity), 60), fontsize="medium")
+    if legend:
+        legend_above(axes[0], legend)
+
+
+def rows_figure(
+    name: str,
+    caption: str,
+    names: Sequence[str],
+    draw_row: Callable[[Axes, int], None],
+    quantity: str,
+    *,
+    x: str = "time [s]",
+    legend: int = 0,
+    row: float = _ROW,
+    sharey: bool = False,
+) -> Figure:
+    """One row of axes for each of `names`, each filled by `draw_row(axes, number from 0)`.
 
     Args:
-        axes: one a joint, from `joint_axes`.
-        values: (samples,) or (samples, joints).
-        quantity: what the signal is: "position"; with the unit it labels the rows.
-        names: of the joints; "joint 1", "joint 2", … where empty.
-        flagged: (samples,) or (samples, joints).
+        quantity: with its unit, "torque [N m]": the label of all rows.
+        legend: columns of the legend above the first row; none where 0.
+        row: height of a row. [inch]
+        sharey: all rows have one scale.
     """
-    values = values.reshape(-1, 1) if values.ndim == 1 else values
-    names = names or [f"joint {number}" for number in range(1, values.shape[1] + 1)]
-    flags = np.zeros(values.shape, bool) if flagged is None else np.broadcast_to(
-        flagged.reshape(-1, 1) if flagged.ndim == 1 else flagged, values.shape)
-    t, label = _drawable_time(t)
-    for axis, name, column, mask in zip(axes, names, values.T, flags.T, strict=True):
-        _line(axis, *broken_at_gaps(t, column), color=style.BLUE, width=1.1)
-        _mark(axis, t, column, mask)
-        axis.set_title(printable(name, 60), pad=3.0)
-        axis.margins(x=0.01, y=0.12)
-        axis.locator_params(axis="y", nbins=4)
-    axes[-1].set_xlabel(label)
-    if figure := axes[0].get_figure():
-        figure.supylabel(printable(f"{quantity} [{format_unit(unit)}]".strip(), 60), fontsize="medium")
-    if flags.any():
-        first = next(axis for axis, mask in zip(axes, flags.T, strict=True) if mask.any())
-        first.fill_between([], [], color=style.ORANGE, alpha=0.35, label=printable(flag_name, 60))
-        first.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0)
+
+    def draw(drawing: Drawing) -> None:
+        axes = joint_axes(drawing, len(names), sharey)
+        for k, axis in enumerate(axes):
+            draw_row(axis, k)
+        label_rows(axes, names, quantity, x, legend)
+
+    return Figure(name, caption, draw, (6.0, 0.65 + row * max(1, len(names))))
+
+
+def one_figure(
+    name: str, caption: str, draw_axes: Callable[[Axes], None], height: float, alt: str = ""
+) -> Figure:
+    """A figure of one pair of axes, `height` inches high."""
+    return Figure(name, caption, lambda drawing: draw_axes(drawing.subplots()), (6.0, height), alt)
 
 
 def draw_measured(axis: Axes, t: Array, x: Array) -> None:
-    """What was measured, broad and light: a model that lies on it leaves its borders to be seen, and where it does not, both."""
+    """What was measured, broad and light: a model that lies on it leaves its borders to be seen."""
     axis.plot(t, x, color=style.SKY, linewidth=3.0, label="measured")
 
 
 def draw_modelled(axis: Axes, t: Array, x: Array, label: str) -> None:
     """What a model says of it, thin and dark, over what was measured."""
     axis.plot(t, x, color=style.VERMILLION, linewidth=0.9, label=label)
+
+
+def compared_figure(
+    name: str,
+    caption: str,
+    t: Array,
+    measured: Array,
+    modelled: Array,
+    quantity: str,
+    label: str = "simulated",
+    names: Sequence[str] = (),
+    others: Sequence[tuple[str, Array, str]] = (),
+) -> Figure:
+    """A measured signal under that of a model, one row a joint, `others` over both.
+
+    Args:
+        measured, modelled: (samples, joints).
+        quantity: with its unit: "torque [N m]".
+        others: (label, (samples, joints), colour).
+    """
+
+    def draw_row(axis: Axes, j: int) -> None:
+        draw_measured(axis, *envelope(t, measured[:, j], _POINTS))
+        draw_modelled(axis, *envelope(t, modelled[:, j], _POINTS), label)
+        for other, values, color in others:
+            drawn = envelope(t, values[:, j], _POINTS)
+            axis.plot(*drawn, color=color, linewidth=0.9, label=other)
+
+    names = names or joint_names(measured.shape[1])
+    return rows_figure(name, caption, names, draw_row, quantity, legend=2 + len(others))
+
+
+def draw_joint_signals(
+    axes: Sequence[Axes],
+    t: Array,
+    values: Array,
+    unit: str,
+    *,
+    quantity: str = "",
+    names: Sequence[str] = (),
+    flagged: Mask | None = None,
+    flag_name: str = "flagged",
+) -> None:
+    """A signal over time, one row a joint, with the flagged samples marked.
+
+    Args:
+        axes: one a joint, from `joint_axes`.
+        values, flagged: (samples,) or (samples, joints).
+        quantity: what the signal is: "position"; with the unit it labels the rows.
+        names: of the joints; "joint 1", "joint 2", … where empty.
+    """
+    values = values.reshape(-1, 1) if values.ndim == 1 else values
+    names = names or joint_names(values.shape[1])
+    flags = np.zeros(values.shape, bool)
+    if flagged is not None:
+        columns = flagged.reshape(-1, 1) if flagged.ndim == 1 else flagged
+        flags = np.broadcast_to(columns, values.shape)
+    t, label = _drawable_time(t)
+    for axis, column, mask in zip(axes, values.T, flags.T, strict=True):
+        _line(axis, *broken_at_gaps(t, column), color=style.BLUE, width=1.1)
+        _mark(axis, t, column, mask)
+    label_rows(axes, names, f"{quantity} [{unit}]".strip(), label)
+    if flags.any():
+        first = next(axis for axis, mask in zip(axes, flags.T, strict=True) if mask.any())
+        shown = printable(flag_name, 60)
+        first.fill_between([], [], color=style.ORANGE, alpha=0.35, label=shown)
+        legend_above(first)
+
+
+def joint_signal_figure(
+    name: str,
+    caption: str,
+    t: Array,
+    values: Array,
+    unit: str,
+    *,
+    quantity: str = "",
+    names: Sequence[str] = (),
+    flagged: Mask | None = None,
+    flag_name: str = "flagged",
+) -> Figure:
+    """A signal over time, one row a joint; see `draw_joint_signals`."""
+    joints = values.shape[1] if values.ndim > 1 else 1
+    look: Look = {"quantity": quantity, "names": names, "flagged": flagged, "flag_name": flag_name}
+
+    def draw(drawing: Drawing) -> None:
+        draw_joint_signals(joint_axes(drawing, joints), t, values, unit, **look)
+
+    return Figure(name, caption, draw, size=(6.0, 0.65 + _ROW * max(1, joints)))
 
 
 def _line(axis: Axes, t: Array, x: Array, color: str, width: float) -> None:
@@ -134,36 +274,34 @@ def _line(axis: Axes, t: Array, x: Array, color: str, width: float) -> None:
     axis.plot(t, x, color=color, linewidth=width)
 
 
-def _mark(axis: Axes, t: Array, column: Array, mask: npt.NDArray[np.bool_]) -> None:
-    """Shade where samples are flagged, and draw over the samples themselves; missing ones have only the shade."""
+def _mark(axis: Axes, t: Array, column: Array, mask: Mask) -> None:
+    """Shade where samples are flagged, and draw over those that are not missing."""
     if not mask.any():
         return
-    reach = float(np.ptp(t)) / 500.0
-    spans = merge_spans(true_spans(t, mask), reach)
-    axis.broken_barh([(start, stop - start) for start, stop in spans], (0.0, 1.0), transform=axis.get_xaxis_transform(),
-                     facecolor=style.ORANGE, edgecolor=style.ORANGE, linewidth=0.8, alpha=0.28, zorder=0.5)
+    spans = merge_spans(true_spans(t, mask), float(np.ptp(t)) / 500.0)
+    axis.broken_barh(
+        [(start, stop - start) for start, stop in spans],
+        (0.0, 1.0),
+        transform=axis.get_xaxis_transform(),
+        color=style.ORANGE,
+        linewidth=0.8,
+        alpha=0.28,
+        zorder=0.5,
+    )
     _line(axis, t, np.where(mask, column, np.nan), color=style.VERMILLION, width=2.6)
 
 
 def _drawable_time(t: Array) -> tuple[Array, str]:
-    """Time as recorded; the number of the sample where the recorded time cannot serve as an axis."""
+    """Time as recorded; the number of the sample where that cannot serve as an axis."""
     t = np.asarray(t, dtype=np.float64)
-    usable = t.size > 0 and bool(np.isfinite(t).all()) and np.abs(t).max() < _LARGEST and np.ptp(t) > 0.0
-    return (t, "time [s]") if usable else (np.arange(t.size, dtype=np.float64), "sample")
-
-
-def broken_at_gaps(t: Array, x: Array) -> tuple[Array, Array]:
-    """A NaN where five samples or more are missing in time: nothing was measured there, so no line is drawn."""
-    step = np.diff(t)
-    rising = step[step > 0.0]
-    if rising.size == 0:
-        return t, x
-    at = np.flatnonzero(step > 5.0 * np.median(rising)) + 1
-    return np.insert(t, at, t[at]), np.insert(x, at, np.nan)
+    finite = t.size > 0 and bool(np.isfinite(t).all())
+    if finite and np.abs(t).max() < _LARGEST and np.ptp(t) > 0.0:
+        return t, "time [s]"
+    return np.arange(t.size, dtype=np.float64), "sample"
 
 
 def draw_intervals(axes: Axes, t: Array, nominal: float) -> None:
-    """Histogram of the time between samples, as its distance from the nominal one; counts on a logarithmic scale."""
+    """Histogram of the time between samples minus the nominal one, on a logarithmic scale."""
     interval = np.diff(np.asarray(t, dtype=np.float64))
     off = interval[np.isfinite(interval)] - nominal
     size = np.abs(off)
@@ -171,22 +309,29 @@ def draw_intervals(axes: Axes, t: Array, nominal: float) -> None:
     # one gap of a minute must not press all the rest into one bar
     reach = min(max(1.05 * near.max(initial=0.0), 1e-3 * nominal), 2.0 * nominal)
     factor, unit = next((pair for pair in _SCALES if reach >= pair[0]), _SCALES[-1])
-    axes.hist(off / factor, bins=61, range=(-reach / factor, reach / factor), color=style.BLUE, rwidth=0.9, log=True)
+    shown = reach / factor
+    axes.hist(off / factor, bins=61, range=(-shown, shown), color=style.BLUE, rwidth=0.9, log=True)
     axes.axvline(0.0, color=style.BLACK, linewidth=0.9, linestyle=(0, (4, 3)))
-    axes.set_xlim(-1.02 * reach / factor, 1.02 * reach / factor)
+    axes.set_xlim(-1.02 * shown, 1.02 * shown)
     axes.set_ylim(bottom=0.7)
     style.log_ticks(axes.yaxis)
-    axes.set_xlabel(f"time between samples minus the nominal {format_number(nominal / factor)} {unit} [{unit}]")
+    beside = f"the nominal {format_number(nominal / factor)} {unit}"
+    axes.set_xlabel(f"time between samples minus {beside} [{unit}]")
     axes.set_ylabel("intervals")
-    beyond = [(int((off < -reach).sum()), "left", 0.0), (int((off > reach).sum()), "right", 1.0)]
-    for count, side, where in beyond:
-        if count:
-            words = f"◀ {format_number(count)} shorter" if side == "left" else f"{format_number(count)} longer ▶"
-            axes.text(where, 1.0, words, transform=axes.transAxes, ha=side, va="bottom", color=style.VERMILLION)
+    write = partial(axes.text, transform=axes.transAxes, va="bottom", color=style.VERMILLION)
+    if shorter := int((off < -reach).sum()):
+        write(0.0, 1.0, f"◀ {format_number(shorter)} shorter", ha="left")
+    if longer := int((off > reach).sum()):
+        write(1.0, 1.0, f"{format_number(longer)} longer ▶", ha="right")
+
+
+def interval_figure(name: str, caption: str, t: Array, sample_time: float) -> Figure:
+    """How evenly the log was sampled."""
+    return one_figure(name, caption, lambda axes: draw_intervals(axes, t, sample_time), 2.6)
 
 
 def draw_timeline(axes: Axes, extent: Span, rows: Sequence[tuple[str, Sequence[Span]]]) -> None:
-    """When something happened: one row a kind ("gap", "filled", …), a bar for every stretch of time.
+    """When something happened: one row a kind ("gap", "filled", …), a bar for each stretch of time.
 
     Args:
         extent: first and last time of the log. [s]
@@ -194,12 +339,12 @@ def draw_timeline(axes: Axes, extent: Span, rows: Sequence[tuple[str, Sequence[S
     """
     start, stop = extent
     reach = (stop - start) / 1000.0
-    for place, (_, spans) in enumerate(rows):
-        colour = style.COLOURS[(place + 1) % len(style.COLOURS)]
-        axes.plot([start, stop], [place, place], color="#dfe4e8", linewidth=1.2, zorder=1)
+    for k, (_, spans) in enumerate(rows):
+        colour = style.COLOURS[(k + 1) % len(style.COLOURS)]
+        axes.plot([start, stop], [k, k], color="#dfe4e8", linewidth=1.2, zorder=1)
         bars = [(first, last - first) for first, last in merge_spans(spans, reach)]
         # the outline keeps a gap of one millisecond in an hour visible
-        axes.broken_barh(bars, (place - 0.3, 0.6), facecolor=colour, edgecolor=colour, linewidth=1.4, zorder=2)
+        axes.broken_barh(bars, (k - 0.3, 0.6), color=colour, linewidth=1.4, zorder=2)
     labels = [f"{printable(name, 40)} ({format_number(len(spans))})" for name, spans in rows]
     axes.set_yticks(range(len(rows)), labels)
     axes.set_ylim(len(rows) - 0.4, -0.6)
@@ -209,3 +354,30 @@ def draw_timeline(axes: Axes, extent: Span, rows: Sequence[tuple[str, Sequence[S
     axes.spines["left"].set_visible(False)
     axes.spines["bottom"].set_color(style.GREY)
     axes.set_xlabel("time [s]")
+
+
+def timeline_figure(
+    name: str, caption: str, extent: Span, rows: Sequence[tuple[str, Sequence[Span]]]
+) -> Figure:
+    """When gaps, repairs and limits fell, one row a kind."""
+    height = 0.6 + 0.32 * max(1, len(rows))
+    return one_figure(name, caption, lambda axes: draw_timeline(axes, extent, rows), height)
+
+
+def density_figure(name: str, caption: str, frequency: Array, density: Array, unit: str) -> Figure:
+    """Amplitude density of a difference over frequency, one line a joint."""
+
+    def draw(axes: Axes) -> None:
+        amplitude = np.sqrt(np.maximum(density[1:], 1e-300))
+        for j, column in enumerate(amplitude.T):
+            look: Look = {"color": joint_colour(j), "label": f"joint {j + 1}"}
+            axes.loglog(frequency[1:], column, linewidth=0.9, **look)
+        largest, least = amplitude.max(initial=1e-150), amplitude.min(initial=1.0)
+        axes.set_ylim(max(0.5 * least, 1e-5 * largest), 2.0 * largest)
+        axes.set_xlabel("frequency [Hz]")
+        axes.set_ylabel(f"difference [{format_unit(unit)}/√Hz]")
+        style.log_ticks(axes.xaxis)
+        style.log_ticks(axes.yaxis)
+        axes.legend(loc="best", ncols=min(3, density.shape[1]))
+
+    return one_figure(name, caption, draw, 2.8)

@@ -1,123 +1,138 @@
-"""The report of a friction fit: the verdict, Table III with standard deviations, Figs. 5 and 6, the curve, the ladder."""
+"""The report of a friction fit: Table III with deviations, Figs. 5 and 6, curve and choice."""
 
 from __future__ import annotations
 
 import re
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.breakaway import BreakAwayConfig
-from pipelines.model.friction.findings import NAMED, FindingsConfig, depends_in_words, drift_in_words, inertia_in_words
+from pipelines.model.friction.findings import (
+    NAMED,
+    FindingsConfig,
+    depends_in_words,
+    drift_in_words,
+    inertia_in_words,
+)
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.result import JointResult, Result
+from pipelines.model.friction.result import JointResult, Result, Series
+from pipelines.model.friction.ripple import Along
 from pipelines.model.words import plain_number
-from pipelines.report.diagnosis_words import spoken
-from pipelines.report.friction_figures import curve_figure, fraction_figure, ripple_figure, simulation_figure
-from pipelines.report.report import Report, Section, Table, Tone
-from pipelines.report.sections import checks_table
-from pipelines.report.style import format_number, format_unit, with_std
+from pipelines.report import style
+from pipelines.report.figures import (
+    Look,
+    draw_measured,
+    draw_modelled,
+    envelope,
+    legend_above,
+    one_figure,
+    rows_figure,
+)
+from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
+from pipelines.report.sections import data_quality
+from pipelines.report.sentences import capital, paragraphs, sentence
+from pipelines.report.style import format_unit, with_std
+from pipelines.report.words import spoken
 
-__all__ = ["friction_report", "ripple_in_words"]
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
 
 _GOOD = 0.05  # of the speed error without friction: what the law has to leave
 _GOOD_TORQUE = 0.1  # of held-out torque, where nothing was simulated: the same
 _THIN = 0.01  # of the curve: a narrower band is hidden by the line
+_NEAR = 0.04  # of the fastest speed: the part of the curve where the sign of friction turns
+_GRAVITY = {
+    "sine": "c in c sin q + c' cos q",
+    "cosine": "c' in c sin q + c' cos q",
+    "constant": "weight along the axis",
+}
+
+_say, _paragraphs = partial(sentence, "friction"), partial(paragraphs, "friction")
 
 
 def friction_report(result: Result) -> Report:
-    """The verdict first; then every joint's law, figures and ladder."""
-    sections = [_summary(result), *(section for joint in result.joints for section in _joint_sections(joint))]
-    if result.checks:
-        sections.append(Section("Data quality", (), (checks_table(result.checks),)))
-    return Report("Friction", _verdict(result), _tone(result), _key_figures(result), tuple(sections))
+    """The verdict first; then every joint's law, figures and choice of the law."""
+    sections = [_summary(result)]
+    for joint in result.joints:
+        sections += _joint_sections(joint)
+    sections += data_quality(result.checks)
+    key = _key_figures(result)
+    return Report("Friction", _verdict(result), _tone(result), key, tuple(sections))
 
 
-_GRAVITY = {"sine": "c in c sin q + c' cos q", "cosine": "c' in c sin q + c' cos q", "constant": "weight along the axis"}
+def _units(joint: JointResult) -> tuple[str, str, str]:
+    """Of position, speed and torque."""
+    return ("rad", "rad/s", "N m") if joint.revolute else ("m", "m/s", "N")
 
 
 def _ratio(joint: JointResult) -> float | None:
     """Speed error of the simulation with friction over that without."""
-    judged = joint.validation
-    if judged.velocity_error_with is None:
+    with_, without = joint.validation.velocity_error_with, joint.validation.velocity_error_without
+    if with_ is None:
         return None
-    if judged.velocity_error_without is None:
+    if without is None:
         return 0.0
-    return judged.velocity_error_with / judged.velocity_error_without if judged.velocity_error_without > 0.0 else None
-
-
-def _gravity(joint: JointResult) -> list[tuple[str, Value]]:
-    return [(name, joint.gravity[name]) for name in ("sine", "cosine", "constant") if name in joint.gravity]
+    return with_ / without if without > 0.0 else None
 
 
 def _well(joint: JointResult) -> bool:
-    if not joint.validation.by:  # nothing was simulated
-        return joint.moved and joint.validation.torque_error is not None and joint.validation.torque_error < _GOOD_TORQUE
-    ratio = _ratio(joint)
-    return ratio is not None and ratio <= _GOOD
+    if joint.validation.by:
+        ratio = _ratio(joint)
+        return ratio is not None and ratio <= _GOOD
+    error = joint.validation.torque_error  # nothing was simulated
+    return joint.moved and error is not None and error < _GOOD_TORQUE
 
 
 def _tone(result: Result) -> Tone:
     if any(check.gate for check in result.checks):
         return "bad"
-    open_ = any(joint.unseen or joint.ripple for joint in result.joints)
-    return "good" if all(_well(joint) for joint in result.joints) and not open_ else "attention"
+    sure = all(_well(joint) and not (joint.unseen or joint.ripple) for joint in result.joints)
+    return "good" if sure else "attention"
 
 
 def _verdict(result: Result) -> str:
-    laws = ". ".join(_law_and_errors(joint) for joint in result.joints)
-    poor = [joint.name for joint in result.joints if joint.validation.by and not _well(joint)]
-    open_ = [joint.name for joint in result.joints if joint.unseen]
-    words = f"{laws}."
-    if any(joint.validation.by and not joint.validation.held_out for joint in result.joints):
-        words += " Simulated were logs that were fitted too, for no friction log has role validate."
-    if gates := [check.message for check in result.checks if check.gate]:
-        words = f"{gates[0][:1].upper()}{gates[0][1:]}. {words}"
-    if poor:
-        words += f" The simulation of {', '.join(poor)} does not follow the measurement well."
-    words += "".join(f" {words}" for joint in result.joints if (words := ripple_in_words(joint)))
-    words += "".join(f" {words}" for joint in result.joints if (words := drift_in_words(joint)))
-    if open_:
-        words += f" What the logs of {', '.join(open_)} leave open is listed with what to record."
-    return words
-
-
-def _law_and_errors(joint: JointResult) -> str:
-    """The law, and how far the simulated speed is off with it and without."""
-    judged = joint.validation
-    if not joint.moved:
-        return f"{_capital(joint.name)} does not move in these logs, and they show nothing of it"
-    words = f"{_capital(joint.name)}: {_plain(joint.law)}"
-    if not judged.by:
-        error = judged.torque_error
-        if error is None or error >= FindingsConfig().poor:  # the finding says it
-            return words
-        return f"{words}, which leaves {format_number(100.0 * error, 2)} % of held-out torque (rms)"
-    with_, without, unit = judged.velocity_error_with, judged.velocity_error_without, _speed_unit(joint)
-    if with_ is None:
-        beside = ", with friction and without" if without is None else f" ({_off(without, unit)} without friction)"
-        return f"{words}; the simulation runs away{beside}"
-    beside = "without friction it runs away" if without is None else f"{format_number(without, 3)} without friction"
-    return f"{words}, simulated speed {_off(with_, unit)} ({beside})"
-
-
-def _off(error: float | None, unit: str) -> str:
-    """How far a simulated speed is from the measured one; None is no figure, but an arm that runs away."""
-    return "runs away from it" if error is None else f"off by {format_number(error, 3)} {unit} rms"
-
-
-def _speed_unit(joint: JointResult) -> str:
-    return "rad/s" if joint.revolute else "m/s"
+    joints, simulated = [], [joint for joint in result.joints if joint.validation.by]
+    for joint in result.joints:
+        error = joint.validation.torque_error
+        if error is not None and error >= FindingsConfig().poor:  # the finding says it
+            error = None
+        joints.append(
+            {
+                "name": capital(joint.name),
+                "law": _plain(joint.law),
+                "moved": joint.moved,
+                "validation": joint.validation,
+                "leaves": error,
+                "unit": _units(joint)[1],
+            }
+        )
+    remarks = [ripple_in_words(j) for j in result.joints] + [
+        drift_in_words(j) for j in result.joints
+    ]
+    return _say(
+        "verdict",
+        gates=[check.message for check in result.checks if check.gate],
+        joints=joints,
+        refitted=any(not joint.validation.held_out for joint in simulated),
+        poor=[joint.name for joint in simulated if not _well(joint)],
+        remarks=[words for words in remarks if words],
+        open=[joint.name for joint in result.joints if joint.unseen],
+    )
 
 
 def _plain(law: str) -> str:
-    return (law.replace("three_sigmoid", "three sigmoids").replace("stribeck", "Stribeck").replace("coulomb", "Coulomb")
-            .replace("_", " ").replace("+", " + "))
+    for key, words in (("three_sigmoid", "three sigmoids"), ("stribeck", "Stribeck")):
+        law = law.replace(key, words)
+    return law.replace("coulomb", "Coulomb").replace("_", " ").replace("+", " + ")
 
 
-def _called(name: str) -> str:
-    """"Coulomb friction, level" for "coulomb.level"; the paper's own letters stay."""
+def _parameter(name: str) -> str:
+    """ "Coulomb friction, level" for "coulomb.level"; the paper's own letters stay."""
     effect, dot, quantity = name.partition(".")
     return f"{find_effect(effect).words.title}, {spoken(quantity)}" if dot else name
 
@@ -126,122 +141,100 @@ def _meaning(joint: JointResult, name: str) -> str:
     """Return the meaning of a number of the joint's law."""
     effect, _, quantity = name.rpartition(".")
     members = (effect,) if effect else law_named(joint.law).members
-    return next((q.meaning for member in members for q in find_effect(member).parameters if q.name == quantity), "")
+    known = [q for member in members for q in find_effect(member).parameters]
+    return next((q.meaning for q in known if q.name == quantity), "")
+
+
+def _std(value: Value | None) -> str | None:
+    return None if value is None else with_std(value.value, value.std)
 
 
 def _key_figures(result: Result) -> Table:
-    rows = []
     simulated = any(joint.validation.by for joint in result.joints)
+    rows = []
     for joint in result.joints:
-        gravity = ", ".join(with_std(value.value, value.std) for _, value in _gravity(joint))
+        gravity = ", ".join(_std(joint.gravity[k]) or "" for k in _GRAVITY if k in joint.gravity)
         error = _ratio(joint) if simulated else joint.validation.torque_error
-        rows.append((joint.name, _plain(joint.law), with_std(joint.inertia.value, joint.inertia.std), gravity,
-                     None if error is None else 100.0 * error))
-    return Table(("joint", "law", "inertia [kg m^2]", "gravity: sine, cosine [N m]",
-                  "speed error, friction in / left out [%]" if simulated else "held-out torque that is left, rms [%]"), tuple(rows))
+        left = None if error is None else 100.0 * error
+        rows.append((joint.name, _plain(joint.law), _std(joint.inertia), gravity, left))
+    error_name = "held-out torque that is left, rms [%]"
+    if simulated:
+        error_name = "speed error, friction in / left out [%]"
+    columns = ("joint", "law", "inertia [kg m^2]", "gravity: sine, cosine [N m]", error_name)
+    return Table(columns, tuple(rows))
 
 
 def _summary(result: Result) -> Section:
     """Table III, which the print of the paper has lost."""
-    names = sorted({name for joint in result.joints for name in joint.parameters})
-    rows, meanings = [], []
-    for name in names:
-        having = [joint.parameters.get(name) for joint in result.joints]
-        first = next(joint for joint in result.joints if name in joint.parameters)
-        rows.append((_called(name), *(None if value is None else with_std(value.value, value.std) for value in having),
-                     format_unit(first.parameters[name].unit)))
-        meanings.append((_called(name), _meaning(first, name)))
-    rows.append(("J", *(with_std(joint.inertia.value, joint.inertia.std) for joint in result.joints),
-                 format_unit(result.joints[0].inertia.unit) if result.joints else ""))
-    meanings.append(("J", "inertia about the joint, the others held"))
-    for name in dict.fromkeys(key for joint in result.joints for key, _ in _gravity(joint)):
-        found = [joint.gravity.get(name) for joint in result.joints]
-        unit = next(value.unit for value in found if value is not None)
-        rows.append((f"gravity, {name}", *(None if v is None else with_std(v.value, v.std) for v in found), unit))
-        meanings.append((f"gravity, {name}", _GRAVITY[name]))
-    text = ("Compare curves, not labels: several sets of numbers give one curve.",)
-    table = Table(("parameter", *(joint.name for joint in result.joints), "unit"), tuple(rows),
-                  "As Table III of Kostić et al. 2004: value ± std.", keeps_empty=True)
-    return Section("Parameters", text, (table, Table(("parameter", "what it is"), tuple(meanings))))
+    joints = result.joints
+    values: dict[str, tuple[str, list[Value | None]]] = {}  # name -> meaning, joint by joint
+    for name in sorted({name for joint in joints for name in joint.parameters}):
+        first = next(joint for joint in joints if name in joint.parameters)
+        found = [joint.parameters.get(name) for joint in joints]
+        values[_parameter(name)] = (_meaning(first, name), found)
+    values["J"] = ("inertia about the joint, the others held", [joint.inertia for joint in joints])
+    for joint in joints:
+        for name in _GRAVITY:
+            if name in joint.gravity:
+                own = [other.gravity.get(name) for other in joints]
+                values.setdefault(f"gravity, {name}", (_GRAVITY[name], own))
+    rows: list[tuple[Cell, ...]] = []
+    for name, (_, found) in values.items():
+        unit = next((format_unit(v.unit) for v in found if v is not None), "")
+        rows.append((name, *map(_std, found), unit))
+    columns = ("parameter", *(joint.name for joint in joints), "unit")
+    caption = "As Table III of Kostić et al. 2004: value ± std."
+    meanings = tuple((name, meaning) for name, (meaning, _) in values.items())
+    tables = (
+        Table(columns, tuple(rows), caption, keeps_empty=True),
+        Table(("parameter", "what it is"), meanings),
+    )
+    text = "Compare curves, not labels: several sets of numbers give one curve."
+    return Section("Parameters", (text,), tables)
 
 
-def _joint_sections(joint: JointResult) -> tuple[Section, ...]:
-    revolute = joint.revolute
-    points = ("the points pair torques at equal position and opposite speed and know of no law" if len(joint.series.map_speed) else
-              "no torques at equal position and opposite speed were found to hold it against")
-    curve = curve_figure(f"curve-{joint.joint}", f"{joint.name}: the fitted law, {_band(joint)}; {points}.", joint.series, revolute)
-    parts = fraction_figure(f"fractions-{joint.joint}", f"{joint.name}: torque of {joint.validation.by} and its fractions in the "
-                            "simulation.", joint.series, revolute)
-    simulated = simulation_figure(f"simulation-{joint.joint}", f"{joint.name}: measured and simulated motion. Gravity is "
-                                  "compensated at the measured position.", joint.series, revolute)
-    alone = (Section(f"{joint.name}: simulation", _simulation_words(joint), (), (simulated, parts)),) if joint.validation.by else ()
-    return (Section(f"{joint.name}: friction", _words(joint), _tables(joint), (curve,)), *_ripple_section(joint), *alone,
-            Section(f"{joint.name}: choice of the law", _ladder_words(joint), (_ladder(joint),)))
+def _joint_sections(joint: JointResult) -> list[Section]:
+    name, speed = joint.name, _units(joint)[1]
+    drift = drift_in_words(joint)
+    how = BreakAwayConfig()
+    never = _never_broke_away(joint)
+    text = _paragraphs("joint", joint, speed, drift, _sticking(joint), never, how.rest, how.within)
+    sections = [
+        Section(f"{name}: friction", text, _tables(joint), (_curve_figure(joint),)),
+        *_ripple_section(joint),
+    ]
+    if joint.validation.by:
+        figures = (_simulation_figure(joint), _fraction_figure(joint))
+        said = _paragraphs("simulation", joint.validation, speed)
+        sections.append(Section(f"{name}: simulation", said, figures=figures))
+    choice = Section(f"{name}: choice of the law", _choice_words(joint), (_candidates(joint),))
+    return [*sections, choice]
 
 
 def ripple_in_words(joint: JointResult) -> str:
     """Return the size of a ripple, and why it is no friction; empty where there is none."""
-    ripple = joint.ripple
-    if ripple is None:
-        return ""
-    return (f"Most of what the law leaves at {joint.name} is no friction: {with_std(ripple.rms.value, ripple.rms.std)} "
-            f"{ripple.rms.unit} rms of it {depends_in_words(joint, ripple)}.")
+    depends = "" if joint.ripple is None else depends_in_words(joint, joint.ripple)
+    return _say("ripple", joint.name, joint.ripple, depends)
 
 
-def _ripple_section(joint: JointResult) -> tuple[Section, ...]:
+def _ripple_section(joint: JointResult) -> list[Section]:
     """Its size, what it does to the inertia, what to do, and the torque by angle."""
     ripple = joint.ripple
     if ripple is None:
-        return ()
+        return []
     place = "angle" if joint.revolute else "position"
-    figure = ripple_figure(f"ripple-{joint.joint}", f"{joint.name}: what friction and inertia leave, by the {place} of the joint: "
-                           "the same forth and back, as no friction is.", ripple.along, joint.revolute)
-    inertia = inertia_in_words(joint, ripple, lambda value: f"{with_std(value.value, value.std)} {format_unit(value.unit)}")
-    text = (f"{ripple_in_words(joint)} It explains {format_number(100.0 * ripple.share, 2)} % of the law's residual on held-out "
-            f"blocks (mean square).{inertia and f' {inertia}.'}", f"{_capital(NAMED)}.")
-    return (Section(f"{joint.name}: a torque of the {place}", text, (), (figure,)),)
+    inertia = inertia_in_words(joint, ripple, lambda v: f"{_std(v)} {format_unit(v.unit)}")
+    text = _paragraphs("ripple_section", ripple_in_words(joint), ripple.share, inertia, NAMED)
+    figure = _ripple_figure(joint, ripple.along, place)
+    return [Section(f"{joint.name}: a torque of the {place}", text, figures=(figure,))]
 
 
-def _band(joint: JointResult) -> str:
-    """In words how wide the band about the curve is."""
-    width, height = 2.0 * float(np.max(joint.series.band)), float(np.max(np.abs(joint.series.curve)))
-    unit = "N m" if joint.revolute else "N"
-    if not np.isfinite(width) or height <= 0.0:
-        return "its band is not known"
-    hidden = ", narrower than the line" if width < _THIN * height else ""
-    return f"± 2 std shaded: at most ± {format_number(width, 2)} {unit}{hidden}"
-
-
-def _words(joint: JointResult) -> tuple[str, ...]:
-    slowest, fastest = joint.driven
-    unit = _speed_unit(joint)
-    words = [f"Driven from {format_number(slowest, 2)} to {format_number(fastest, 3)} {unit}, for which the law holds; "
-             f"logs: {', '.join(joint.logs)}."]
-    words += [text for text in (drift_in_words(joint),
-                                _sticking_in_words(joint)) if text]
-    if joint.held is not None:
-        low, high = joint.held
-        words.append(f"At rest friction carried from {format_number(low, 3)} to {format_number(high, 3)} N m.")
-    if joint.validation.by and (never := _never_broke_away(joint)):
-        how = BreakAwayConfig()
-        words.append(f"No break-away torque {' or '.join(never)} is given: nowhere in these logs does the joint rest for "
-                     f"{how.rest:g} s and then run that way within {how.within:g} s. A slow ramp of torque from rest shows it, "
-                     "where the joint does not creep for longer before it runs.")
-    return tuple(words)
-
-
-def _sticking_in_words(joint: JointResult) -> str:
-    """How many rows are left out, and why."""
-    sticking = joint.sticking
-    if sticking is None:
-        return ""
-    travel = f"{plain_number(sticking.distance)} {'rad' if joint.revolute else 'm'}"
-    words = (f"{plain_number(100.0 * sticking.share)} % of the rows of {joint.name} are left out: the joint rests or bends its "
-             f"contacts there, up to a travel of {travel}, and friction is no function of its speed.")
-    if sticking.slips:
-        words += (f" It sticks and slips on {sticking.slips} times amid motion one way: only the slips are fitted, and the law "
-                  "holds from the slowest speed that was driven on. Drive faster or with a stiffer loop to see slower sliding.")
-    return words
+def _sticking(joint: JointResult) -> dict[str, str] | None:
+    """How many rows are left out where the joint sticks, and up to which travel."""
+    if joint.sticking is None:
+        return None
+    travel = f"{plain_number(joint.sticking.distance)} {_units(joint)[0]}"
+    return {"share": plain_number(100.0 * joint.sticking.share), "travel": travel}
 
 
 def _never_broke_away(joint: JointResult) -> list[str]:
@@ -252,61 +245,152 @@ def _never_broke_away(joint: JointResult) -> list[str]:
 def _tables(joint: JointResult) -> tuple[Table, ...]:
     tables = []
     if joint.break_away:
-        tables.append(Table(("direction", "break-away torque", "unit", "events"), tuple(
-            ("forth" if event.direction > 0 else "back", with_std(event.torque.value, event.torque.std), event.torque.unit,
-             event.events) for event in joint.break_away), "Mean ± std of one event; reported, not part of the law."))
+        rows = tuple(
+            ("forth" if e.direction > 0 else "back", _std(e.torque), e.torque.unit, e.events)
+            for e in joint.break_away
+        )
+        caption = "Mean ± std of one event; reported, not part of the law."
+        tables.append(Table(("direction", "break-away torque", "unit", "events"), rows, caption))
     if joint.unseen:
-        tables.append(Table(("not shown by these logs", "what to record"), tuple(
-            (gap.what, gap.record) for gap in joint.unseen),
-                            tones=tuple("attention" for _ in joint.unseen)))
+        gaps = tuple((gap.what, gap.record) for gap in joint.unseen)
+        columns = ("not shown by these logs", "what to record")
+        attention: tuple[Tone, ...] = tuple("attention" for _ in gaps)
+        tables.append(Table(columns, gaps, tones=attention))
     return tuple(tables)
 
 
-def _simulation_words(joint: JointResult) -> tuple[str, ...]:
-    judged = joint.validation
-    log = f"{judged.by}, {'which was held out' if judged.held_out else 'which was fitted too, for no log has role validate'}"
-    with_, without = (_off(value, _speed_unit(joint)) for value in (judged.velocity_error_with, judged.velocity_error_without))
-    return (f"Simulated from its first sample under the torque of {log}, beside the measured speed: {with_} with friction, "
-            f"{without} without.",)
+def _choice_words(joint: JointResult) -> tuple[str, ...]:
+    """How the law was chosen, and by how much the best law with fewer numbers is worse."""
+    laws = joint.candidate_laws
+    by_logs = joint.judged_by == "logs"
+    chosen = next((law for law in laws if law.chosen), laws[0])
+    usable = [law for law in laws if not law.reason]
+    plainer = [law for law in usable if law.size < chosen.size]
+    if not plainer or min(law.validate_rms for law in laws) <= 0.0:
+        return _paragraphs("choice", len(laws), by_logs, None, None, None, 0.0)
+    plain = min(plainer, key=lambda law: law.validate_rms)
+    best = min(usable, key=lambda law: law.validate_rms)
+    more = 100.0 * (plain.validate_rms / best.validate_rms - 1.0)  # than the best: as was tested
+    names = [{"law": _plain(law.law), "size": law.size} for law in (chosen, plain)]
+    than = "" if best is chosen else _plain(best.law)
+    return _paragraphs("choice", len(laws), by_logs, *names, than, more)
 
 
-def _ladder_words(joint: JointResult) -> tuple[str, ...]:
-    judge = "held-out logs" if joint.judged_by == "logs" else "held-out blocks of the fitted logs"
-    if len(joint.candidate_laws) == 1:
-        return ("The law was given.",)
-    return (f"Every law was fitted on one part and judged on {judge}; the simplest that is not measurably worse than the best was "
-            "taken.", *_why_not_plainer(joint))
+def _candidates(joint: JointResult) -> Table:
+    rows, tones = [], list[Tone]()
+    for law in joint.candidate_laws:
+        # "amplitude of presliding" for "presliding.amplitude": names of settings are no words
+        reason = _plain(re.sub(r"\b([a-z]\w*)\.([a-z]\w*)", r"\2 of \1", law.reason))
+        verdict = "chosen" if law.chosen else reason or ("not worse" if law.alike else "worse")
+        errors = (1e3 * law.identify_rms, 1e3 * law.validate_rms)
+        rows.append((_plain(law.law), law.size, *errors, verdict))
+        tones.append("good" if law.chosen else "neutral")
+    columns = ("law", "numbers", "left, fitted [mN m]", "left, held out [mN m]", "")
+    caption = "Root mean square of the residual of mean torques over windows."
+    return Table(columns, tuple(rows), caption, tuple(tones))
 
 
-def _why_not_plainer(joint: JointResult) -> tuple[str, ...]:
-    """Return by how much the held-out error of the best law with fewer numbers is larger."""
-    chosen = next(rung for rung in joint.candidate_laws if rung.chosen)
-    plainer = [rung for rung in joint.candidate_laws if rung.size < chosen.size and not rung.reason]
-    if not plainer or min(rung.validate_rms for rung in joint.candidate_laws) <= 0.0:
-        return ()
-    plain = min(plainer, key=lambda rung: rung.validate_rms)
-    best = min([rung for rung in joint.candidate_laws if not rung.reason] or [chosen], key=lambda rung: rung.validate_rms)
-    more = format_number(100.0 * (plain.validate_rms / best.validate_rms - 1.0), 2)  # than the best: what chance was asked of
-    than = "" if best is chosen else f" than {_plain(best.law)}, the best of all"
-    return (f"{_capital(_plain(chosen.law))}, with {chosen.size} numbers, and not {_plain(plain.law)}, the best law with fewer "
-            f"({plain.size}): that leaves {more} % more of what was held out (rms){than}, more than chance allows.",)
+def _curve_figure(joint: JointResult) -> Figure:
+    """Friction torque against speed: all of it, and the part about zero."""
+    series, (_, speed, torque) = joint.series, _units(joint)
+    width, height = 2.0 * float(np.max(series.band)), float(np.max(np.abs(series.curve)))
+    known = bool(np.isfinite(width)) and height > 0.0
+    thin, paired = width < _THIN * height, len(series.map_speed) > 0
+    caption = _say("curve", joint.name, width if known else None, torque, thin, paired)
+
+    def draw(drawing: Drawing) -> None:
+        whole, near = drawing.subplots(1, 2, sharey=True, width_ratios=(3, 2))
+        fastest = float(series.speed.max())
+        draw_curve(whole, series, fastest)
+        draw_curve(near, series, _NEAR * fastest)
+        whole.set_ylabel(f"friction [{torque}]")
+        drawing.supxlabel(f"speed [{speed}]", fontsize="medium")
+        whole.legend(loc="upper left", borderpad=0.2)
+        near.set_title("about zero", pad=3.0)
+
+    return Figure(f"curve-{joint.joint}", caption, draw)
 
 
-def _capital(words: str) -> str:
-    return words[:1].upper() + words[1:]
+def draw_curve(axis: Axes, series: Series, reach: float) -> None:
+    """The law with its band, and the torques at equal position and opposite speed."""
+    inside = np.abs(series.speed) <= 1.05 * reach
+    v, curve, band = series.speed[inside], series.curve[inside], 2.0 * series.band[inside]
+    shade: Look = {"color": style.BLUE, "alpha": 0.25, "linewidth": 0.0}
+    axis.fill_between(v, curve - band, curve + band, label="± 2 std", **shade)
+    axis.plot(v, curve, color=style.BLUE, linewidth=1.2, label="fitted law")
+    near = series.map_speed <= 1.05 * reach
+    points = (series.map_speed[near], series.map_odd[near])
+    look: Look = {"markersize": 3.0, "color": style.VERMILLION, "elinewidth": 0.8}
+    for side in (1.0, -1.0) if len(series.map_speed) else ():
+        label = "± v in pairs" if side > 0 else None
+        v, x = (side * p for p in points)
+        axis.errorbar(v, x, 2.0 * series.map_std[near], fmt="o", label=label, **look)
+    axis.axhline(0.0, color=style.GREY, linewidth=0.6)
+    axis.axvline(0.0, color=style.GREY, linewidth=0.6)
+    axis.set_xlim(-1.03 * reach, 1.03 * reach)
+    axis.locator_params(axis="x", nbins=5)
 
 
-def _plain_reason(reason: str) -> str:
-    """With "amplitude of presliding" for "presliding.amplitude": names of settings are no words."""
-    return _plain(re.sub(r"\b([a-z]\w*)\.([a-z]\w*)", r"\2 of \1", reason))
+def _fraction_figure(joint: JointResult) -> Figure:
+    """Torque and its friction, gravity and inertial fractions, Fig. 5."""
+    s = joint.series
+    fractions = {
+        "torque": (s.torque, style.BLACK),
+        "friction": (s.friction, style.GREEN),
+        "gravity": (s.gravity, style.PURPLE),
+        "inertia": (s.inertial, style.BLUE),
+    }
+    names = list(fractions)
+
+    def draw_row(axis: Axes, k: int) -> None:
+        values, color = fractions[names[k]]
+        axis.plot(*envelope(s.t, values, 800), color=color, linewidth=0.9)
+
+    caption = f"{joint.name}: torque of {joint.validation.by} and its fractions in the simulation."
+    quantity = "torque [N m]" if joint.revolute else "force [N]"
+    return rows_figure(
+        f"fractions-{joint.joint}", caption, names, draw_row, quantity, row=1.15, sharey=True
+    )
 
 
-def _ladder(joint: JointResult) -> Table:
-    rows = []
-    tones: list[Tone] = []
-    for rung in joint.candidate_laws:
-        verdict = "chosen" if rung.chosen else _plain_reason(rung.reason) or ("not worse" if rung.alike else "worse")
-        rows.append((_plain(rung.law), rung.size, 1e3 * rung.identify_rms, 1e3 * rung.validate_rms, verdict))
-        tones.append("good" if rung.chosen else "neutral")
-    return Table(("law", "numbers", "left, fitted [mN m]", "left, held out [mN m]", ""), tuple(rows),
-                 "Root mean square of the residual of mean torques over windows.", tuple(tones))
+def _simulation_figure(joint: JointResult) -> Figure:
+    """Measured over simulated position and speed, friction left out and in, Fig. 6."""
+    s, (position, speed, _) = joint.series, _units(joint)
+    columns = {
+        "friction left out": ((s.q, s.q_without), (s.dq, s.dq_without)),
+        "with friction": ((s.q, s.q_with), (s.dq, s.dq_with)),
+    }
+
+    def draw(drawing: Drawing) -> None:
+        grid = drawing.subplots(2, 2, sharex=True)
+        for column, (title, signals) in zip(grid.T, columns.items(), strict=True):
+            for axis, (measured, simulated) in zip(column, signals, strict=True):
+                draw_measured(axis, *envelope(s.t, measured, 800))
+                draw_modelled(axis, *envelope(s.t, simulated, 800), "simulated")
+                axis.margins(x=0.01, y=0.08)
+                axis.locator_params(axis="y", nbins=5)
+            column[0].set_title(title, pad=3.0)
+            column[1].set_xlabel("time [s]")
+        grid[0, 0].set_ylabel(f"position [{position}]")
+        grid[1, 0].set_ylabel(f"speed [{speed}]")
+        grid[0, 1].legend(loc="best", borderpad=0.2)
+
+    what = "measured and simulated motion. Gravity is compensated at the measured position."
+    return Figure(f"simulation-{joint.joint}", f"{joint.name}: {what}", draw, (6.0, 4.0))
+
+
+def _ripple_figure(joint: JointResult, along: Along, place: str) -> Figure:
+    """Residual of the law against the angle: forth, back, and the fitted waves."""
+
+    def draw(axis: Axes) -> None:
+        axis.plot(along.angle, along.forth, ".", ms=3.5, color=style.VERMILLION, label="forth")
+        axis.plot(along.angle, along.back, ".", ms=3.5, color=style.GREEN, label="back")
+        axis.plot(along.angle, along.waves, color=style.BLUE, linewidth=1.0, label="fitted waves")
+        axis.set_xlabel("angle [rad]" if joint.revolute else "position [m]")
+        axis.set_ylabel("torque left [N m]" if joint.revolute else "force left [N]")
+        axis.margins(x=0.01)
+        legend_above(axis, 3)
+
+    what = f"what friction and inertia leave, by the {place} of the joint"
+    caption = f"{joint.name}: {what}: the same forth and back, as no friction is."
+    return one_figure(f"ripple-{joint.joint}", caption, draw, 3.0)

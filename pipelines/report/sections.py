@@ -1,28 +1,38 @@
-"""Parts of a report that several stages show: checks of a log, its signals, its sampling, what happened when."""
+"""Sections that several reports share: the checks of a log, and what its torque is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
-
-import numpy as np
-import numpy.typing as npt
+import math
+from collections.abc import Iterable
 
 from pipelines.errors import Check, Level
+from pipelines.estimation.checks.boundary import Boundary
 from pipelines.log.codes import title_of
-from pipelines.report import figures
-from pipelines.report.report import Figure, Table, Tone
+from pipelines.report.report import Section, Table, Tone
+from pipelines.report.sentences import as_sentence, paragraphs, sentence
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure as Drawing
+NO_COLLISION_CHECK = (
+    "Self-collision is not checked, nor is collision with anything around the robot."
+)
+CARD = "What the logged torque is"
 
-__all__ = ["checks_table", "interval_figure", "joint_signal_figure", "level_tone", "timeline_figure"]
-
-Array = npt.NDArray[np.float64]
-
-_TONES: dict[Level, Tone] = {"ok": "good", "warn": "attention", "repair": "attention", "reject": "bad"}
-_RESULTS: dict[Level, str] = {"ok": "passed", "warn": "look at it", "repair": "mended", "reject": "not usable"}
+_TONES: dict[Level, Tone] = {
+    "ok": "good",
+    "warn": "attention",
+    "repair": "attention",
+    "reject": "bad",
+}
+_RESULTS: dict[Level, str] = {
+    "ok": "passed",
+    "warn": "warning",
+    "repair": "repaired",
+    "reject": "not usable",
+}
 _ORDER: tuple[Level, ...] = ("reject", "repair", "warn", "ok")
+_LISTED = 40  # logs
+_UNKNOWN = "not identifiable"
+
+Row = tuple[str, str, str, Tone]  # quantity, estimate, meaning, tone
 
 
 def level_tone(levels: Iterable[Level]) -> Tone:
@@ -33,35 +43,120 @@ def level_tone(levels: Iterable[Level]) -> Tone:
 
 def checks_table(checks: Iterable[Check], *, as_given: bool = False) -> Table:
     """What was checked and found, the worst first, or `as_given`."""
-    ordered = list(checks) if as_given else sorted(checks, key=lambda check: _ORDER.index(check.level))
-    return Table(columns=("result", "finding", "where", "what to do", "code"),
-                 rows=tuple((_RESULTS[check.level], check.message, check.where, check.remedy,
-                             f"{check.code} {title_of(check.code)}".strip())
-                            for check in ordered),
-                 tones=tuple(_TONES[check.level] for check in ordered))
+    found = list(checks) if as_given else sorted(checks, key=lambda c: _ORDER.index(c.level))
+    return Table(
+        ("result", "finding", "where", "what to do", "code"),
+        tuple(
+            (
+                _RESULTS[c.level],
+                c.message,
+                c.where,
+                c.remedy,
+                f"{c.code} {title_of(c.code)}".strip(),
+            )
+            for c in found
+        ),
+        tones=tuple(_TONES[c.level] for c in found),
+    )
 
 
-def joint_signal_figure(name: str, caption: str, t: Array, values: Array, unit: str, *, quantity: str = "",
-                        names: Sequence[str] = (), flagged: npt.NDArray[np.bool_] | None = None,
-                        flag_name: str = "flagged") -> Figure:
-    """A signal over time, one row a joint; see `figures.draw_joint_signals`."""
-    joints = values.shape[1] if values.ndim > 1 else 1
-
-    def draw(drawing: Drawing) -> None:
-        figures.draw_joint_signals(figures.joint_axes(drawing, joints), t, values, unit, quantity=quantity, names=names,
-                                   flagged=flagged, flag_name=flag_name)
-
-    return Figure(name, caption, draw, size=figures.joint_size(joints))
+def data_quality(checks: Iterable[Check]) -> tuple[Section, ...]:
+    """The section of the checks of the logs, where there are any."""
+    found = tuple(checks)
+    return (Section("Data quality", tables=(checks_table(found),)),) if found else ()
 
 
-def interval_figure(name: str, caption: str, t: Array, sample_time: float) -> Figure:
-    """How evenly the log was sampled."""
-    return Figure(name, caption, lambda drawing: figures.draw_intervals(drawing.subplots(), t, sample_time),
-                  size=(6.0, 2.6))
+def further_logs(names: Iterable[str]) -> tuple[Section, ...]:
+    """The section of the logs that have no figures, where there are any."""
+    listed = ", ".join(list(names)[:_LISTED])
+    text = f"Their figures are in result.json alone: {listed}."
+    return (Section("Further logs", (text,)),) if listed else ()
 
 
-def timeline_figure(name: str, caption: str, extent: tuple[float, float],
-                    rows: Sequence[tuple[str, Sequence[tuple[float, float]]]]) -> Figure:
-    """When gaps, repairs and limits fell, one row a kind."""
-    return Figure(name, caption, lambda drawing: figures.draw_timeline(drawing.subplots(), extent, rows),
-                  size=(6.0, 0.6 + 0.32 * max(1, len(rows))))
+def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
+    """What the logged torque is: the verdict, a row a quantity, and what no log tells.
+
+    Nothing where no log moves the arm enough.
+    """
+    if boundary is None:
+        return ()
+    rows = [_sign(boundary), _gravity(boundary), _direction(boundary), _friction(boundary)]
+    rows += [_order(boundary), _unit(boundary)]
+    table = Table(
+        ("quantity", "estimate ± standard deviation", "meaning"),
+        tuple(row[:3] for row in rows),
+        tones=tuple(row[3] for row in rows),
+    )
+    parts = {
+        "its sign": boundary.sign,
+        "gravity": boundary.gravity.present,
+        "gravity's direction": boundary.direction.vector,
+        "friction": boundary.friction.present,
+        "the order of the joints": None if boundary.order.reason else boundary.order.columns,
+    }
+    if boundary.gravity.present is False:
+        parts["gravity's direction"] = ()
+    unknown = [name for name, value in parts.items() if value is None]
+    text = paragraphs("boundary", "text", boundary, unknown, len(unknown) < len(parts))
+    return (Section(CARD, text, (table,), leads=True),)
+
+
+def _sign(boundary: Boundary) -> Row:
+    names = {"magnitude": "none", None: _UNKNOWN}
+    tone: Tone = "bad" if boundary.sign == "magnitude" else "neutral"
+    meaning = sentence("boundary", "sign", boundary.sign)
+    return "sign", names.get(boundary.sign, "signed"), meaning, tone
+
+
+def _number(value: float | None, std: float | None) -> str:
+    if value is None or std is None or not math.isfinite(std):
+        return _UNKNOWN
+    digits = max(2, min(4, 1 - math.floor(math.log10(std)))) if std > 0.0 else 4
+    return f"{value + 0.0:.{digits}f} ± {std:.{digits}f}"
+
+
+def _gravity(boundary: Boundary) -> Row:
+    share = boundary.gravity
+    joints = [
+        f"joint {j}: {_number(value, std)}"
+        for j, (value, std) in enumerate(zip(share.joint_share, share.joint_std, strict=True), 1)
+        if value is not None
+    ]
+    tone: Tone = "bad" if boundary.without_gravity else "neutral"
+    meaning = sentence("boundary", "gravity", share, joints)
+    return "share of gravity", _number(share.share, share.std), meaning, tone
+
+
+def _direction(boundary: Boundary) -> Row:
+    direction = boundary.direction
+    tone: Tone = "bad" if boundary.turned else "neutral"
+    if direction.vector is None or direction.std is None or direction.angle is None:
+        return "gravity vector [m/s²]", _UNKNOWN, as_sentence(direction.reason), tone
+    vector = ", ".join(f"{round(x, 2) + 0.0:.2f}" for x in direction.vector)
+    angle, std = math.degrees(direction.angle), math.degrees(direction.std)
+    meaning = f"{angle:.1f}° from the description."
+    return "gravity vector [m/s²]", f"[{vector}] ± {std:.1f}°", meaning, tone
+
+
+def _friction(boundary: Boundary) -> Row:
+    share = boundary.friction
+    meaning = sentence("boundary", "friction", share, boundary.side)
+    return "share of friction", _number(share.share, share.std), meaning, "neutral"
+
+
+def _order(boundary: Boundary) -> Row:
+    order = boundary.order
+    tone: Tone = "bad" if order.signal else "neutral"
+    estimate = _UNKNOWN if order.columns is None else ", ".join(map(str, order.columns))
+    if order.columns is not None and not order.signal:
+        estimate += ", as logged"
+    return "order of the joints", estimate, sentence("boundary", "order", order), tone
+
+
+def _unit(boundary: Boundary) -> Row:
+    unit = boundary.unit
+    names = ", ".join(dict.fromkeys(unit.units))
+    if unit.scale is None:
+        return "unit", names, f"Taken from the log: not identifiable, {unit.reason}.", "neutral"
+    scale = _number(unit.scale, unit.std)
+    return "unit", f"{names}, times {scale}", "1 where the described links are right.", "neutral"

@@ -1,7 +1,8 @@
-"""How figures and numbers look: colours every eye can tell apart, plain text, digits that mean something.
+"""How figures and numbers look: colours every eye can tell apart, digits that mean something.
 
-Colours: Okabe and Ito 2008, "Color Universal Design". Text in figures is drawn as outlines of the font that matplotlib
-ships, so a figure looks the same on every screen and printer and no name in it can be read as mark-up.
+Colours: Okabe and Ito 2008, "Color Universal Design". Text in figures is drawn as outlines of the
+font that matplotlib ships, so a figure looks the same on every screen and printer and no name in it
+can be read as mark-up.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ import math
 import os
 import re
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from pipelines.errors import clean
 from pipelines.log.atomic import remove_folder, temporary_folder
@@ -23,10 +24,7 @@ from pipelines.log.atomic import remove_folder, temporary_folder
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
-__all__ = ["BLACK", "BLUE", "COLOURS", "GREEN", "GREY", "ORANGE", "PURPLE", "SKY", "VERMILLION", "figure_style",
-           "format_decimals", "format_number", "format_unit", "log_ticks", "prepare_matplotlib", "printable", "to_one_place",
-           "unit_in_words", "with_std"]
-
+STYLE_FILE: Final = Path(__file__).parent / "templates" / "report.mplstyle"
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 BLACK: Final = "#1a1f24"
 GREY: Final = "#5b6670"
@@ -36,33 +34,20 @@ GREEN: Final = "#009e73"
 ORANGE: Final = "#e69f00"
 SKY: Final = "#56b4e9"
 PURPLE: Final = "#cc79a7"
-COLOURS: Final = (BLUE, VERMILLION, GREEN, ORANGE, SKY, PURPLE)  # in the order they are told apart best
-
-_RC: Final[dict[Any, Any]] = {
-    "text.parse_math": False,  # names of channels come from files: "$a_{" is a name, not a formula
-    "svg.fonttype": "path",
-    "font.family": ["DejaVu Sans"],
-    "font.size": 9.0, "axes.titlesize": 9.0, "axes.labelsize": 9.0, "xtick.labelsize": 8.5, "ytick.labelsize": 8.5,
-    "legend.fontsize": 8.5, "legend.frameon": False, "legend.handlelength": 1.4, "legend.borderaxespad": 0.2,
-    "text.color": BLACK, "axes.labelcolor": BLACK, "axes.titlecolor": BLACK, "axes.edgecolor": GREY,
-    "xtick.color": GREY, "ytick.color": GREY, "xtick.labelcolor": BLACK, "ytick.labelcolor": BLACK,
-    "axes.spines.top": False, "axes.spines.right": False, "axes.linewidth": 0.7, "axes.axisbelow": True,
-    "axes.grid": True, "grid.color": "#dfe4e8", "grid.linewidth": 0.6, "axes.titlelocation": "left",
-    "axes.formatter.limits": (-4, 5), "axes.formatter.useoffset": False,
-    "xtick.major.size": 3.0, "ytick.major.size": 3.0, "xtick.major.width": 0.7, "ytick.major.width": 0.7,
-    # a lone sample between two gaps is a very short line; only its round ends make it visible
-    "lines.linewidth": 1.1, "lines.solid_capstyle": "round", "lines.solid_joinstyle": "round",
-    "figure.facecolor": "white", "savefig.facecolor": "white",
-    # laid out at the resolution of the PNG: at another the letters are rounded to other widths, and a long label is cut
-    "figure.dpi": 150.0,
-}
+COLOURS: Final = (
+    BLUE,
+    VERMILLION,
+    GREEN,
+    ORANGE,
+    SKY,
+    PURPLE,
+)  # in the order they are told apart best
 
 
 def printable(text: object, limit: int = 400) -> str:
     """`text` as one line that any file, browser and font can take.
 
-    Names read from a damaged file may hold halves of surrogate pairs: UTF-8 cannot write them and
-    matplotlib fails on them.
+    Names from a damaged file may hold halves of surrogate pairs, which UTF-8 cannot write.
     """
     return clean(str(text).encode("utf-8", "replace").decode("utf-8"), limit)
 
@@ -77,13 +62,21 @@ def unit_in_words(unit: str) -> str:
     return "" if unit == "1" else f"per {unit[2:]}" if unit.startswith("1/") else format_unit(unit)
 
 
+def enumerated(words: Iterable[str], word: str = "and") -> str:
+    """ "a, b and c"."""
+    *first, last = list(words) or [""]
+    return f"{', '.join(first)} {word} {last}" if first else last
+
+
 def format_number(value: float | None, digits: int = 4) -> str:
-    """`value` with `digits` significant digits and no empty zeros, fewer where it is `Rounded`; a dash where there is none."""
+    """`value` with `digits` significant digits, fewer where it is `Rounded`; a dash for none."""
     if value is None or math.isnan(value):
         return "–"
     if isinstance(value, Rounded):
         digits = min(digits, value.digits)
-    if item := getattr(value, "item", None):  # NumPy's integers and truth values are no int and no bool
+    if item := getattr(
+        value, "item", None
+    ):  # NumPy's integers and truth values are no int and no bool
         value = item()
     if isinstance(value, bool):
         return "yes" if value else "no"
@@ -98,8 +91,11 @@ def format_number(value: float | None, digits: int = 4) -> str:
 
 
 class Rounded(float):
-    """A number for a cell, shown with so many significant digits: a column of equally many decimals fills it up with digits of its
-    own, where a number rounded before would get zeros that are none."""
+    """A number for a cell, shown with so many significant digits.
+
+    A column of equally many decimals fills it up with digits of its own, where a number that was
+    rounded before would get zeros that are none.
+    """
 
     digits: int
 
@@ -115,7 +111,7 @@ def three_digits(value: float | None) -> Rounded | None:
 
 
 def to_one_place(values: Sequence[float]) -> list[float | None]:
-    """Rounded to the same decimal place, where the largest has three digits and the smallest two; None where there is no value."""
+    """Rounded to one decimal place, where the largest has three digits and the smallest two."""
     sizes = [math.floor(math.log10(abs(x))) for x in values if math.isfinite(x) and x != 0.0]
     place = max(2 - max(sizes), 1 - min(sizes)) if sizes else 0
     return [round(float(x), place) if math.isfinite(x) else None for x in values]
@@ -127,20 +123,20 @@ def format_decimals(value: float, decimals: int) -> str:
 
 
 def with_std(value: float | None, std: float | None) -> str:
-    """Value and standard deviation to the same decimal place, the deviation with two digits: "1.930 ± 0.020"."""
+    """Value and deviation to one decimal place, the deviation with two digits: "1.930 ± 0.020"."""
     if value is None or std is None or not math.isfinite(value) or math.isnan(std) or std == 0.0:
         return format_number(value)
     if math.isinf(std):
         return f"{format_number(value)} ± ∞"
     last = _split(std, 2)[1] - 1  # decimal place of the deviation's second digit
     first = max(_split(value, 17)[1] if value else last + 1, last + 1)
-    if first - last > 9 or abs(first) > 300:  # both to one place would be a row of zeros, or not a number
+    if first - last > 9 or abs(first) > 300:  # both to one place: a row of zeros, or not a number
         return f"{format_number(value, 10)} ± {format_number(std, 2)}"
     if -3 <= first <= 5:
-        parts = [_grouped(f"{round(number, -last):.{max(0, -last)}f}") for number in (value, std)]
-        return " ± ".join(parts)
-    parts = [_grouped(f"{number / 10.0**first:.{first - last}f}") for number in (value, std)]
-    return f"({' ± '.join(parts)}) × 10{_raised(first)}"
+        decimals = max(0, -last)
+        return " ± ".join(_grouped(f"{round(x, -last):.{decimals}f}") for x in (value, std))
+    both = " ± ".join(_grouped(f"{x / 10.0**first:.{first - last}f}") for x in (value, std))
+    return f"({both}) × 10{_raised(first)}"
 
 
 def _split(value: float, digits: int) -> tuple[str, int]:
@@ -168,35 +164,37 @@ def _raised(exponent: int) -> str:
 
 
 def log_ticks(axis: Axis) -> None:
-    """Label powers of ten on a logarithmic axis as plain text; matplotlib's own labels are formulas.
+    """Label powers of ten on a logarithmic axis as plain text; matplotlib's own are formulas.
 
-    Where fewer than two of them are in view, so that no scale could be read, what lies between is labelled: twice and five times
-    a power of ten, or every whole multiple, and the powers in the same way.
+    Where fewer than two of them are in view, so that no scale could be read, what lies between is
+    labelled: twice and five times a power of ten, or every whole multiple.
     """
     from matplotlib.ticker import FuncFormatter
 
-    def seen() -> list[int]:
+    def in_view(multiple: int = 1) -> int:
+        """How many of `multiple` times a power of ten are in view."""
         low, high = sorted(axis.get_view_interval())
-        return [k for k in range(1, 10) for power in _powers(low, high) if low <= k * 10.0**power <= high]
+        if low <= 0.0:
+            return 0
+        first = math.ceil(math.log10(low / multiple) - 1e-9)
+        return math.floor(math.log10(high / multiple) + 1e-9) - first + 1
 
     def label(value: float, _position: int | None = None) -> str:
         if 1.0 <= value < 1e4:
             return format_number(int(value))
-        return f"10{_raised(round(math.log10(value)))}" if seen().count(1) >= 2 else format_number(value, 1)
+        if in_view() < 2:
+            return format_number(value, 1)
+        return f"10{_raised(round(math.log10(value)))}"
 
     def between(value: float, _position: int | None = None) -> str:
-        if (there := seen()).count(1) >= 2:
+        if in_view() >= 2:
             return ""
-        wanted = (2, 5) if sum(there.count(k) for k in (1, 2, 5)) >= 2 else range(2, 10)
-        return format_number(float(f"{value:.1g}"), 1) if round(value / 10.0 ** math.floor(math.log10(value))) in wanted else ""
+        wanted = (2, 5) if sum(map(in_view, (1, 2, 5))) >= 2 else range(2, 10)
+        multiple = round(value / 10.0 ** math.floor(math.log10(value)))
+        return format_number(float(f"{value:.1g}"), 1) if multiple in wanted else ""
 
     axis.set_major_formatter(FuncFormatter(label))
     axis.set_minor_formatter(FuncFormatter(between))
-
-
-def _powers(low: float, high: float) -> range:
-    """Of ten, that a multiple between the two may have."""
-    return range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1) if 0.0 < low <= high else range(0)
 
 
 @contextmanager
@@ -204,21 +202,24 @@ def figure_style(salt: str) -> Iterator[None]:
     """Draw in the report's style, whatever the user's own matplotlib settings say.
 
     Args:
-        salt: makes the identifiers inside the SVG of one figure differ from those of the next, and equal on every run.
+        salt: makes the identifiers in the SVG of one figure differ from those of the next, and
+            equal on every run.
     """
     prepare_matplotlib()
     import matplotlib
 
     with matplotlib.rc_context(), warnings.catch_warnings():
-        # A glyph the font lacks, a panel too narrow for its labels: the reader sees it, the terminal need not.
+        # A glyph the font lacks, a panel too narrow for its labels: the reader sees it.
         warnings.simplefilter("ignore", UserWarning)
         matplotlib.rcdefaults()
-        matplotlib.rcParams.update(_RC | {"svg.hashsalt": salt})
+        own = matplotlib.rc_params_from_file(STYLE_FILE, use_default_template=False)
+        matplotlib.rcParams.update(own)
+        matplotlib.rcParams["svg.hashsalt"] = salt
         yield
 
 
 def prepare_matplotlib() -> None:
-    """Before its first import: give matplotlib a folder it may write to, and keep its remarks on fonts and caches to itself."""
+    """Before its first import: give matplotlib a folder to write to, silence its remarks."""
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     if "MPLCONFIGDIR" in os.environ or _writable_home():
         return
@@ -232,11 +233,15 @@ def _writable_home() -> bool:
         home = Path.home()
     except RuntimeError:  # no HOME and no entry for this user
         return False
-    folders = [Path(os.environ.get(name) or home / below) / "matplotlib"
-               for name, below in (("XDG_CONFIG_HOME", ".config"), ("XDG_CACHE_HOME", ".cache"))]
+    folders = [
+        Path(os.environ.get(name) or home / below) / "matplotlib"
+        for name, below in (("XDG_CONFIG_HOME", ".config"), ("XDG_CACHE_HOME", ".cache"))
+    ]
     return all(map(_can_be_made, folders))
 
 
 def _can_be_made(folder: Path) -> bool:
-    nearest = next(path for path in (folder, *folder.parents) if os.path.exists(path))  # Path.exists raises where it may not look
+    nearest = next(
+        path for path in (folder, *folder.parents) if os.path.exists(path)
+    )  # Path.exists raises where it may not look
     return nearest.is_dir() and os.access(nearest, os.W_OK)

@@ -17,6 +17,7 @@ from pipelines.diagnosis.result import Diagnosis
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import encode
 from pipelines.model.rows.prepare import Logs
+from pipelines.report.boundary_card import CARD
 from pipelines.stage import Request
 from tests.diagnose.sessions import but, healthy_again, session, written
 from tests.diagnosis.asking import answered
@@ -66,6 +67,11 @@ def test_the_report_does_not_call_it_nothing_wrong(rubbed: diagnose.Result) -> N
     assert report.verdict.startswith("Whether anything is wrong with this arm cannot be judged: no noise floor")
     assert report.tone == "attention"
     assert "nothing is wrong" not in str(report).lower()
+
+
+def test_what_the_logged_torque_is_comes_first(rubbed: diagnose.Result) -> None:
+    assert encode(rubbed)[0]["boundary"]["sign"] == "signed"
+    assert diagnose.report(rubbed).sections[0].title == CARD
 
 
 def test_a_model_that_leaves_next_to_nothing_needs_no_floor() -> None:

@@ -97,7 +97,7 @@ def test_the_report_says_what_to_check(rippled: Outcome[diagnose.Result]) -> Non
     assert any(text.startswith("What to check: ") for text in first.text)
     assert any(" mm " in text for text in first.text)
     assert first.figures[0].name == "proof-1"
-    assert {"What this rests on", "What would have been found"} <= {section.title for section in report.sections}
+    assert {"What this rests on", "Detection limits"} <= {section.title for section in report.sections}
 
 
 def test_it_is_said_which_laws_and_thresholds_a_diagnosis_took(rippled: Outcome[diagnose.Result]) -> None:

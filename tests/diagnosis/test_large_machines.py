@@ -60,5 +60,5 @@ def test_a_cause_that_would_have_to_push_is_refused_for_that() -> None:
 
     found = extended(Logs((slide(1, "identify", less),), (slide(3, "validate", less),)), Wanted(QuadraticDrag(joint=1)))
     (rejected,) = found.rejected
-    assert rejected.reason.startswith("fitted exactly, its numbers are none that it can have: coefficient = -")
+    assert rejected.reason.startswith("fitted exactly, its numbers are impossible: coefficient = -")
     assert rejected.reason.endswith(" N s^2/m^2")

@@ -17,7 +17,7 @@ from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, prepare
 from pipelines.model.rows.residual_analysis import _fine_enough, binned, proof
-from pipelines.report.diagnosis_proof import proof_figures
+from pipelines.report.diagnosis_finding import proof_figures
 from tests.diagnosis.rotor import turned
 from tests.report.test_diagnosis_words import found
 
@@ -51,7 +51,7 @@ def test_what_rings_is_shown_over_frequency() -> None:
         assert abs(shown.x[np.argmax(line)] - _RINGS) < 2.0
     beside = np.abs(shown.x - _RINGS) < 2.0
     assert shown.after[beside].max() < 0.2 * shown.before[beside].max()
-    caption = next(proof_figures(1, replace(found("base_resonance"), proof=shown))).caption
+    caption = proof_figures(1, replace(found("base_resonance"), proof=shown))[0].caption
     size = re.search(r"amplitudes in the log .*: ([0-9.]+) N m rms without", caption)
     assert size is not None
     assert float(size[1]) == pytest.approx(float(before.rms[0]), rel=0.1)
@@ -92,7 +92,7 @@ def test_what_happened_once_is_shown_over_the_time_of_its_log() -> None:
     assert shown.predicted.max() > 2.7
     assert abs(shown.x[np.argmax(shown.predicted)] - when) < 0.1
     assert shown.x[-1] <= second.t[-1]
-    caption = next(proof_figures(1, replace(found("contact"), proof=shown, log="again"))).caption
+    caption = proof_figures(1, replace(found("contact"), proof=shown, log="again"))[0].caption
     assert caption.startswith("Residual of joint 1 over the time of again, means in bins: ")
     angle: Any = SimpleNamespace(left=before.left - np.tile(np.where(first.at_rows(first.motion.q)[:, 0] > 9.0, 1.0, 0.0), 2))
     assert proof(before, angle, 1).against == "position"

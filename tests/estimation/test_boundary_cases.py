@@ -21,7 +21,7 @@ from pipelines.log.experiment import ExperimentLog, Signal
 from pipelines.log.files import find_logs, open_log
 from pipelines.log.robot import format_robot
 from pipelines.log.robot_files import load_robot
-from pipelines.report.boundary_card import boundary_card
+from pipelines.report.sections import boundary_card
 from pipelines.stage import Request, run_stage
 
 RECIPE = """

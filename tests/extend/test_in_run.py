@@ -15,7 +15,7 @@ from pipelines import diagnose, extend, run
 from pipelines.diagnosis.result import Rejected
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.log.model_file import read_model
-from pipelines.report.run_ledger import ledger_lines
+from pipelines.report.run_report import stage_lines
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written
 
@@ -37,14 +37,14 @@ def test_a_run_names_the_cause_and_writes_the_model(tmp_path: Path) -> None:
     answer = next(k for k, title in enumerate(titles) if "Cogging at joint 2" in title)
     sources = [k for k, title in enumerate(titles) if title.startswith("inspect")]
     assert "Stages" in titles[:answer]
-    nominal, effect, extended = ledger_lines(outcome.result.stages)
+    nominal, effect, extended = stage_lines(outcome.result.stages)
     gain = outcome.result.stages[1].result.findings[0].gain.validate_torque_rms
     assert nominal.rms == pytest.approx(gain.before)  # the line that the effect's gain is counted from
     shown = outcome.result.stages[1].result.after_rms.validate  # of the key figures
     assert extended.rms == pytest.approx(shown, rel=1e-6)  # one model, fitted by both stages
     partly = tuple(replace(step, result=replace(step.result, accepted=False, rejected=(Rejected("spring", 1, "no gain"),)))
                    if step.name == "extend" else step for step in outcome.result.stages)
-    assert ledger_lines(partly)[-1] == extended  # what was accepted beside it stays
+    assert stage_lines(partly)[-1] == extended  # what was accepted beside it stays
     assert outcome.report.advice[0].startswith("What to check: ")
     assert (effect.stage, extended.stage, effect.sure) == ("diagnose", "extend", True)
     assert effect.gain == pytest.approx(100.0 * (1.0 - np.linalg.norm(gain.after) / np.linalg.norm(gain.before)))

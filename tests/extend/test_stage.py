@@ -68,7 +68,7 @@ def test_an_order_of_which_only_a_harmonic_is_there_is_refused_with_what_was_fit
     result = extended(folder, tmp_path / "out", f"cogging:2:order={true['order'].value / 3.0}").result
     assert not result.findings
     (rejected,) = result.rejected
-    assert "its numbers are none that it can have: order = " in rejected.reason
+    assert "its numbers are impossible: order = " in rejected.reason
     told = dict(re.findall(r"(\w+) = ([\d.]+)", rejected.reason))
     assert float(told["order_3"]) == pytest.approx(true["order"].value, rel=0.02)
     assert float(told["amplitude_3"]) == pytest.approx(true["amplitude"].value, rel=0.1)

@@ -27,13 +27,12 @@ from tests.cli.commands import rrrid
 from tests.model.friction.closed_loop import draw, logs_of
 
 
-def fitted(shared: Path, folder: Path, case: str, law: str | None) -> dict[str, Any]:
-    """The first joint of a recorded case, imported by its recipe, and the checks."""
+def fitted(shared: Path, folder: Path, case: str) -> dict[str, Any]:
+    """The result of a recorded case, imported by its recipe and fitted with a free choice of laws."""
     recipe = next((shared / "cases").glob(f"{case}-*")) / "r.toml"
     made = rrrid("import", str(recipe), "--out", "imp", "--no-report", cwd=folder)
     assert made.returncode == 0, made.stderr
-    options = () if law is None else ("--law", law)
-    made = rrrid("fit-friction", "imp", *options, "--out", "o", "--no-report", "--json", cwd=folder)
+    made = rrrid("fit-friction", "imp", "--out", "o", "--no-report", "--json", cwd=folder)
     assert made.returncode == 0, made.stderr
     result: dict[str, Any] = json.loads(made.stdout)
     return result
@@ -46,7 +45,7 @@ def within(value: dict[str, float], truth: float, std: float, relative: float) -
 @pytest.mark.slow
 def test_rests_do_not_count_as_sliding(shared: Path, tmp_path: Path) -> None:
     """Case 24: 3 and 2 N m, 1.0 and 1.6 N m s/rad, 0.5 kg m²; no gravity about an axis that is parallel to it."""
-    (joint,) = fitted(shared, tmp_path, "24", "asymmetric_friction")["joints"]
+    (joint,) = fitted(shared, tmp_path, "24")["joints"]
     numbers = joint["parameters"]
     assert within(numbers["asymmetric_friction.coulomb_difference"], 1.0, 2.0, 0.001)
     assert within(numbers["asymmetric_friction.viscous_difference"], -0.6, 2.0, 0.001)
@@ -59,7 +58,7 @@ def test_rests_do_not_count_as_sliding(shared: Path, tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_a_coarse_encoder_is_given_longer_windows(shared: Path, tmp_path: Path) -> None:
     """Case 26: 2 mrad a count. The inertia is 0.5 kg m² within two of its standard deviations, and these are below 2 %."""
-    (joint,) = fitted(shared, tmp_path, "26", "coulomb+viscous")["joints"]
+    (joint,) = fitted(shared, tmp_path, "26")["joints"]
     assert within(joint["inertia"], 0.5, 2.0, 0.0)
     assert joint["inertia"]["std"] < 0.01
     assert joint["sticking"]["window"] > 0.02
@@ -67,7 +66,7 @@ def test_a_coarse_encoder_is_given_longer_windows(shared: Path, tmp_path: Path) 
 
 def test_friction_that_warms_up_is_named_with_its_course(shared: Path, tmp_path: Path) -> None:
     """Case 28: friction falls by 35 % with 15 s, anew in each log of 32 s: by 0.31 of 0.77 in its middle."""
-    result = fitted(shared, tmp_path, "28", "coulomb+viscous")
+    result = fitted(shared, tmp_path, "28")
     (joint,) = result["joints"]
     assert joint["drift"]["kind"] == "trend"
     assert joint["drift"]["when"] == pytest.approx(15.0, rel=0.25)

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check
+from pipelines.report.figures import interval_figure, joint_signal_figure, timeline_figure
 from pipelines.report.report import Report, Section, Table
-from pipelines.report.sections import checks_table, interval_figure, joint_signal_figure, timeline_figure
+from pipelines.report.sections import checks_table
 from pipelines.report.style import with_std
 
 FOOTER = {"made by": "rrrid inspect sample_logs/tx40_excitation.h5 --out runs", "version": "0.1.0",

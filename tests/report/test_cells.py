@@ -10,9 +10,8 @@ from typing import Any
 
 import pytest
 
-from pipelines.report.cells import column_texts, filled
 from pipelines.report.render import render_report
-from pipelines.report.report import Report, Table
+from pipelines.report.report import Report, Table, column_texts, filled
 from pipelines.report.style import format_number, three_digits
 from pipelines.stage import Outcome
 from rrrid_cli.console import say_outcome

@@ -14,12 +14,11 @@ from pipelines.diagnosis.result import Answer, Finding, Gain, Rejected, Residual
 from pipelines.model.effects import find_effect
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.residual_analysis import Proof
-from pipelines.report.diagnosis_finding import finding_section
-from pipelines.report.diagnosis_floor import what_stays
-from pipelines.report.diagnosis_proof import draw_proof_in_time
-from pipelines.report.diagnosis_words import together
+from pipelines.report.diagnosis_finding import draw_proof_in_time, finding_section
+from pipelines.report.diagnosis_report import what_stays
 from pipelines.report.finding_words import how_much, taken_in, where
 from pipelines.report.frf_figures import posture_words
+from pipelines.report.words import together
 
 
 def finding(cause: str = "quadratic_drag", joint: int | None = 3, other: dict[str, float] | None = None) -> Finding:
@@ -40,13 +39,13 @@ NOMINAL = ResidualRms(np.array([0.5, 0.4, 0.02]), np.array([0.5, 0.4, 0.02]), np
         (
             "reference logs",
             (0.1, 0.04),
-            " Ratio of the remaining held-out residual to the noise floor: joint 1 2.",
+            "Ratio of the remaining held-out residual to the noise floor: joint 1 2.",
         ),
         ("reference logs", (0.06, 0.04), ""),
         (
             "blocks",
             (0.6, 0.04),
-            " On held-out motion the residual of joint 1 is above the noise; whether it is above "
+            "On held-out motion the residual of joint 1 is above the noise; whether it is above "
             "that of a healthy arm is not known: there are no reference logs.",
         ),
         ("blocks", (0.4, 0.04), ""),  # any arm leaves more than noise at its reversals

@@ -27,11 +27,9 @@ from pipelines.diagnosis.result import (
 )
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.rows.fit import TorqueGain
-from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section
-from pipelines.report.diagnosis_floor import torque_errors
-from pipelines.report.diagnosis_proof import proof_figures
-from pipelines.report.diagnosis_report import diagnosis_report
-from pipelines.report.diagnosis_words import in_order, meaning_of, named, spoken, together, told_values, without_keys
+from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section, proof_figures
+from pipelines.report.diagnosis_report import diagnosis_report, torque_errors
+from pipelines.report.words import format_values, in_order, meaning_of, named, spoken, together, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
@@ -82,7 +80,7 @@ def test_several_waves_at_a_joint_are_a_row_each() -> None:
 
 def test_what_is_told_of_parameters_can_be_read_aloud() -> None:
     """Harmonics are counted, pure numbers have no unit, and no two parameters of an effect get the same words."""
-    assert told_values([("amplitude_2", Value(0.12, None, "N m")), ("gain_error", Value(0.1, None, "1"))]) == (
+    assert format_values([("amplitude_2", Value(0.12, None, "N m")), ("gain_error", Value(0.1, None, "1"))]) == (
         "second amplitude 0.12 N m, gain error 0.1")
     for cause in effect_names():
         names = [spoken(q.name) for q in find_effect(cause).parameters]
@@ -223,7 +221,7 @@ def test_limits_are_told_for_what_a_technician_can_see() -> None:
              DetectionLimit("presliding", 2, "force", Value(0.1, None, "N m"), {"elastic": Value(-1.0, None, "1")}),
              DetectionLimit("stribeck", 2, "amplitude", Value(0.1, None, "N m"), {"speed": Value(0.0341, None, "rad/s")}))
     page = diagnosis_report(Result(**(NOTHING | {"detection_limits": found})))
-    (table,) = (section.tables[0] for section in page.sections if section.title == "What would have been found")
+    (table,) = (section.tables[0] for section in page.sections if section.title == "Detection limits")
     assert [row[table.columns.index("at")] for row in table.rows] == [
         "107 waves a turn", "40 waves in 2π m", "", "speed 0.0341 rad/s"]
 
@@ -235,7 +233,7 @@ def test_a_proof_says_what_it_shows(left: float, said: str) -> None:
     x = np.linspace(0.0, 1.0, 20)
     before = np.where(x < 0.5, 0.5, -0.5)
     proof = Proof(1, "position", "rad", x, before, left * before, before, 0.1 * np.ones(20), x, before, left * before, before)
-    caption = next(proof_figures(1, replace(found("cogging"), proof=proof))).caption
+    caption = proof_figures(1, replace(found("cogging"), proof=proof))[0].caption
     assert said in caption
     assert "0.5 N m rms without the finding" in caption
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.report.extension_report import _now
+from pipelines.report.diagnosis_report import _extension_now
 
 
 @pytest.mark.parametrize(("origins", "said"), [
@@ -17,4 +17,4 @@ def test_whose_error_is_now_is_told(origins: tuple[str, ...], said: str) -> None
     """Base parameters that are fitted to later logs hold a load: the error that it takes away is counted from those of before."""
     names = {"residual": "cogging", "base parameters": "payload"}
     there: Any = SimpleNamespace(findings=tuple(SimpleNamespace(cause=names[one], joint=None, origin=one) for one in origins))
-    assert _now(there).startswith(said) if said else not _now(there)
+    assert _extension_now(there).startswith(said) if said else not _extension_now(there)

@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.log.result_figures import fitted, residuals, robot_of
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.report.figure_words import figure_in_words
+from pipelines.report.words import figure_in_words
 
 
 @pytest.mark.parametrize(("name", "words"), [

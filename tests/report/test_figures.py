@@ -13,16 +13,19 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from pipelines.errors import Check
-from pipelines.report.figures import draw_joint_signals, envelope, joint_axes, merge_spans, true_spans
+from pipelines.report.figures import (
+    draw_joint_signals,
+    envelope,
+    interval_figure,
+    joint_axes,
+    joint_signal_figure,
+    merge_spans,
+    timeline_figure,
+    true_spans,
+)
 from pipelines.report.render import render_report
 from pipelines.report.report import Figure, Report, Section
-from pipelines.report.sections import (
-    checks_table,
-    interval_figure,
-    joint_signal_figure,
-    level_tone,
-    timeline_figure,
-)
+from pipelines.report.sections import checks_table, level_tone
 
 SIGNALS = arrays(np.float64, st.integers(0, 400), elements=st.one_of(
     st.floats(-1e3, 1e3), st.just(np.nan), st.just(np.inf)))

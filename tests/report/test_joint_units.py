@@ -12,8 +12,8 @@ from pipelines.model.excitation.limits import Limit
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.residual_analysis import Curve, Evidence
 from pipelines.report.diagnosis_finding import gain_table
-from pipelines.report.diagnosis_floor import torque_errors
-from pipelines.report.joint_units import Units, each, unit_of, units_in
+from pipelines.report.diagnosis_report import torque_errors
+from pipelines.report.words import Units, each, unit_of, units_in
 
 NOTHING: Any = {field.name: None for field in fields(Evidence)}
 RMS = ResidualRms(np.ones(2), np.ones(2), 0.5 * np.ones(2))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,13 +12,12 @@ import pytest
 from pipelines.model.friction.result import Series
 from pipelines.model.rows.residual_analysis import Evidence
 from pipelines.report import style
-from pipelines.report.bps import torque_figure
-from pipelines.report.diagnosis_picture import _figures
-from pipelines.report.friction_figures import simulation_figure
-from pipelines.report.joint_units import Units
+from pipelines.report.diagnosis_picture import residual_figures
+from pipelines.report.figures import compared_figure
+from pipelines.report.friction_report import _simulation_figure
 from pipelines.report.render import render_report
 from pipelines.report.report import Figure, Report, Section
-from pipelines.report.writing_figures import _compared
+from pipelines.report.words import Units
 from tests.seeds import usually
 
 T = np.linspace(0.0, 10.0, 500)
@@ -28,17 +29,19 @@ NONE = np.zeros(2)
 def friction() -> Figure:
     still = np.zeros(3)
     series = Series(still, still, still, still, still, still, still, T, X, X, X, X, X, X, X, X, X, X)
-    return simulation_figure("drawn", "", series, True)
+    joint: Any = SimpleNamespace(joint=1, name="drawn", revolute=True, series=series)
+    return _simulation_figure(joint)
 
 
 def predicted() -> Figure:
     evidence = Evidence("log", T, BOTH, BOTH, 0.0 * BOTH, None, None, (), (), NONE, np.zeros((2, 2)), np.eye(2), np.eye(2))
-    return next(figure for figure in _figures(evidence, "", Units()) if figure.name.startswith("torque-predicted"))
+    return next(figure for figure in residual_figures(evidence, "", Units()) if figure.name.startswith("torque-predicted"))
 
 
 FIGURES = {
-    "estimate-bps": lambda: torque_figure("drawn", "", T, BOTH, BOTH, 0.0 * BOTH, 0.0 * BOTH, ("a", "b")),
-    "validate-writing": lambda: _compared("drawn", "", T, BOTH, BOTH, "rad", "position"),
+    "estimate-bps": lambda: compared_figure("drawn", "", T, BOTH, BOTH, "torque [N m]", "model", ("a", "b"), (
+        ("friction", 0.0 * BOTH, style.GREEN), ("left", 0.0 * BOTH, style.BLACK))),
+    "validate-writing": lambda: compared_figure("drawn", "", T, BOTH, BOTH, "position [rad]"),
     "fit-friction": friction, "diagnose": predicted}
 
 

@@ -8,14 +8,13 @@ import sys
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from pipelines.report.figures import interval_figure, joint_signal_figure, timeline_figure
 from pipelines.report.render import render_report, write_report
 from pipelines.report.report import Figure, Report, Section, Table
-from pipelines.report.sections import interval_figure, joint_signal_figure, timeline_figure
 from tests.report.demo import FOOTER, demo_report
 
 HOSTILE = ["<script>alert(1)</script>", "</svg><img src=x onerror=alert(1)>", "--> </style></title>", "--!><b>",
@@ -102,26 +101,6 @@ def test_the_verdict_stands_before_the_evidence_and_is_said_in_words(demo: dict[
     places = [words.index(part) for part in ("Attention One joint lost its encoder for 0.6 s", "Key figures",
                                              "RRID-S02", "made by")]
     assert places == sorted(places)
-
-
-@pytest.mark.slow
-def test_keeping_ticks_changes_no_picture(demo: dict[str, bytes], monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same bytes as by matplotlib alone: linear and logarithmic axes, a shared one, one with a power of ten at its end."""
-    def several(drawing: Any) -> None:
-        x = np.geomspace(1.0, 3e7, 60)
-        (a, b), (c, d) = drawing.subplots(2, 2, sharex="col")
-        a.semilogx(x, 1e9 * np.sin(x))
-        b.loglog(x, x**-2.0)
-        c.plot(x, x)
-        d.hist(x, bins=9)
-        a.set_title("above the power of ten")
-        drawing.supylabel("all [N m]")
-
-    report = Report("", "", sections=(Section("", figures=(Figure("several", "", several, (5.0, 3.0)),)),))
-    kept = render_report(report, {})
-    monkeypatch.setattr("pipelines.report.render.settle", lambda drawing: None)
-    assert render_report(report, {}) == kept
-    assert render_report(demo_report(), FOOTER) == demo
 
 
 def test_equal_bytes_in_another_process(demo: dict[str, bytes], tmp_path: Path) -> None:

@@ -16,9 +16,7 @@ from pipelines.errors import Check
 from pipelines.log.model_file import ModelFile
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.report import Figure, Report, Section, Table
-from pipelines.report.run_ledger import ledger_lines, ledger_section
-from pipelines.report.run_report import run_report
-from pipelines.report.run_result import Result, Step
+from pipelines.report.run_report import Result, Step, run_report, stage_lines, stages_section
 
 
 def of_logs(count: int, figures: int) -> Report:
@@ -79,7 +77,7 @@ def test_every_gain_counts_from_a_line_above_it() -> None:
     """A load's is that over the arm of the reference logs, not over a rigid body that holds it already, in any order."""
     for findings, was in (((RIPPLE,), NOMINAL), ((LOAD,), BARE), ((LOAD, RIPPLE), BARE), ((RIPPLE, DRAG), NOMINAL),
                           ((DRAG, RIPPLE), NOMINAL), ((RIPPLE, LOAD), 2.0 * BARE)):
-        lines = ledger_lines(told(*findings, was=was))
+        lines = stage_lines(told(*findings, was=was))
         for k, line in enumerate(lines):
             assert line.before is None or any(np.allclose(line.before, above.rms) for above in lines[:k])
         assert [line.step.startswith("+") for line in lines].count(True) == len(findings)
@@ -87,22 +85,21 @@ def test_every_gain_counts_from_a_line_above_it() -> None:
 
 def test_a_load_alone_is_told_beside_the_arm_without_it() -> None:
     """The model fitted to the loaded arm is no step towards the load: it is no line of the ledger."""
-    bare, load, extended = ledger_lines(told(LOAD, was=BARE))
+    bare, load, extended = stage_lines(told(LOAD, was=BARE))
     assert bare.step.endswith("without payload at the tip")
     assert (bare.rms, load.before, extended.before) == (tuple(BARE),) * 3
 
 
 def test_findings_that_build_on_one_another_stand_in_that_order() -> None:
     """The drag was found beside the cogging, and is the stronger: the cogging comes first all the same."""
-    steps = [line.step for line in ledger_lines(told(DRAG, RIPPLE))]
+    steps = [line.step for line in stage_lines(told(DRAG, RIPPLE))]
     assert steps[:3] == ["rigid body and friction, as diagnose fits them", "+ cogging at joint 2", "+ quadratic drag at joint 1"]
 
 
 def test_no_line_joins_the_steps_of_two_stages() -> None:
     """The model of extend without its cause is no step back from what diagnose found."""
-    lines = ledger_lines(told(RIPPLE, was=2.0 * NOMINAL))
-    section = ledger_section(lines)
-    assert section is not None
+    lines = stage_lines(told(RIPPLE, was=2.0 * NOMINAL))
+    (section,) = stages_section(lines)
     drawing = Drawing()
     section.figures[0].draw(drawing)
     for drawn in drawing.axes[0].lines:
@@ -113,8 +110,7 @@ def test_no_line_joins_the_steps_of_two_stages() -> None:
 
 def test_what_a_gain_is_a_share_of_stands_above_it() -> None:
     """Of the error here, of its square in the ledger of hypotheses: a reader lays the two side by side."""
-    section = ledger_section(ledger_lines(told(RIPPLE)))
-    assert section is not None
+    (section,) = stages_section(stage_lines(told(RIPPLE)))
     assert "gain in rms [%]" in section.tables[0].columns
     assert "in the square" in section.text[0]
 
@@ -122,8 +118,7 @@ def test_what_a_gain_is_a_share_of_stands_above_it() -> None:
 def test_the_ledger_writes_the_tip_as_the_verdict_does() -> None:
     """0.125 mm is 0.125 mm in every line, not 0.13 in one and 0.12 in the next."""
     tips = dataclasses.replace(RIPPLE.gain, tip_error_rms=TipError(1.2509e-4, 1.86e-5))
-    section = ledger_section(ledger_lines(told(dataclasses.replace(RIPPLE, gain=tips))))
-    assert section is not None
+    (section,) = stages_section(stage_lines(told(dataclasses.replace(RIPPLE, gain=tips))))
     assert "0.125 → 0.0186" in [row[-1] for row in section.tables[0].rows]
 
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from pipelines.log import shared_work
+from pipelines.report.render import Picture, drawn
 from pipelines.report.report import Figure
-from pipelines.report.side_by_side import Picture, drawn
 
 FIGURES = {f"figure-{k}": Figure(f"figure-{k}", lambda drawing: None, "") for k in range(9)}
 

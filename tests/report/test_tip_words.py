@@ -10,9 +10,8 @@ import pytest
 
 from pipelines.diagnosis.result import BeforeAfter, Finding, TipError
 from pipelines.model.simulation.comparison import SimulatedSpan
-from pipelines.report.diagnosis_finding import gain_table
-from pipelines.report.run_ledger import Line, ledger_section
-from pipelines.report.tip_words import all_together, tip_change, tip_worth
+from pipelines.report.diagnosis_finding import all_together, gain_table, tip_change, tip_worth
+from pipelines.report.run_report import Line, stages_section
 from tests.report.test_diagnosis_finding import finding
 
 BOTH = (SimulatedSpan("writing-1", 5.0), SimulatedSpan("writing-2", 5.0))
@@ -59,8 +58,7 @@ def test_the_span_stands_wherever_millimetres_do(how: Any, span: tuple[Simulated
     gain = replace(finding().gain, simulation=how, tip_error_rms=TipError(2e-3, 1e-3), simulated_span=span,
                    simulated_position_rms=BeforeAfter(np.full(3, 1e-3), np.full(3, 1e-4)))
     line = Line("+ cogging", "diagnose", (0.1,), (0.2,), True, (2e-3, 1e-3), said)
-    ledger = ledger_section([line])
-    assert ledger is not None
+    (ledger,) = stages_section([line])
     for text in (tip_change(gain), tip_worth(gain), gain_table(gain, "Gain.").caption, " ".join(ledger.text)):
         assert said in text
         assert (" s of " in text) == bool(said)

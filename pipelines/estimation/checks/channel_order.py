@@ -27,7 +27,9 @@ from pipelines.model.row_fit import Sampled
 __all__ = ["SIGNALS", "ColumnOrder", "search_orders"]
 
 SIGNALS = ("q and tau", "tau", "q")
-_ALL_UP_TO = {"q and tau": 5, "q": 4, "tau": 4}  # joints; of more, orders are reached by exchanges
+_ALL_UP_TO = {"q and tau": 7, "q": 4, "tau": 4}  # joints; of more, orders are reached by exchanges
+_ROUGHLY = 100  # moments that rank orders by one solution, all joints weighed by their torque
+_REFINED = 50  # orders that are compared in full, of those that are ranked
 _BEAM = 8  # orders that are kept at each exchange
 _RIDGE = 1e-9  # of equilibrated columns
 _ROUNDS = 4  # of reweighting, from what each joint by itself leaves
@@ -87,6 +89,10 @@ def search_orders(
     for signal in signals if every else ():
         if len(moving) <= _ALL_UP_TO[signal]:
             orders = {_placed(same, moving, moved) for moved in permutations(moving)} - {same}
+            if len(orders) > _REFINED:
+                rough = _Scorer(arm, thinned(motions, _ROUGHLY), gravity, model_error)
+                ranks = {order: rough.rank(signal, order) for order in orders}
+                orders = set(sorted(ranks, key=lambda order: -ranks[order])[:_REFINED])
             scores |= {(signal, order): scorer(signal, order) for order in orders}
             continue
         own = {order: scores[signal, order] for order in swaps} | {same: logged}
@@ -124,7 +130,8 @@ class _Scorer:
             basis = np.linalg.qr(columns / np.maximum(np.linalg.norm(columns, axis=0), 1e-300))[0]
             self.basis.append(basis)
             self.tau.append(torque - basis @ (basis.T @ torque))
-        self.known: dict[Order, tuple[Array, Array, Array]] = {}
+        self.same: Order = tuple(range(len(arm.chain.revolute)))
+        self.logged = self._normal(self.same)
 
     def _normal(self, order: Order) -> tuple[Array, Array, Array]:
         """Per joint: Gram matrix (n, p, p), products with every torque (n, p, n), power of every
@@ -138,29 +145,40 @@ class _Scorer:
         moments, turned = own.shape[1], own.transpose(0, 2, 1)
         return turned @ own / moments, turned @ tau / moments, np.mean(tau**2, axis=1)
 
-    def __call__(self, signal: str, order: Order) -> float:
-        """Return the log likelihood a moment of an order of the signals named."""
-        same: Order = tuple(range(len(order)))
-        q_order, tau_order = (order if name in signal else same for name in ("q", "tau"))
-        if q_order not in self.known:
-            self.known[q_order] = self._normal(q_order)
-        gram, cross, power = self.known[q_order]
-        size = self.size[list(tau_order)]
+    def _scaled(self, signal: str, order: Order) -> tuple[Array, Array, Array]:
+        """Return the same of an order of the signals named, in units of each joint's torque."""
+        q_order, tau_order = (order if name in signal else self.same for name in ("q", "tau"))
+        gram, cross, power = self.logged if q_order == self.same else self._normal(q_order)
+        joints, torques = np.arange(len(order)), list(tau_order)
+        size = self.size[torques]
         gram = gram / size[:, None, None] ** 2
-        right = cross[np.arange(len(order)), :, list(tau_order)] / size[:, None] ** 2
-        total = power[np.arange(len(order)), list(tau_order)] / size**2
+        right = cross[joints, :, torques] / size[:, None] ** 2
         scale = np.sqrt(np.maximum(np.einsum("jpp->p", gram), 1e-300))
         scale[scale < 1e-10 * scale.max()] = np.inf
-        gram, right = gram / np.outer(scale, scale), right / scale
-        ridge = 1e-6 * np.eye(len(scale)) * np.einsum("jpp->j", gram)[:, None, None] / len(scale)
+        return gram / np.outer(scale, scale), right / scale, power[joints, torques] / size**2
+
+    def _left(self, gram: Array, right: Array, total: Array, variance: Array) -> Array:
+        """Return the variance of each joint's residual (n,) if joints weigh by 1 / `variance`."""
+        normal = np.einsum("jpq,j->pq", gram, 1.0 / variance)
+        ridge = _RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
+        phi = np.linalg.solve(normal + ridge, right.T @ (1.0 / variance))
+        rest = total - 2.0 * right @ phi + np.einsum("p,jpq,q->j", phi, gram, phi)
+        return np.asarray(np.maximum(rest, 0.0) + self.model_error**2)
+
+    def rank(self, signal: str, order: Order) -> float:
+        """Return the log likelihood a moment with all joints weighed alike."""
+        gram, right, total = self._scaled(signal, order)
+        return -0.5 * float(np.sum(np.log(self._left(gram, right, total, np.ones(len(order))))))
+
+    def __call__(self, signal: str, order: Order) -> float:
+        """Return the log likelihood a moment of an order of the signals named."""
+        gram, right, total = self._scaled(signal, order)
+        size = gram.shape[1]
+        ridge = 1e-6 * np.eye(size) * np.einsum("jpp->j", gram)[:, None, None] / size
         alone = np.linalg.solve(gram + ridge, right[:, :, None])[:, :, 0]  # each joint by itself
         variance = np.maximum(total - np.sum(right * alone, axis=1), 0.0) + self.model_error**2
         for _ in range(_ROUNDS):
-            normal = np.einsum("jpq,j->pq", gram, 1.0 / variance)
-            ridge = _RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal))
-            phi = np.linalg.solve(normal + ridge, right.T @ (1.0 / variance))
-            rest = total - 2.0 * right @ phi + np.einsum("p,jpq,q->j", phi, gram, phi)
-            variance = np.maximum(rest, 0.0) + self.model_error**2
+            variance = self._left(gram, right, total, variance)
         return -0.5 * float(np.sum(np.log(variance)))
 
 
