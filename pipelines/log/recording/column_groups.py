@@ -216,8 +216,13 @@ def _split(members: list[Member], n: int) -> list[list[Member]]:
     """Split columns of one kind by their words: arm_q_1 … and leg_q_1 … are two groups.
 
     Where a word comes once only, the words name the joints: wrist_1, wrist_2, elbow; but a word
-    that comes once for each of `n` joints names a signal.
+    that comes once for each of `n` joints names a signal. Names of one joint that differ in their
+    units alone, pos_1_deg and pos_1_rad, are two signals.
     """
+    units = {name.unit for name, _ in members}
+    if len({(name.label, place) for name, place in members}) < len(members) and len(units) > 1:
+        alike = ([m for m in members if m[0].unit == unit] for unit in sorted(units))
+        return [part for group in alike for part in _split(group, n)]
     places = [place for _, place in members if place is not None]
     if places and len(set(places)) == len(places):
         return [members]

@@ -385,7 +385,8 @@ def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("position", "torque", "encoding"), [
     ("Posizione misurata giunto # [gradi]", "Coppia giunto # [N·m]", "utf-8"), ("実角度J#[deg]", "関節トルクJ#[Nm]", "cp932"),
-    ("关节#实际角度(度)", "关节#力矩(牛米)", "gb18030"), ("Угол оси #, град", "Момент оси #, Нм", "cp1251")])
+    ("关节#实际角度(度)", "关节#力矩(牛米)", "gb18030"), ("Угол оси #, град", "Момент оси #, Нм", "cp1251"),
+    ("Nivel # kulma [°]", "Nivel # momentti [Nm]", "cp1252")])
 def test_names_in_other_languages_and_encodings_are_read(tmp_path: Path, position: str, torque: str, encoding: str) -> None:
     columns = good()
     named = {"t": columns["t"]}
@@ -518,6 +519,12 @@ def test_words_that_come_once_a_joint_are_a_signal_each(tmp_path: Path) -> None:
     draft = _arm(tmp_path, lambda run: _block("mp#", run.q) | _block("mt#", run.tau) | {"dt": np.full(len(run.t), 0.005)})
     assert 'candidate: columns = "mp{j}"' in draft
     assert 'candidate: columns = "mt{j}"' in draft
+
+
+def test_names_that_differ_in_their_units_alone_are_two_signals(tmp_path: Path) -> None:
+    draft = _arm(tmp_path, lambda run: _block("q#_ticks", np.round(652 * run.q)) | _block("q#", run.q) | _block("tau#", run.tau))
+    assert 'candidate: columns = "q{j}_ticks"' in draft
+    assert 'candidate: columns = "q{j}"' in draft
 
 
 def test_a_current_in_a_rms_keeps_its_unit_and_asks_for_the_constant(tmp_path: Path) -> None:
