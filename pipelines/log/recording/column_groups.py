@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -24,8 +24,9 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
 from pipelines.log.units import canonical_unit
 
-__all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of",
-           "lost_numbers", "sound_samples", "texts_of", "unit_of_group"]  # fmt: skip
+__all__ = ["Choice", "Group", "by_texts", "choose", "file_quantity", "groups_of",
+           "lost_numbers", "of_torques", "sound_samples", "tables_beside", "texts_of",
+           "unit_of_group"]  # fmt: skip
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
@@ -309,24 +310,35 @@ def file_quantity(path: Path) -> str:
     return found if found in ("position", "torque", "current") else ""
 
 
-def companion_of(path: Path, table: RawTable) -> RawTable | None:
-    """Return a file of the folder with the same columns and rows: positions here, torques there."""
-    torques = ("torque", "current")
-    for other in sorted(path.parent.iterdir())[:200]:
-        if other == path or other.suffix.lower() != path.suffix.lower():
-            continue
-        if not other.is_file() or other.stat().st_size > 1 << 30:
-            continue
-        if (file_quantity(other) in torques) == (file_quantity(path) in torques):
-            continue
+def of_torques(path: Path) -> bool:
+    return file_quantity(path) in ("torque", "current")
+
+
+def tables_beside(path: Path, table: RawTable, by_name: bool) -> Iterator[RawTable]:
+    """Yield the files of the folder with the same columns and rows, as a rule of other signals.
+
+    Positions and torques by their names come first, and alone where `by_name`. Another number makes
+    no other signal: run_2.csv beside run_1.csv.
+    """
+    kind, stem = of_torques(path), re.sub(r"\d+", "#", path.stem)
+    found = [
+        other
+        for other in sorted(path.parent.iterdir())[:200]
+        if other.suffix.lower() == path.suffix.lower()
+        and re.sub(r"\d+", "#", other.stem) != stem
+        and (of_torques(other) != kind or not by_name)
+        and other.is_file()
+        and other.stat().st_size <= 1 << 30
+    ]
+    found.sort(key=lambda other: (of_torques(other) == kind, file_quantity(other) != "position"))
+    for other in found:
         try:
             candidate = read_table(other)
         except InputRejected:
             continue  # another file of the folder
         same = list(candidate.columns) == list(table.columns)
         if same and candidate.rows.size == table.rows.size:
-            return candidate
-    return None
+            yield candidate
 
 
 def lost_numbers(table: RawTable) -> list[float]:

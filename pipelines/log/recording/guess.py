@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +30,7 @@ from pipelines.log.recording.inference import Inference, Model, unit_of_joint
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.reading import (
     arm_beside,
-    companion_for,
+    files_beside,
     read_recording,
     with_companion,
 )
@@ -91,7 +91,8 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
     lost = lost_numbers(table)
     table = sound_samples(table, lost)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
-    companion = companion_for(reading)
+    companion, beside = files_beside(reading)
+    reading = replace(reading, beside=beside)
     if companion is not None:
         companion = sound_samples(companion, lost)
         same = np.array_equal(companion.rows, table.rows)
@@ -317,7 +318,7 @@ class _Drafting:
         if guess.value == "N m" and found.joints:
             pairs = zip(units, found.joints, strict=True)
             units = ["N" if unit == "N m" and not j.revolute else unit for unit, j in pairs]
-        further = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
+        further = self._file(table)
         if scale:
             further += f", scale = {scale.number:g}"
             self.evidence.append(f"tau scale: the file states {clean(scale.words, 200)}")
@@ -336,7 +337,7 @@ class _Drafting:
 
     def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
         """Return a blank line with the candidates, and why none of them was taken."""
-        table = self.reading.table
+        table = self.reading.torque_table if signal == "tau" else self.reading.table
         line = f'{signal} = {{ columns = "{self.blank(f"signals.{signal}")}", unit = "{BLANK}" }}'
         found = [*([choice.group] if choice.group else []), *choice.others]
         if not found:
@@ -357,8 +358,13 @@ class _Drafting:
         lines += self._sister_lines()
         for group in found[:8]:
             what = ask if group is first else "candidate"
-            lines.append(f"    # {what}: {_columns(group.columns, table)}")
+            lines.append(f"    # {what}: {_columns(group.columns, table)}{self._file(table)}")
+        if beside := [f"file = {_quoted(name)}" for name in self.reading.beside[:8]]:
+            lines.append(f"    # as many columns and rows: {', '.join(beside)}")
         return lines
+
+    def _file(self, table: RawTable) -> str:
+        return f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
 
     def _sister_lines(self) -> list[str]:
         sisters = self.reading.sisters

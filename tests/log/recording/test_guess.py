@@ -371,6 +371,19 @@ def test_a_number_that_marks_a_lost_sample_is_proposed(tmp_path: Path) -> None:
     assert 'q = { columns = "q{j}"' in draft
 
 
+def test_files_of_one_signal_each_are_candidates_for_each_other(tmp_path: Path) -> None:
+    """By their names, tau beside q; else all of as many columns and rows, but no other run."""
+    moved = simulate(THREE, seed=3)
+    (tmp_path / "arm.urdf").write_text(THREE.urdf())
+    for name, block in (("q", moved.q), ("dq", moved.dq), ("tau", moved.tau)):
+        np.save(tmp_path / f"{name}.npy", block)
+    for name in ("q.npy", "tau.npy"):
+        assert '# candidate: columns = "column_{j}", file = "tau.npy"' in guess_recipe(tmp_path / name).text
+    for name, block in (("out_x1", moved.q), ("out_x2", moved.q), ("out_y1", moved.dq), ("out_z1", moved.tau)):
+        np.savetxt(tmp_path / f"{name}.txt", np.column_stack([moved.t, block]))
+    assert '# as many columns and rows: file = "out_y1.txt", file = "out_z1.txt"' in guess_recipe(tmp_path / "out_x1.txt").text
+
+
 def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
     """Four columns whose squares add up to one, called q0 to q3, and the four joints' angles."""
     four = Arm("abcd", ("a", "b", "c", "d"), "zyyy", (150,) * 4)

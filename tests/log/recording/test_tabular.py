@@ -201,8 +201,7 @@ def test_f09_messages_between_the_rows_are_left_out_and_named(sign: str) -> None
     said = "[WARN] [1714744933.305000]: control loop missed its rate of 200 Hz"
     rows = "\n".join(lines()).replace(",", sign).split("\n")
     table = parse("\n".join([*rows[:100], said, *rows[100:700], said, *rows[700:]]) + "\n")
-    assert [check.message[:50] for check in table.checks if check.code == "RRID-F09"] == ["2 lines of text between the rows left out, the fir"]
-    assert "line 101: '[WARN]" in "".join(check.message for check in table.checks)
+    assert "2 lines of text between the rows left out, the first is line 101: '[WARN]" in table.checks[-1].message
     assert table.rows.size == 1200
     assert table.breaks == ()
     torn = parse("\n".join([*rows[:100], rows[100][:30] + said, *rows[101:]]) + "\n")
