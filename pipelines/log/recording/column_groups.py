@@ -26,13 +26,14 @@ from pipelines.log.units import canonical_unit
 
 __all__ = ["Choice", "Group", "by_texts", "choose", "file_quantity", "groups_of",
            "lost_numbers", "of_torques", "sound_samples", "tables_beside", "texts_of",
-           "unit_of_group"]  # fmt: skip
+           "unit_of_group", "without_lost_rows"]  # fmt: skip
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
 _LEARNING = {"observation", "action", "norm", "normalized", "normalised", "scaled"}
 _USABLE = 0.8  # of the cells of a column that is looked at
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
+_MOTION = ("position", "velocity", "acceleration", "torque", "current", "")
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 
 Order = Literal["robot", "numbers", "file", "text"]
@@ -355,6 +356,33 @@ def lost_numbers(table: RawTable) -> list[float]:
             if min(abs(number - others.min()), abs(number - others.max())) > _FAR_OFF * room > 0.0:
                 found[number] += values.size - others.size
     return sorted(number for number, cells in found.items() if cells > 1)
+
+
+def without_lost_rows(table: RawTable) -> tuple[RawTable, int]:
+    """Make rows holes in which all that was measured is zero at once, far from the rows around them.
+
+    Far is a jump, into the zeros and out of them, beyond all other steps of some column.
+    """
+    columns = {}
+    for name, column in table.columns.items():
+        said, values = read_name(name), np.where(np.abs(column) < _NO_NUMBER, column, np.nan)
+        moves = np.unique(values[:1000]).size >= 50 and (np.diff(values) < 0).any()
+        if said.quantity in _MOTION and said.origin != "commanded" and moves:
+            columns[name] = values
+    x = np.column_stack(list(columns.values())) if columns else np.zeros((0, 0))
+    lost = (x == 0.0).all(axis=1)
+    starts = np.flatnonzero(~lost[:-1] & lost[1:])
+    ends = np.flatnonzero(lost[:-1] & ~lost[1:])
+    ends = ends[ends > starts[0]] if starts.size else starts
+    if x.shape[1] < 2 or not ends.size or lost.mean() > 1.0 - _USABLE:
+        return table, 0
+    steps = np.abs(np.diff(x, axis=0))
+    jumps = np.minimum(steps[starts[: ends.size]], steps[ends])
+    usual = np.nan_to_num(steps[~lost[:-1] & ~lost[1:]]).max(axis=0)
+    if not (np.median(jumps, axis=0) > _FAR_OFF * usual).any():
+        return table, 0
+    holes = {name: np.where(lost, np.nan, table.columns[name]) for name in columns}
+    return replace(table, columns={**table.columns, **holes}), int(lost.sum())
 
 
 def sound_samples(table: RawTable, lost: Sequence[float]) -> RawTable:

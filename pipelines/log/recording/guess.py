@@ -24,6 +24,7 @@ from pipelines.log.recording.column_groups import (
     sound_samples,
     texts_of,
     unit_of_group,
+    without_lost_rows,
 )
 from pipelines.log.recording.evidence import Guess, held
 from pipelines.log.recording.inference import Inference, Model, unit_of_joint
@@ -88,23 +89,26 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
         message = f"{len(table.columns)} columns: too many to guess what each is"
         remedy = "export the joints' signals alone, or write the recipe"
         raise InputRejected("F16", message, where=path, remedy=remedy)
+    table, count = without_lost_rows(table)
+    lost_rows = f"{count} of {table.rows.size} rows" if count else ""
     lost = lost_numbers(table)
     table = sound_samples(table, lost)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
     companion, beside = files_beside(reading)
     reading = replace(reading, beside=beside)
     if companion is not None:
-        companion = sound_samples(companion, lost)
+        companion = sound_samples(without_lost_rows(companion)[0], lost)
         same = np.array_equal(companion.rows, table.rows)
         reading = with_companion(reading, companion if same else None)
-    return _Drafting(Inference(reading, model), lost).draft()
+    return _Drafting(Inference(reading, model), lost, lost_rows).draft()
 
 
 class _Drafting:
     """The lines of a draft. Not frozen: it collects evidence and blanks on the way."""
 
-    def __init__(self, found: Inference, lost: Sequence[float]) -> None:
-        self.found, self.reading, self.lost = found, found.reading, lost
+    def __init__(self, found: Inference, lost: Sequence[float], lost_rows: str) -> None:
+        self.found, self.reading = found, found.reading
+        self.lost, self.lost_rows = lost, lost_rows
         self.evidence: list[str] = []
         self.blanks: list[str] = []
         self.current = found.current
@@ -407,12 +411,17 @@ class _Drafting:
         return [f"# {said}{ratios}, + where motor and joint turn alike"]
 
     def _missing(self) -> list[str]:
-        """Return [missing] with the numbers that mark a lost sample; nothing where none does."""
-        if not self.lost:
-            return []
-        why = "far from all other numbers of its column, in several cells: a lost sample"
-        guess = Guess(str(self.lost), "likely", why)
-        return ["[missing]", f"values = {self.lost}   {self.note('missing', guess)}", ""]
+        """Return [missing] with what marks a lost sample: numbers, rows of zeros; or nothing."""
+        lines = []
+        if self.lost:
+            why = "far from all other numbers of its column, in several cells: a lost sample"
+            guess = Guess(str(self.lost), "likely", why)
+            lines.append(f"values = {self.lost}   {self.note('missing', guess)}")
+        if self.lost_rows:
+            why = f"{self.lost_rows} are zero in all that was measured, far from those around"
+            guess = Guess("rows of zeros", "likely", why)
+            lines.append(f"rows = [0.0]   {self.note('missing', guess)}")
+        return ["[missing]", *lines, ""] if lines else []
 
     def _resample(self) -> list[str]:
         if self.found.t is None:

@@ -371,6 +371,24 @@ def test_a_number_that_marks_a_lost_sample_is_proposed(tmp_path: Path) -> None:
     assert 'q = { columns = "q{j}"' in draft
 
 
+def test_rows_of_zeros_are_proposed_as_lost_samples(tmp_path: Path) -> None:
+    """A bus that answered nothing: the motion is judged by the other rows."""
+    def columns(run: Run) -> dict[str, Array]:
+        q, tau = run.q.copy(), run.tau.copy()
+        q[[90, 91, 700]] = tau[[90, 91, 700]] = 0.0
+        return _block("q#", q) | _block("q_ref#", run.q_ref) | _block("tau#", tau)
+    draft = _arm(tmp_path, columns)
+    assert "[missing]\nrows = [0.0]   # check: likely, 3 of " in draft
+    assert 'q = { columns = "q{j}", unit = "rad" }' in draft
+
+
+def test_an_arm_that_rests_at_its_zero_has_lost_no_samples(tmp_path: Path) -> None:
+    def columns(run: Run) -> dict[str, Array]:
+        near = np.clip(np.abs(np.arange(len(run.t)) - 600) / 100.0 - 1.0, 0.0, 1.0)[:, None]
+        return _block("q#", near * run.q) | _block("tau#", near * run.tau)
+    assert "[missing]" not in _arm(tmp_path, columns)
+
+
 def test_files_of_one_signal_each_are_candidates_for_each_other(tmp_path: Path) -> None:
     """By their names, tau beside q; else all of as many columns and rows, but no other run."""
     moved = simulate(THREE, seed=3)
