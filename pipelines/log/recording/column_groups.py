@@ -359,7 +359,7 @@ def lost_numbers(table: RawTable) -> list[float]:
 
 
 def without_lost_rows(table: RawTable) -> tuple[RawTable, int]:
-    """Make rows holes in which all that was measured is zero at once, far from the rows around them.
+    """Make holes of rows in which all that was measured is zero, far from the rows around them.
 
     Far is a jump, into the zeros and out of them, beyond all other steps of some column.
     """

@@ -115,7 +115,7 @@ def _mark_missing(recording: Recording, limits: Limits, checks: list[Check]) -> 
     lost = np.zeros((recording.t.size, 1), dtype=bool)
     if measured and limits.missing_rows:
         values = np.hstack([recording.signals[name] for name in measured])
-        lost = np.isin(values, limits.missing_rows).all(axis=1)[:, None]
+        lost = np.logical_and.reduce(np.isin(values, limits.missing_rows), axis=1)[:, None]
     if lost.any():
         message = f"{int(lost.sum())} rows of all measured signals are declared missing"
         remedy = "correct [missing] rows if these are samples"
