@@ -235,7 +235,7 @@ def _whole_words(name: str) -> str:
 @lru_cache(maxsize=4096)
 def _parts(word: str) -> tuple[str, ...]:
     """Return the known words that `word` consists of without a rest, else `word` alone."""
-    if len(word) > 40 or word in ALL_WORDS or word in _SUFFIX_UNITS:
+    if len(word) > 40 or word.isdecimal() or word in ALL_WORDS or word in _SUFFIX_UNITS:
         return (word,)
     for first in _COMPOUND:
         if word.startswith(first) and len(word) > len(first):
