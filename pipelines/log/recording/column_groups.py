@@ -32,6 +32,7 @@ _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
 _LEARNING = {"observation", "action", "norm", "normalized", "normalised", "scaled"}
 _USABLE = 0.8  # of the cells of a column that is looked at
+_MOST_BESIDE = 20  # files that are read to see whether they have as many columns and rows
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
 _MOTION = ("position", "velocity", "acceleration", "torque", "current", "")
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
@@ -327,12 +328,13 @@ def tables_beside(path: Path, table: RawTable, by_name: bool) -> Iterator[RawTab
         for other in sorted(path.parent.iterdir())[:200]
         if other.suffix.lower() == path.suffix.lower()
         and re.sub(r"\d+", "#", other.stem) != stem
-        and (of_torques(other) != kind or not by_name)
         and other.is_file()
         and other.stat().st_size <= 1 << 30
     ]
-    found.sort(key=lambda other: (of_torques(other) == kind, file_quantity(other) != "position"))
-    for other in found:
+    found.sort(key=lambda other: file_quantity(other) != "position")
+    named = [other for other in found if of_torques(other) != kind]
+    rest = [other for other in found if of_torques(other) == kind]
+    for other in named if by_name else (*named, *rest[:_MOST_BESIDE]):
         try:
             candidate = read_table(other)
         except InputRejected:
