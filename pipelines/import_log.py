@@ -157,7 +157,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
 def _import(source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]) -> list[ImportedLog]:
     assembled = assemble(source, material, mapped, material.assume_units)
     recipe = material.recipe
-    limits = Limits(recipe.missing.values, recipe.time.longest_gap, recipe.resample is not None)
+    missing, held = recipe.missing, recipe.log.torque == "held-command"
+    limits = Limits(missing.values, recipe.time.longest_gap, recipe.resample is not None, missing.rows, held)
     checks += assembled.checks
     repaired = []
     for recording in assembled.recordings:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
 from pathlib import Path
@@ -24,14 +24,17 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.sources import read_table
 from pipelines.log.units import canonical_unit
 
-__all__ = ["Choice", "Group", "by_texts", "choose", "companion_of", "file_quantity", "groups_of",
-           "lost_numbers", "sound_samples", "texts_of", "unit_of_group"]  # fmt: skip
+__all__ = ["Choice", "Group", "by_texts", "choose", "file_quantity", "groups_of",
+           "lost_numbers", "of_torques", "sound_samples", "tables_beside", "texts_of",
+           "unit_of_group", "without_lost_rows"]  # fmt: skip
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
 _LEARNING = {"observation", "action", "norm", "normalized", "normalised", "scaled"}
 _USABLE = 0.8  # of the cells of a column that is looked at
+_MOST_BESIDE = 20  # files that are read to see whether they have as many columns and rows
 _FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
+_MOTION = ("position", "velocity", "acceleration", "torque", "current", "")
 _NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
 
 Order = Literal["robot", "numbers", "file", "text"]
@@ -216,8 +219,13 @@ def _split(members: list[Member], n: int) -> list[list[Member]]:
     """Split columns of one kind by their words: arm_q_1 … and leg_q_1 … are two groups.
 
     Where a word comes once only, the words name the joints: wrist_1, wrist_2, elbow; but a word
-    that comes once for each of `n` joints names a signal.
+    that comes once for each of `n` joints names a signal. Names of one joint that differ in their
+    units alone, pos_1_deg and pos_1_rad, are two signals.
     """
+    units = {name.unit for name, _ in members}
+    if len({(name.label, place) for name, place in members}) < len(members) and len(units) > 1:
+        alike = ([m for m in members if m[0].unit == unit] for unit in sorted(units))
+        return [part for group in alike for part in _split(group, n)]
     places = [place for _, place in members if place is not None]
     if places and len(set(places)) == len(places):
         return [members]
@@ -304,24 +312,36 @@ def file_quantity(path: Path) -> str:
     return found if found in ("position", "torque", "current") else ""
 
 
-def companion_of(path: Path, table: RawTable) -> RawTable | None:
-    """Return a file of the folder with the same columns and rows: positions here, torques there."""
-    torques = ("torque", "current")
-    for other in sorted(path.parent.iterdir())[:200]:
-        if other == path or other.suffix.lower() != path.suffix.lower():
-            continue
-        if not other.is_file() or other.stat().st_size > 1 << 30:
-            continue
-        if (file_quantity(other) in torques) == (file_quantity(path) in torques):
-            continue
+def of_torques(path: Path) -> bool:
+    return file_quantity(path) in ("torque", "current")
+
+
+def tables_beside(path: Path, table: RawTable, by_name: bool) -> Iterator[RawTable]:
+    """Yield the files of the folder with the same columns and rows, as a rule of other signals.
+
+    Positions and torques by their names come first, and alone where `by_name`. Another number makes
+    no other signal: run_2.csv beside run_1.csv.
+    """
+    kind, stem = of_torques(path), re.sub(r"\d+", "#", path.stem)
+    found = [
+        other
+        for other in sorted(path.parent.iterdir())[:200]
+        if other.suffix.lower() == path.suffix.lower()
+        and re.sub(r"\d+", "#", other.stem) != stem
+        and other.is_file()
+        and other.stat().st_size <= 1 << 30
+    ]
+    found.sort(key=lambda other: file_quantity(other) != "position")
+    named = [other for other in found if of_torques(other) != kind]
+    rest = [other for other in found if of_torques(other) == kind]
+    for other in named if by_name else (*named, *rest[:_MOST_BESIDE]):
         try:
             candidate = read_table(other)
         except InputRejected:
             continue  # another file of the folder
         same = list(candidate.columns) == list(table.columns)
         if same and candidate.rows.size == table.rows.size:
-            return candidate
-    return None
+            yield candidate
 
 
 def lost_numbers(table: RawTable) -> list[float]:
@@ -338,6 +358,33 @@ def lost_numbers(table: RawTable) -> list[float]:
             if min(abs(number - others.min()), abs(number - others.max())) > _FAR_OFF * room > 0.0:
                 found[number] += values.size - others.size
     return sorted(number for number, cells in found.items() if cells > 1)
+
+
+def without_lost_rows(table: RawTable) -> tuple[RawTable, int]:
+    """Make holes of rows in which all that was measured is zero, far from the rows around them.
+
+    Far is a jump, into the zeros and out of them, beyond all other steps of some column.
+    """
+    columns = {}
+    for name, column in table.columns.items():
+        said, values = read_name(name), np.where(np.abs(column) < _NO_NUMBER, column, np.nan)
+        moves = np.unique(values[:1000]).size >= 50 and (np.diff(values) < 0).any()
+        if said.quantity in _MOTION and said.origin != "commanded" and moves:
+            columns[name] = values
+    x = np.column_stack(list(columns.values())) if columns else np.zeros((0, 0))
+    lost = (x == 0.0).all(axis=1)
+    starts = np.flatnonzero(~lost[:-1] & lost[1:])
+    ends = np.flatnonzero(lost[:-1] & ~lost[1:])
+    ends = ends[ends > starts[0]] if starts.size else starts
+    if x.shape[1] < 2 or not ends.size or lost.mean() > 1.0 - _USABLE:
+        return table, 0
+    steps = np.abs(np.diff(x, axis=0))
+    jumps = np.minimum(steps[starts[: ends.size]], steps[ends])
+    usual = np.nan_to_num(steps[~lost[:-1] & ~lost[1:]]).max(axis=0)
+    if not (np.median(jumps, axis=0) > _FAR_OFF * usual).any():
+        return table, 0
+    holes = {name: np.where(lost, np.nan, table.columns[name]) for name in columns}
+    return replace(table, columns={**table.columns, **holes}), int(lost.sum())
 
 
 def sound_samples(table: RawTable, lost: Sequence[float]) -> RawTable:

@@ -30,31 +30,31 @@ _VOCABULARY = {
         phi φ θ ϕ winkel lage stellung drehwinkel gelenkwinkel angulaire articulaire posicion
         posiciones angulo angulos posizione posizioni angolo angoli posicao posicoes positie hoek
         hoeken stand vinkel lage_vinkel pozycja polozenie kat poloha uhel natoceni konum aci
-        pozisyon положение позиция угол 位置 角度 角 位移 转角 関節角 関節角度 回転角 위치 각도
-        관절각""",
+        pozisyon kulma asento asema положение позиция угол 位置 角度 角 位移 转角 関節角 関節角度
+        回転角 위치 각도 관절각""",
     "velocity": """
         dq qd qdot dqdt qvel vel vels velo velocity velocities speed speeds omega dtheta jvel spd
         ω dφ dθ dϕ geschwindigkeit drehzahl winkelgeschwindigkeit vitesse vitesses vit velocidad
         velocidades velocita velocidade snelheid toerental hastighet varvtal predkosc rychlost hiz
-        скорость 速度 角速度 转速 回転速度 回転数 속도 각속도""",
+        nopeus kulmanopeus скорость 速度 角速度 转速 回転速度 回転数 속도 각속도""",
     "acceleration": """
         ddq qdd qddot acc accel acceleration accelerations ddtheta qacc jacc ddφ ddθ
         beschleunigung winkelbeschleunigung aceleracion accelerazione aceleracao versnelling
-        ускорение 加速度 角加速度 가속도""",
+        kiihtyvyys ускорение 加速度 角加速度 가속도""",
     "torque": """
         tau torque torques trq tq moment moments effort efforts eff mom tor qfrc jtau tauj jtrq τ
         drehmoment drehmomente couple couples par pares momento coppia coppie binario koppel
-        koppels vridmoment tork момент моменты 力矩 扭矩 转矩 扭力 トルク 토크""",
+        koppels vridmoment tork momentti vaantomomentti момент моменты 力矩 扭矩 转矩 扭力 トルク 토크""",
     "current": """
         i iq isq curr current currents cur amp amps ampere strom motorstrom courant courants
-        intensite corriente corrientes corrente correnti stroom motorstroom prad proud akim ток
-        电流 電流 전류""",
+        intensite corriente corrientes corrente correnti stroom motorstroom prad proud akim virta
+        ток 电流 電流 전류""",
     "time": """
         t ms us ns time times tout timestamp timestamps stamp clock sec secs second seconds nsec
         nsecs nanosec nanosecs nanosecond nanoseconds usec usecs microsec microseconds msec
         millisec milliseconds millis micros nanos elapsed ts uptime datetime date zeit zeitstempel
         uhrzeit temps horodatage heure duree seconde secondes tiempo marca_de_tiempo hora segundos
-        tempo ora secondi tijd tijdstempel tid tidsstampel czas cas zaman время 时间 时间戳 时刻
+        tempo ora secondi tijd tijdstempel tid tidsstampel czas cas zaman aika время 时间 时间戳 时刻
         秒 毫秒 微秒 時間 時刻 経過時間 タイムスタンプ ミリ秒 시간 시각 타임스탬프""",
     "index": """
         idx index sample samples step steps count counter seq row frame iteration iter nr ipoc id
@@ -62,7 +62,7 @@ _VOCABULARY = {
         サンプル フレーム""",
     "temperature": """
         temp temperature temperatures tmp ϑ temperatur temperatura temperatuur teplota sicaklik
-        температура 温度 온도""",
+        lampotila температура 温度 온도""",
     "other": """
         pose ee eef eff_pose tcp tool flange cart cartesian force forces wrench ft voltage
         voltages volt volts gripper finger fingers status mode error errors err deviation lag
@@ -74,8 +74,8 @@ _VOCABULARY = {
         pince outil effort_outil cartesienne voltaje fuerza potencia pinza herramienta desviacion
         tensione forza potenza errore scarto utensile tensao forca erro desvio garra ferramenta
         spanning kracht vermogen fout afwijking grijper fel napiecie sila blad uchyb chwytak
-        napeti odchylka chyba gerilim hata kuvvet напряжение сила ошибка отклонение 电压 力 误差
-        偏差 末端 工具 功率 夹爪 姿态 坐标 状态 跟随误差 電圧 誤差 手先 電力 グリッパ 姿勢 전압 힘
+        napeti odchylka chyba gerilim hata kuvvet jannite voima virhe напряжение сила ошибка
+        отклонение 电压 力 误差 偏差 末端 工具 功率 夹爪 姿态 坐标 状态 跟随误差 電圧 誤差 手先 電力 グリッパ 姿勢 전압 힘
         오차""",
     "commanded": """
         cmd command commanded commands des desired ref reference references target targets tgt set
@@ -85,16 +85,16 @@ _VOCABULARY = {
         consignas deseada deseado referencia objetivo comandada comandado mandada comandata
         comandato riferimento desiderata desiderato obiettivo desejada desejado alvo gewenste
         gewenst gewenste_waarde setwaarde borvarde bor zadana zadany zadane zadanej pozadovana
-        zadost istenen hedef заданное заданная заданный уставка целевое 指令 目标 期望 给定 设定
-        参考 规划 命令 指令値 目標 目標値 設定 設定値 参照 목표 지령 명령""",
+        zadost istenen hedef ohje ohjearvo tavoite asetusarvo заданное заданная заданный уставка
+        целевое 指令 目标 期望 给定 设定 参考 规划 命令 指令値 目標 目標値 設定 設定値 参照 목표 지령 명령""",
     "measured": """
         meas measured measure measurement msr act actual fb feedback real present read observation
         observed sensor sensed obs ai ist istwert gemessen mesure mesuree mesures reelle reel
         actuelle actuel medida medido medidas misurata misurato attuale reale effettiva effettivo
         atual gemeten werkelijke actuele arvarde uppmatt rzeczywista rzeczywisty zmierzona
-        zmierzony aktualna aktualny skutecna skutecny merena gercek olculen измеренное измеренный
-        измеренная фактическое фактическая фактический текущее текущая текущий 实际 测量 反馈 当前
-        实测 真实 現在 現在値 実 実際 測定 測定値 計測 実測 応答 フィードバック 현재 실제 측정""",
+        zmierzony aktualna aktualny skutecna skutecny merena gercek olculen mitattu измеренное
+        измеренный измеренная фактическое фактическая фактический текущее текущая текущий 实际 测量 反馈
+        当前 实测 真实 現在 現在値 実 実際 測定 測定値 計測 実測 応答 フィードバック 현재 실제 측정""",
     "partial": """
         ext external gravity grav friction residual inertia coriolis ff feedforward dist
         disturbance contact collision model modelled calc calculated computed predicted sim
@@ -105,7 +105,7 @@ _VOCABULARY = {
         calculado calculada perturbacion simulado esterna esterno gravita attrito modello
         calcolata calcolato disturbo simulata gravidade atrito zwaartekracht wrijving berekend
         berekende yttre externt friktion zewnetrzny tarcia grawitacji vnejsi treni dis surtunme
-        внешний внешняя трения гравитации расчетный 外 外部 外力 重力 摩擦 摩擦力 补偿 前馈 模型
+        kitka внешний внешняя трения гравитации расчетный 外 外部 外力 重力 摩擦 摩擦力 补偿 前馈 模型
         计算 理论 仿真 扰动 接触 碰撞 外乱 補償 モデル 計算 フィードフォワード 외부 외력 중력 마찰
         보상""",
     "estimated": """
@@ -116,14 +116,14 @@ _VOCABULARY = {
         filtrada filtrata filtrato 滤波 滤波后 フィルタ フィルタ後""",
     "motor": """
         motor mot motors rotor drive servo antrieb moteur moteurs motores motore motori silnika
-        silnik двигателя двигатель мотор мотора 电机 马达 驱动器 编码器 伺服 モータ モーター
+        silnik moottori moottorin двигателя двигатель мотор мотора 电机 马达 驱动器 编码器 伺服 モータ モーター
         エンコーダ サーボ 모터""",
     "joint": """
         joint joints jnt jnts axis axes link actuator actuators arm j a achse achsen gelenk axe
         articulation eje ejes articulacion articulaciones junta asse assi giunto giunti eixo eixos
         juntas articulacao gewricht assen led axel os osi przegub przegubu zlacze osa osy kloub
-        kloubu eklem eksen ось оси сустав сустава звено звена шарнир шарнира 关节 轴 臂 机械臂
-        関節 軸 アーム 관절 축""",
+        kloubu eklem eksen nivel nivelen akseli ось оси сустав сустава звено звена шарнир шарнира 关节
+        轴 臂 机械臂 関節 軸 アーム 관절 축""",
     "noise": """
         field fields data msg value values val state states robot robots header vector array log
         record signal channel ch io out info feedback_data raw side of the in and ma active
@@ -235,7 +235,7 @@ def _whole_words(name: str) -> str:
 @lru_cache(maxsize=4096)
 def _parts(word: str) -> tuple[str, ...]:
     """Return the known words that `word` consists of without a rest, else `word` alone."""
-    if len(word) > 40 or word in ALL_WORDS or word in _SUFFIX_UNITS:
+    if len(word) > 40 or word.isdecimal() or word in ALL_WORDS or word in _SUFFIX_UNITS:
         return (word,)
     for first in _COMPOUND:
         if word.startswith(first) and len(word) > len(first):

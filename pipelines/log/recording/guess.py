@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,13 +24,14 @@ from pipelines.log.recording.column_groups import (
     sound_samples,
     texts_of,
     unit_of_group,
+    without_lost_rows,
 )
 from pipelines.log.recording.evidence import Guess, held
 from pipelines.log.recording.inference import Inference, Model, unit_of_joint
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.recording.reading import (
     arm_beside,
-    companion_for,
+    files_beside,
     read_recording,
     with_companion,
 )
@@ -88,22 +89,26 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
         message = f"{len(table.columns)} columns: too many to guess what each is"
         remedy = "export the joints' signals alone, or write the recipe"
         raise InputRejected("F16", message, where=path, remedy=remedy)
+    table, count = without_lost_rows(table)
+    lost_rows = f"{count} of {table.rows.size} rows" if count else ""
     lost = lost_numbers(table)
     table = sound_samples(table, lost)
     reading = read_recording(path, table, arm_beside(path.parent, robot))
-    companion = companion_for(reading)
+    companion, beside = files_beside(reading)
+    reading = replace(reading, beside=beside)
     if companion is not None:
-        companion = sound_samples(companion, lost)
+        companion = sound_samples(without_lost_rows(companion)[0], lost)
         same = np.array_equal(companion.rows, table.rows)
         reading = with_companion(reading, companion if same else None)
-    return _Drafting(Inference(reading, model), lost).draft()
+    return _Drafting(Inference(reading, model), lost, lost_rows).draft()
 
 
 class _Drafting:
     """The lines of a draft. Not frozen: it collects evidence and blanks on the way."""
 
-    def __init__(self, found: Inference, lost: Sequence[float]) -> None:
-        self.found, self.reading, self.lost = found, found.reading, lost
+    def __init__(self, found: Inference, lost: Sequence[float], lost_rows: str) -> None:
+        self.found, self.reading = found, found.reading
+        self.lost, self.lost_rows = lost, lost_rows
         self.evidence: list[str] = []
         self.blanks: list[str] = []
         self.current = found.current
@@ -317,7 +322,7 @@ class _Drafting:
         if guess.value == "N m" and found.joints:
             pairs = zip(units, found.joints, strict=True)
             units = ["N" if unit == "N m" and not j.revolute else unit for unit, j in pairs]
-        further = f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
+        further = self._file(table)
         if scale:
             further += f", scale = {scale.number:g}"
             self.evidence.append(f"tau scale: the file states {clean(scale.words, 200)}")
@@ -336,7 +341,7 @@ class _Drafting:
 
     def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
         """Return a blank line with the candidates, and why none of them was taken."""
-        table = self.reading.table
+        table = self.reading.torque_table if signal == "tau" else self.reading.table
         line = f'{signal} = {{ columns = "{self.blank(f"signals.{signal}")}", unit = "{BLANK}" }}'
         found = [*([choice.group] if choice.group else []), *choice.others]
         if not found:
@@ -357,8 +362,13 @@ class _Drafting:
         lines += self._sister_lines()
         for group in found[:8]:
             what = ask if group is first else "candidate"
-            lines.append(f"    # {what}: {_columns(group.columns, table)}")
+            lines.append(f"    # {what}: {_columns(group.columns, table)}{self._file(table)}")
+        if beside := [f"file = {_quoted(name)}" for name in self.reading.beside[:8]]:
+            lines.append(f"    # as many columns and rows: {', '.join(beside)}")
         return lines
+
+    def _file(self, table: RawTable) -> str:
+        return f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
 
     def _sister_lines(self) -> list[str]:
         sisters = self.reading.sisters
@@ -401,12 +411,17 @@ class _Drafting:
         return [f"# {said}{ratios}, + where motor and joint turn alike"]
 
     def _missing(self) -> list[str]:
-        """Return [missing] with the numbers that mark a lost sample; nothing where none does."""
-        if not self.lost:
-            return []
-        why = "far from all other numbers of its column, in several cells: a lost sample"
-        guess = Guess(str(self.lost), "likely", why)
-        return ["[missing]", f"values = {self.lost}   {self.note('missing', guess)}", ""]
+        """Return [missing] with what marks a lost sample: numbers, rows of zeros; or nothing."""
+        lines = []
+        if self.lost:
+            why = "far from all other numbers of its column, in several cells: a lost sample"
+            guess = Guess(str(self.lost), "likely", why)
+            lines.append(f"values = {self.lost}   {self.note('missing', guess)}")
+        if self.lost_rows:
+            why = f"{self.lost_rows} are zero in all that was measured, far from those around"
+            guess = Guess("rows of zeros", "likely", why)
+            lines.append(f"rows = [0.0]   {self.note('missing', guess)}")
+        return ["[missing]", *lines, ""] if lines else []
 
     def _resample(self) -> list[str]:
         if self.found.t is None:

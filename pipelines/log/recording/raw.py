@@ -167,7 +167,8 @@ def columns_of_arrays(arrays: Arrays, source: str) -> RawTable:
         if samples not in matrix.shape or rows == wide:
             why = "square" if rows == wide else f"not of {samples} samples"
             text[name] = f"an array of shape {array.shape}, {why}"
-            others += [f"'{clean(name, 40)}'"] if samples not in matrix.shape and max(matrix.shape) >= FEWEST else []
+            if samples not in matrix.shape and max(matrix.shape) >= FEWEST:
+                others.append(f"'{clean(name, 40)}'")
             continue
         if (wide if rows == samples else rows) > _WIDEST_MATRIX:
             continue

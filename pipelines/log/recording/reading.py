@@ -22,9 +22,10 @@ from pipelines.log.recording.column_groups import (
     Group,
     by_texts,
     choose,
-    companion_of,
     file_quantity,
     groups_of,
+    of_torques,
+    tables_beside,
     texts_of,
 )
 from pipelines.log.recording.column_names import WORDS, words_of
@@ -33,7 +34,7 @@ from pipelines.log.recording.raw import RawTable
 from pipelines.log.robot import RobotDescription
 from pipelines.log.robot_files import load_robot
 
-__all__ = ["BY_FILE", "WITHOUT_NAME", "Arm", "Reading", "arm_beside", "companion_for", "matrix",
+__all__ = ["BY_FILE", "WITHOUT_NAME", "Arm", "Reading", "arm_beside", "files_beside", "matrix",
            "read_recording", "with_companion"]  # fmt: skip
 
 WITHOUT_NAME, BY_FILE = "columns without a name", "columns named by their file"
@@ -92,6 +93,7 @@ class Reading:
     torque_table: RawTable  # the file that holds the torques
     slope: Slope | None  # of q against dq, per recorded unit of time
     by_evidence: bool  # the columns have no telling names
+    beside: tuple[str, ...] = ()  # files with as many columns and rows, where this has one signal
 
     @property
     def joints(self) -> int:
@@ -218,16 +220,25 @@ def with_companion(reading: Reading, companion: RawTable | None) -> Reading:
     if companion is None:
         return reading
     other = read_recording(reading.path.parent / companion.source, companion, reading.arm)
-    if other.q.group and not reading.q.group:
+    if not reading.q.group and (other.q.group or of_torques(reading.path)):
         reading, other = other, reading
     return replace(reading, tau=other.tau, torque_table=other.table)
 
 
-def companion_for(reading: Reading) -> RawTable | None:
-    """Return the companion file of a recording that lacks positions or torques."""
-    no_torque = reading.tau.group is None and not reading.tau.others
-    lacking = reading.q.group is None or no_torque
-    return companion_of(reading.path, reading.table) if lacking else None
+def files_beside(reading: Reading) -> tuple[RawTable | None, tuple[str, ...]]:
+    """Return the companion of a file that lacks positions or torques; else what may be one.
+
+    Names alone tell a companion; of a file with one signal, all others are named.
+    """
+    found = (reading.q, reading.tau)
+    if found[0].group is not None and (found[1].group or found[1].others):
+        return None, ()
+    signals = {g.columns for c in found for g in (c.group, *c.others) if g is not None}
+    tables = tables_beside(reading.path, reading.table, by_name=len(signals) > 1)
+    first = next(tables, None)
+    if first is None or of_torques(Path(first.source)) != of_torques(reading.path):
+        return first, ()
+    return None, tuple(table.source for table in (first, *tables))
 
 
 def _with_file_name(groups: list[Group], path: Path) -> list[Group]:

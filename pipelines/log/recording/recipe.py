@@ -156,6 +156,7 @@ class MissingSpec:
 
     __pydantic_config__ = _STRICT
     values: tuple[float, ...] = ()
+    rows: tuple[float, ...] = ()  # only where all measured signals of a row have that number
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ __all__ = ["Limits", "Recording", "late_intervals", "repair"]
 
 _SHORTEST_PART = 0.1  # of all samples
 _MOST_MISSING = 0.2
+_MEASURED = ("q", "dq", "tau", "current")
 _NO_SAMPLE = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
 
 Index = npt.NDArray[np.int64]
@@ -78,6 +79,8 @@ class Limits:
     missing: tuple[float, ...] = ()
     longest_gap: float | None = None  # [s]; default what an observer predicts through
     resampled: bool = False
+    missing_rows: tuple[float, ...] = ()  # numbers of all measured signals at once
+    held: bool = False  # the torque is commanded
 
 
 def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...], tuple[Check, ...]]:
@@ -90,7 +93,7 @@ def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...],
     if recording.t.size < 2:
         message = many(recording.t.size, "sample")
         raise InputRejected("T08", message, where=recording.where, remedy="record again")
-    recording = _mark_missing(recording, limits.missing, checks)
+    recording = _mark_missing(recording, limits, checks)
     recording = _drop_missing(recording, checks)
     recording = _drop_duplicates(recording, checks)
     parts = tuple(
@@ -104,14 +107,22 @@ def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...],
     return parts, tuple(checks)
 
 
-def _mark_missing(
-    recording: Recording, missing: tuple[float, ...], checks: list[Check]
-) -> Recording:
+def _mark_missing(recording: Recording, limits: Limits, checks: list[Check]) -> Recording:
     """D03: make declared sentinels NaN; refuse infinite, absurd and undeclared ones."""
-    signals, problems = {}, Gathering()
+    signals, problems, missing = {}, Gathering(), limits.missing
+    measured = [name for name in _MEASURED if name in recording.signals]
+    measured = [name for name in measured if name != "tau" or not limits.held]
+    lost = np.zeros((recording.t.size, 1), dtype=bool)
+    if measured and limits.missing_rows:
+        values = np.hstack([recording.signals[name] for name in measured])
+        lost = np.logical_and.reduce(np.isin(values, limits.missing_rows), axis=1)[:, None]
+    if lost.any():
+        message = f"{int(lost.sum())} rows of all measured signals are declared missing"
+        remedy = "correct [missing] rows if these are samples"
+        checks.append(Check.of("D03", "repair", message, where=recording.where, remedy=remedy))
     for name, values in recording.signals.items():
         hit = np.isin(values, np.array(missing)) if missing else np.zeros(values.shape, dtype=bool)
-        signals[name] = values = np.where(hit, np.nan, values)
+        signals[name] = values = np.where(hit | lost, np.nan, values)
         if hit.any():
             message = f"{int(hit.sum())} numbers of {name} are declared missing values"
             remedy = "correct [missing] if these are samples"

@@ -2,7 +2,8 @@
 
 A line with the wrong number of cells, or with a cell that is no number, is left out and named, as
 long as such lines are few (F09); the last line of a file that does not end in a line end is left
-out, because its last number may be cut. Spreadsheet errors and formulas are refused: the numbers
+out, because its last number may be cut. A few lines of text between the rows are messages, left out
+and named. Spreadsheet errors and formulas are refused: the numbers
 around them are not a recording. Lines of one form may label their numbers instead:
 
     [14:02:11.254] [rt] q=[0.1, 0.2] tau=[3.0, 4.0]     timestamp, q[0], q[1], tau[0], tau[1]
@@ -18,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipelines.errors import Check, InputRejected
+from pipelines.errors import Check, InputRejected, clean
 from pipelines.log.experiment import Array
 from pipelines.log.limits import FEWEST
 from pipelines.log.recording.raw import RawTable
@@ -47,6 +48,7 @@ _MOST_DAMAGED = 10  # lines
 _DAMAGED_SHARE = 1e-3
 _MOST_JOINTS = 32
 _MOST_NOTES = 40  # lines above a table
+_WORD = re.compile(r"[^\W\d_]{3}")
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(
@@ -107,6 +109,7 @@ def read_text(data: bytes, source: str, given: TextFormat | None = None) -> RawT
         return turned
     header = find_header(lines, text, dialect, source, given.header)
     body = _body(lines, header, text, source, checks)
+    body = _without_messages(body, dialect, source, checks)
     _refuse_further_table(body, dialect, text, source)
     reader = _Reader(dialect, header.names, source)
     kept, found = _numbers(body, text.endswith("\n"), reader, checks)
@@ -159,6 +162,39 @@ def _body(
         remedy = "none where the clock goes on"
         checks.append(Check.of("F16", "warn", message, where=where, remedy=remedy))
     return body
+
+
+def _without_messages(
+    body: list[Line], dialect: Dialect, source: str, checks: list[Check]
+) -> list[Line]:
+    """F09: leave out a few lines of text between the rows: messages of the recorder.
+
+    A message has words and not the cells of a row. It neither begins nor ends with a number, as the
+    rows do: what does so is a damaged row.
+    """
+    delimiter = dialect.delimiter.strip(" ") or None
+
+    def numeric(cell: str) -> bool:
+        return is_number(cell, dialect.decimal) or cell in MISSING
+
+    def message(line: str) -> bool:
+        if numeric(line.split(delimiter, 1)[0].strip()) or not _WORD.search(line):
+            return False
+        cells = cells_of(line, dialect.delimiter)
+        ends = numeric(cells[0]) or numeric(cells[-1])
+        return len(cells) != dialect.width and not ends and not any(map(FORMULA.fullmatch, cells))
+
+    row = cells_of(body[0][1], dialect.delimiter)
+    of_numbers = numeric(row[0]) and numeric(row[-1])
+    said = [line for line in body if of_numbers and message(line[1])]
+    if not said or len(said) > (1.0 - _LEAST) * len(body):
+        return body
+    words = f"{len(said)} lines of text between the rows left out"
+    words += f", the first is line {said[0][0]}: '{clean(said[0][1], 60)}'"
+    remedy = "none where these are messages of the recorder"
+    checks.append(Check.of("F09", "warn", words, where=source, remedy=remedy))
+    left_out = {number for number, _ in said}
+    return [line for line in body if line[0] not in left_out]
 
 
 def _numbered(names: tuple[str, ...]) -> dict[str, tuple[str, ...]]:

@@ -301,8 +301,9 @@ def torque_unit(
         return _unsure(f"{peak}, and no links of a robot to compare with: {asked}")
     why = f"{peak}, and it follows from the motion by weight and inertia of the robot's links"
     known = fit.gains[np.isfinite(fit.gains)]  # a factor that may be theirs, or of another unit
-    times = f", {known.min():.2f} to {known.max():.2f} times what they ask for" if known.size else ""
-    return Guess("N m", "likely", why + times)
+    if known.size:
+        why += f", {known.min():.2f} to {known.max():.2f} times what they ask for"
+    return Guess("N m", "likely", why)
 
 
 def whole(values: Array) -> bool:

@@ -371,6 +371,37 @@ def test_a_number_that_marks_a_lost_sample_is_proposed(tmp_path: Path) -> None:
     assert 'q = { columns = "q{j}"' in draft
 
 
+def test_rows_of_zeros_are_proposed_as_lost_samples(tmp_path: Path) -> None:
+    """A bus that answered nothing: the motion is judged by the other rows."""
+    def columns(run: Run) -> dict[str, Array]:
+        q, tau = run.q.copy(), run.tau.copy()
+        q[[90, 91, 700]] = tau[[90, 91, 700]] = 0.0
+        return _block("q#", q) | _block("q_ref#", run.q_ref) | _block("tau#", tau)
+    draft = _arm(tmp_path, columns)
+    assert "[missing]\nrows = [0.0]   # check: likely, 3 of " in draft
+    assert 'q = { columns = "q{j}", unit = "rad" }' in draft
+
+
+def test_an_arm_that_rests_at_its_zero_has_lost_no_samples(tmp_path: Path) -> None:
+    def columns(run: Run) -> dict[str, Array]:
+        near = np.clip(np.abs(np.arange(len(run.t)) - 600) / 100.0 - 1.0, 0.0, 1.0)[:, None]
+        return _block("q#", near * run.q) | _block("tau#", near * run.tau)
+    assert "[missing]" not in _arm(tmp_path, columns)
+
+
+def test_files_of_one_signal_each_are_candidates_for_each_other(tmp_path: Path) -> None:
+    """By their names, tau beside q; else all of as many columns and rows, but no other run."""
+    moved = simulate(THREE, seed=3)
+    (tmp_path / "arm.urdf").write_text(THREE.urdf())
+    for name, block in (("q", moved.q), ("dq", moved.dq), ("tau", moved.tau)):
+        np.save(tmp_path / f"{name}.npy", block)
+    for name in ("q.npy", "tau.npy"):
+        assert '# candidate: columns = "column_{j}", file = "tau.npy"' in guess_recipe(tmp_path / name).text
+    for name, block in (("out_x1", moved.q), ("out_x2", moved.q), ("out_y1", moved.dq), ("out_z1", moved.tau)):
+        np.savetxt(tmp_path / f"{name}.txt", np.column_stack([moved.t, block]))
+    assert '# as many columns and rows: file = "out_y1.txt", file = "out_z1.txt"' in guess_recipe(tmp_path / "out_x1.txt").text
+
+
 def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
     """Four columns whose squares add up to one, called q0 to q3, and the four joints' angles."""
     four = Arm("abcd", ("a", "b", "c", "d"), "zyyy", (150,) * 4)
@@ -385,7 +416,8 @@ def test_a_quaternion_is_no_position_of_joints(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("position", "torque", "encoding"), [
     ("Posizione misurata giunto # [gradi]", "Coppia giunto # [N·m]", "utf-8"), ("実角度J#[deg]", "関節トルクJ#[Nm]", "cp932"),
-    ("关节#实际角度(度)", "关节#力矩(牛米)", "gb18030"), ("Угол оси #, град", "Момент оси #, Нм", "cp1251")])
+    ("关节#实际角度(度)", "关节#力矩(牛米)", "gb18030"), ("Угол оси #, град", "Момент оси #, Нм", "cp1251"),
+    ("Nivel # kulma [°]", "Nivel # momentti [Nm]", "cp1252")])
 def test_names_in_other_languages_and_encodings_are_read(tmp_path: Path, position: str, torque: str, encoding: str) -> None:
     columns = good()
     named = {"t": columns["t"]}
@@ -518,6 +550,12 @@ def test_words_that_come_once_a_joint_are_a_signal_each(tmp_path: Path) -> None:
     draft = _arm(tmp_path, lambda run: _block("mp#", run.q) | _block("mt#", run.tau) | {"dt": np.full(len(run.t), 0.005)})
     assert 'candidate: columns = "mp{j}"' in draft
     assert 'candidate: columns = "mt{j}"' in draft
+
+
+def test_names_that_differ_in_their_units_alone_are_two_signals(tmp_path: Path) -> None:
+    draft = _arm(tmp_path, lambda run: _block("q#_ticks", np.round(652 * run.q)) | _block("q#", run.q) | _block("tau#", run.tau))
+    assert 'candidate: columns = "q{j}_ticks"' in draft
+    assert 'candidate: columns = "q{j}"' in draft
 
 
 def test_a_current_in_a_rms_keeps_its_unit_and_asks_for_the_constant(tmp_path: Path) -> None:

@@ -195,6 +195,21 @@ def test_f09_much_damage_is_refused() -> None:
         parse("\n".join(rows) + "\n")
 
 
+@pytest.mark.parametrize("sign", [",", " "])
+def test_f09_messages_between_the_rows_are_left_out_and_named(sign: str) -> None:
+    """No sample is lost by them; a row that a message tore is damaged as before, and many messages are refused."""
+    said = "[WARN] [1714744933.305000]: control loop missed its rate of 200 Hz"
+    rows = "\n".join(lines()).replace(",", sign).split("\n")
+    table = parse("\n".join([*rows[:100], said, *rows[100:700], said, *rows[700:]]) + "\n")
+    assert "2 lines of text between the rows left out, the first is line 101: '[WARN]" in table.checks[-1].message
+    assert table.rows.size == 1200
+    assert table.breaks == ()
+    torn = parse("\n".join([*rows[:100], rows[100][:30] + said, *rows[101:]]) + "\n")
+    assert torn.breaks == (99,)
+    with pytest.raises(InputRejected, match="RRID-F09"):
+        parse("\n".join(part for k, row in enumerate(rows) for part in (row, said)[: 1 + (k % 5 == 4)]) + "\n")
+
+
 def test_f16_a_further_table_below_the_first_is_refused_with_its_line() -> None:
     """Its numbers would go on under the names of the first."""
     rows = lines()
