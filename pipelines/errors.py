@@ -26,7 +26,10 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2
 def clean(text: object, limit: int | None = 400) -> str:
     """`text` as one printable line of at most `limit` characters (None: all of it), control characters taken out."""
     line = " ".join(_CONTROL.sub("", str(text).encode("utf-8", "replace").decode("utf-8")).split())
-    return line if limit is None or len(line) <= limit else line[: limit - 1] + "…"
+    if limit is None or len(line) <= limit:
+        return line
+    words, _, last = line[: limit - 1].rpartition(" ")  # a word is not cut, as far as it is one
+    return f"{words} …" if len(last) < limit // 2 else f"{line[: limit - 1]}…"
 
 
 def escaped(path: object) -> str:

@@ -34,3 +34,9 @@ def test_only_what_is_near_is_suggested(word: str, most: int, said: str) -> None
 def test_one_mark_ends_a_sentence_and_names_stay_as_they_are(message: str, remedy: str, said: str) -> None:
     """No full stop behind a question mark; what is typed (options, values, keys) gets no capital."""
     assert str(InputRejected("F01", message, remedy=remedy)) == f"RRID-F01 {said}"
+
+
+def test_a_long_text_ends_behind_a_word() -> None:
+    """What is left out follows the last whole word; of one endless word a part is better than nothing."""
+    assert clean("the drive of panda_joint3 saturates", 30) == "the drive of panda_joint3 …"
+    assert clean("x" * 50, 30) == "x" * 29 + "…"
