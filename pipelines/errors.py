@@ -28,7 +28,7 @@ def clean(text: object, limit: int | None = 400) -> str:
     line = " ".join(_CONTROL.sub("", str(text).encode("utf-8", "replace").decode("utf-8")).split())
     if limit is None or len(line) <= limit:
         return line
-    words, _, last = line[: limit - 1].rpartition(" ")  # a word is not cut, as far as it is one
+    words, _, last = line[: limit - 1].rpartition(" ")  # no word is cut, but one that is half of the text
     return f"{words} …" if len(last) < limit // 2 else f"{line[: limit - 1]}…"
 
 

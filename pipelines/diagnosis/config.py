@@ -36,7 +36,7 @@ class DiagnosisConfig:
         0.3  # of the best gain, without or with what standing numbers have taken of it, from which
         # a candidate is refitted
     )
-    causes: int = 4  # most causes in one session
+    causes: int = 4  # most causes in one session, at least 1
     ripple_orders: int = 24  # [1/rev] of torque-proportional ripple in the standing dictionary
     form_widths: int = 7  # sigmoids that make the form of a friction law
     drift_order: int = 3  # of the polynomial of time by which friction without a name drifts

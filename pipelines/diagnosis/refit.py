@@ -2,7 +2,8 @@
 
 later = Later.of(dataset, dictionary, prior, config)
 state = later.start()
-state = later.fit(state.with_effect(...))
+model, belief = state.model.with_effect(effect, amplitudes), later.beside(state.belief, effect)
+state = later.fit(model, state.theta, belief)
 """
 
 from __future__ import annotations
@@ -304,18 +305,22 @@ class Later:
 
         An event counts in the whole alone: beyond its moment it leaves nothing.
         """
+        lasting, every = self._powers(state)
+        return np.asarray(lasting / max(float(every.sum()), 1e-300))
+
+    def lasting(self, state: State) -> Array:
+        """Return the share (joints,) of the lasting effects in the torque of all at each joint."""
+        lasting, every = self._powers(state)
+        return np.asarray(np.minimum(lasting / np.maximum(every, 1e-300), 1.0))
+
+    def _powers(self, state: State) -> tuple[Array, Array]:
+        """Return the power (joints,) of the torque of lasting effects, and of all."""
         effects = state.model.effects
-        lasting = tuple(one for one in effects if one.log is None)
-        if not lasting:
-            return np.zeros(self.rows.n_joints)
-        plain, own, whole = (
-            self.rows.torque(replace(state.model, effects=some)) for some in ((), lasting, effects)
-        )
-        power, total = (
-            np.array([float(np.sum((x - y) ** 2)) for x, y in zip(torque, plain, strict=True)])
-            for torque in (own, whole)
-        )
-        return np.asarray(power / max(float(total.sum()), 1e-300))
+        some = ((), tuple(one for one in effects if one.log is None), effects)
+        plain, *others = (self.rows.torque(replace(state.model, effects=own)) for own in some)
+        each = [zip(torque, plain, strict=True) for torque in others]
+        lasting, every = (np.array([float(np.sum((x - y) ** 2)) for x, y in own]) for own in each)
+        return lasting, every
 
     @property
     def usual(self) -> Array:

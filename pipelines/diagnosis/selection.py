@@ -2,7 +2,7 @@
 
 selection = select(later, baseline, responses)
 selection.causes              each with its alternatives
-selection.last                the round in which the search ended, and why
+selection.rounds              the last of them says why the search ended
 """
 
 from __future__ import annotations
@@ -94,11 +94,6 @@ class Selection:
     end: State
     rounds: tuple[Round, ...]
     cut: tuple[Key, ...] = ()  # causes still significant when the largest number was reached
-
-    @property
-    def last(self) -> Round | None:
-        """The round in which the search ended; None where no cause was looked for."""
-        return self.rounds[-1] if self.rounds else None
 
     @property
     def without_selected_alternatives(self) -> Selection:
@@ -232,6 +227,7 @@ class _Step:
         start, state = self.start, self.state
         prior = max(start.cost - start.rss - state.cost + state.rss, 0.0)
         saved = np.maximum(_power(start.residual) - _power(state.residual), 0.0)
+        saved = saved * self.later.lasting(state)  # beyond its moment an event leaves nothing
         saved = saved + prior * self.later.acting(state) + self.later.standing
         return np.asarray(self.later.config.relevance * saved)
 
@@ -271,24 +267,26 @@ class _Step:
         """Return the significant causes that are the most promising ones, the best first.
 
         A cause is promising by its gain, or by its gain and what the standing numbers have taken of
-        it, for healthy machines have it in small. That of the largest gain is always among them.
+        it, for healthy machines have it in small. That of the largest gain is always among them,
+        and the best of the waves that matter only when they are fitted comes last.
         """
         config = self.later.config
         named = {key: one for key, one in self.significant.items() if one.group.kind == "named"}
-        if not named:
-            return []
-        taken = self.later.taken(self.state, [one.group for one in named.values()])
-        gain = {key: one.gain for key, one in named.items()}
-        worth = {key: gain[key] + more for key, more in zip(named, taken, strict=True)}
-        best = {
-            key
-            for by in (gain, worth)
-            for key, x in by.items()
-            if x > config.promising * max(by.values())
-        }
-        most = max(gain.values())
-        order = sorted(best, key=lambda key: (gain[key] < most, -worth[key]))
-        return [named[key] for key in order[: config.refits]]
+        gain = {key: one.gain for key, one in named.items() if self._matters(one)}
+        fine = sorted(named.keys() - gain.keys(), key=lambda key: -named[key].gain)[:1]
+        order: list[Key] = []
+        if gain:
+            taken = self.later.taken(self.state, [named[key].group for key in gain])
+            worth = {key: gain[key] + more for key, more in zip(gain, taken, strict=True)}
+            best = {
+                key
+                for by in (gain, worth)
+                for key, x in by.items()
+                if x > config.promising * max(by.values())
+            }
+            most = max(gain.values())
+            order = sorted(best, key=lambda key: (gain[key] < most, -worth[key]))
+        return [named[key] for key in (*order[: config.refits], *fine)]
 
     def _refitted(self, responses: Sequence[Acting], touch: Window | None) -> list[Candidate]:
         """Return causes with all their numbers fitted exactly, and the best window of an event."""

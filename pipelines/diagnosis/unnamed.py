@@ -40,7 +40,7 @@ def in_words(key: Key) -> str:
     """Return "cogging:2" of a cause, and what it is of a shape without a name."""
     cause, joint = key
     if cause.startswith("ripple "):
-        return f"a torque ripple of joint {joint}, {cause.removeprefix('ripple ')} a turn,"
+        return f"a torque ripple of joint {joint} ({cause.removeprefix('ripple ')} a turn)"
     return _WORDS[cause].format(joint) if cause in _WORDS else place_of(cause, joint)
 
 

@@ -77,7 +77,7 @@ def _source(name: str) -> str:
 def _on_one_line(text: str) -> str:
     """Line breaks are spaces, and there is none before a comma or behind an opening bracket."""
     text = re.sub("[ \n]+", " ", text).strip(" ")
-    return re.sub(r" (?=[,;:.)])|(?<=\() ", "", text)
+    return re.sub(r" (?=[,;:)]|[.](?:\s|$))|(?<=\() ", "", text)
 
 
 def capital(words: str) -> str:

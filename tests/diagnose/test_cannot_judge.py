@@ -17,7 +17,7 @@ from pipelines.diagnosis.result import Diagnosis
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import encode
 from pipelines.model.rows.prepare import Logs
-from pipelines.report.boundary_card import CARD
+from pipelines.report.sections import CARD
 from pipelines.stage import Request
 from tests.diagnose.sessions import but, healthy_again, session, written
 from tests.diagnosis.asking import answered

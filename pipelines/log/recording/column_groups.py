@@ -381,7 +381,7 @@ def without_lost_rows(table: RawTable) -> tuple[RawTable, int]:
     steps = np.abs(np.diff(x, axis=0))
     jumps = np.minimum(steps[starts[: ends.size]], steps[ends])
     usual = np.nan_to_num(steps[~lost[:-1] & ~lost[1:]]).max(axis=0)
-    if not (np.median(jumps, axis=0) > _FAR_OFF * usual).any():
+    if not (np.median(np.nan_to_num(jumps), axis=0) > _FAR_OFF * usual).any():
         return table, 0
     holes = {name: np.where(lost, np.nan, table.columns[name]) for name in columns}
     return replace(table, columns={**table.columns, **holes}), int(lost.sum())

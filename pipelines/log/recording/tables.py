@@ -152,8 +152,6 @@ def _body(
         remedy = "give header or comment under [format] if these are data"
         where = f"{source}, line {lines[0][0]}"
         checks.append(Check.of("F16", "warn", message, where=where, remedy=remedy))
-    if not body:
-        raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
     head = text.split("\n")[header.line - 1] if header.line else ""
     if again := [number for number, line in body if head and line == head]:
         body = [line for line in body if line[1] != head]
@@ -161,6 +159,8 @@ def _body(
         message, where = f"{comes}: the recorder was started again", f"{source}, line {again[0]}"
         remedy = "none where the clock goes on"
         checks.append(Check.of("F16", "warn", message, where=where, remedy=remedy))
+    if not body:
+        raise InputRejected("T08", "a header, but no sample", where=source, remedy="record again")
     return body
 
 

@@ -57,7 +57,7 @@ class Proof:
     """
 
     joint: int  # 1-based, whose residual is shown
-    against: str  # a signal of `figures.signals`, or "frequency"
+    against: str  # a signal of `signals`, or "frequency"
     unit: str
     x: Array  # (bins,) middle of each
     before: Array  # (bins,) [N m] mean residual without the finding

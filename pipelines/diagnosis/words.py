@@ -50,7 +50,9 @@ def summary_of(found: Diagnosis) -> str:
 
 
 def _alternative(first: Finding, other: Alternative) -> str:
-    like = replace(first, cause=other.cause, joint=other.joint, parameters=other.parameters, log=None)
+    like = replace(
+        first, cause=other.cause, joint=other.joint, parameters=other.parameters, log=None
+    )
     return f"{within(find_effect(other.cause).words.title)}{how_much(like)}{where(like)}"
 
 
