@@ -24,7 +24,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2
 
 
 def clean(text: object, limit: int | None = 400) -> str:
-    """`text` as one printable line of at most `limit` characters (None: all of it), control characters taken out."""
+    """Return `text` in a printable line of at most `limit` characters (None: all of it), without control characters."""
     line = " ".join(_CONTROL.sub("", str(text).encode("utf-8", "replace").decode("utf-8")).split())
     if limit is None or len(line) <= limit:
         return line

@@ -154,7 +154,7 @@ def _kept(arm: Arm | None) -> list[Wanted]:
 
 
 def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
-    """What `diagnose` named, within `run`; what happened once has no place in a model."""
+    """Return the causes that `diagnose` named, within `run`, without those that happen once."""
     named = [Wanted(find_effect(one.cause)(joint=one.joint)) for one in diagnosed.findings
              if diagnosed.verdict == "cause" and not _once(find_effect(one.cause))]
     if not named:
@@ -164,7 +164,7 @@ def _found(diagnosed: Diagnosed, label: str) -> list[Wanted]:
 
 
 def _found_instead(diagnosed: Diagnosed) -> str:
-    """What `diagnose` says, where it names nothing that a model could have."""
+    """Return the outcome of `diagnose` in words, where it names nothing that a model could have."""
     if diagnosed.verdict == "unknown":
         return "diagnose found something wrong, and no cause for it"
     if diagnosed.verdict == "cannot-judge":

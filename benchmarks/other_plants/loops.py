@@ -83,7 +83,7 @@ class Loop:
         self._speed, self._sum = np.zeros(len(inertia)), np.zeros(len(inertia))
 
     def told(self) -> Controller | None:
-        """What a log can say of it."""
+        """Return the description that a log has of the loop; None of those that it cannot describe."""
         if self.kind not in ("pd", "pid"):
             return None
         return Controller("pd", kp=self.kp, kd=self.kd, ki=self.ki, velocity="backward-difference", torque_resolution=self.counts)

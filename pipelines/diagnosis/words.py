@@ -1,4 +1,4 @@
-"""Say in words what was found: where, how much of it there is, and what imitates it.
+"""Describe findings in words: their place, their size, and the causes that imitate them.
 
 summary_of(result)             one sentence for a technician
 where(finding)                 " at joint 2 (from joint 1)"
@@ -104,7 +104,7 @@ def _beside(others: Sequence[Finding]) -> str:
 def taken_in(one: Finding, left: Array) -> str:
     """Return what is said where the nominal model imitates most of the power of a torque.
 
-    Its residual at that joint holds whatever of that torque it does not imitate.
+    Its residual at that joint contains the part of that torque that it does not imitate.
 
     Args:
         left: (joints,) [N m] rms that the nominal model leaves of the logs it was fitted to.

@@ -121,7 +121,7 @@ class Table:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Which of k numbers belong to one joint alone."""
+    """The partition of k numbers: those of one joint alone, and the shared ones."""
 
     own: tuple[Indices, ...]  # of each joint
     shared: Indices

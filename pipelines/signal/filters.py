@@ -162,7 +162,7 @@ def fast_length(n: int) -> int:
 
 
 def passed_both_ways(frequency: Array, cutoff_hz: float, rate: float, order: int = 4) -> Array:
-    """What `zero_phase` leaves of a sinusoid of `frequency` [Hz]: |H|² of the low-pass, a real gain.
+    """Return the gain of `zero_phase` for a sinusoid of `frequency` [Hz]: |H|² of the low-pass, real.
 
     |H|² = 1 / (1 + (tan(π f / rate) / tan(π f_c / rate))^(2n)): Butterworth 1930, by the bilinear transform.
     """

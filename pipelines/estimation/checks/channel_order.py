@@ -7,7 +7,7 @@ either alone from a column map.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations
 
@@ -88,25 +88,40 @@ def search_orders(
         every = few or max(scores.values(), default=logged) > logged
     for signal in signals if every else ():
         if len(moving) <= _ALL_UP_TO[signal]:
-            orders = {_placed(same, moving, moved) for moved in permutations(moving)} - {same}
-            if len(orders) > _REFINED:
-                rough = _Scorer(arm, thinned(motions, _ROUGHLY), gravity, model_error)
-                ranks = {order: rough.rank(signal, order) for order in orders}
-                orders = set(sorted(ranks, key=lambda order: -ranks[order])[:_REFINED])
+            rough = _Scorer(arm, thinned(motions, _ROUGHLY), gravity, model_error)
+            orders = _best_ranked(rough, signal, same, moving)
             scores |= {(signal, order): scorer(signal, order) for order in orders}
-            continue
-        own = {order: scores[signal, order] for order in swaps} | {same: logged}
-        beam: list[Order] = []
-        for _ in range(len(moving) - 1):
-            best = sorted(own, key=lambda order: -own[order])[:_BEAM]
-            if best == beam:
-                break
-            beam = best
-            near = {_exchanged(order, a, b) for order in beam for a, b in combinations(moving, 2)}
-            own |= {order: scorer(signal, order) for order in near - own.keys()}
-        scores |= {(signal, order): score for order, score in own.items() if order != same}
+        else:
+            own = {order: scores[signal, order] for order in swaps} | {same: logged}
+            reached = _by_exchanges(scorer, signal, own, moving)
+            scores |= {(signal, order): x for order, x in reached.items() if order != same}
     ranked = sorted(scores.items(), key=lambda item: -item[1])[:most]
     return tuple(ColumnOrder(*key) for key, score in ranked if score > least)
+
+
+def _best_ranked(
+    rough: _Scorer, signal: str, same: Order, moving: Sequence[int]
+) -> Collection[Order]:
+    """Return all orders but the logged one, of many those that a rough comparison ranks first."""
+    orders = {_placed(same, moving, moved) for moved in permutations(moving)} - {same}
+    if len(orders) <= _REFINED:
+        return orders
+    return sorted(orders, key=lambda order: -rough.rank(signal, order))[:_REFINED]
+
+
+def _by_exchanges(
+    scorer: _Scorer, signal: str, known: Mapping[Order, float], moving: Sequence[int]
+) -> dict[Order, float]:
+    """Return the scores of orders that exchanges of two columns reach from the best ones known."""
+    own, beam = dict(known), list[Order]()
+    for _ in range(len(moving) - 1):
+        best = sorted(own, key=lambda order: -own[order])[:_BEAM]
+        if best == beam:
+            break
+        beam = best
+        near = {_exchanged(order, a, b) for order in beam for a, b in combinations(moving, 2)}
+        own |= {order: scorer(signal, order) for order in near - own.keys()}
+    return own
 
 
 class _Scorer:

@@ -66,6 +66,6 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
 
 
 def _finite_median(x: Array) -> float:
-    """Return the median of the finite values of `x`; 0 where there are none."""
+    """Return the median of the finite values of `x`; 0 without any."""
     finite = x[np.isfinite(x)]
     return float(median(finite)) if finite.size else 0.0

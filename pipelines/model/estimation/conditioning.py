@@ -1,4 +1,4 @@
-"""What is done alike to torque and columns before they become equations: low-pass, decimation, slow samples left out."""
+"""Condition torque and columns alike before they become equations: low-pass, decimation, no slow samples."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SHORT = 0.5  # of the longest stretch without a gap
 
 @dataclass(frozen=True)
 class Conditioning:
-    """What is done alike to torque and columns. See `condition` for the defaults."""
+    """The filter and decimation of torque and columns. See `condition` for the defaults."""
 
     low_pass: LowPass | None
     cutoff_hz: float | None
@@ -42,7 +42,7 @@ def condition(motion: Motion, rate: float, cutoff_hz: float | None, decimation: 
 
 
 def cutoff_at(cutoff_hz: float | None, rate: float) -> float | None:
-    """What a log of `rate` feels of a cut-off that several logs share: nothing where it lies above all that it holds."""
+    """Return the cut-off that several logs share, for a log of `rate`; None where it lies above the band of that log."""
     return cutoff_hz if cutoff_hz is not None and cutoff_hz < HIGHEST * rate else None
 
 

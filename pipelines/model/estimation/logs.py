@@ -33,7 +33,7 @@ _MOSTLY = 0.01  # of the samples saturated: that is why none is left
 
 @dataclass(frozen=True)
 class Recipe:
-    """What is done to a log before it becomes equations. None: found from the logs that are fitted."""
+    """How a log becomes equations. None: found from the logs that are fitted."""
 
     how: Reconstruction = field(default_factory=Reconstruction)
     cutoff_hz: float | None = None

@@ -236,7 +236,7 @@ def _added(standing: Sequence[Acting], motion: Motion, arm: ArmModel) -> Array:
 
 
 def law_of(laws: Sequence[Effect], effect: Effect, name: str) -> int | None:
-    """Which of the laws at the joint of `effect` has a shape `name`."""
+    """Return the number of the law at the joint of `effect` that has a shape `name`."""
     return next((k for k, law in enumerate(laws) if law.joint == effect.joint
                  and any(q.shape and q.name == name for q in law.parameters)), None)
 

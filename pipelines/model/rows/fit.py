@@ -64,7 +64,7 @@ def solved(table: Array, y: Array, ridge: float = 0.0) -> Array:
 
 
 def superfluous(table: Array, wanted: Sequence[int], least: float) -> list[int]:
-    """Which of the `wanted` columns of `table` (k, rows) the others are as well, but for a part below `least` of their length.
+    """Return which of the `wanted` columns of `table` (k, rows) the others imitate but for a part below `least` of their length.
 
     The one that is seen least goes first, and no longer counts as one of the others: of two columns that are nearly the same one
     stays (pivoting, as in Golub & Van Loan 2013, ch. 5.4).
@@ -177,13 +177,13 @@ class Refined:
         return self.data.rms(self.left)
 
     def of_effect(self, place: int) -> list[int]:
-        """Which slopes belong to effect number `place`."""
+        """Return the slopes that belong to effect number `place`."""
         first = len(self.model.beta)
         return [first + k for k, (kind, which, _) in enumerate(self.names) if kind == 1 and which == place]
 
     @cached_property
     def unseen(self) -> list[int]:
-        """Which slopes, of effects, the others are as well: those numbers stay where they were, for these logs do not tell them."""
+        """The slopes of effects that the others imitate: the logs do not determine those numbers, and they stay as they were."""
         if self.known is not None:  # where they were fitted they were held
             return [k for k in range(len(self.model.beta), len(self.slopes)) if self.names[k - len(self.model.beta)][0] == 1
                     and self.known[k, k] == 0.0]

@@ -133,7 +133,7 @@ class Binned:
 
     @property
     def power(self) -> float:
-        """What the means hold of the sum of squares."""
+        """The sum of squares of the means."""
         return float(np.sum(self.count * self.mean**2))
 
 
