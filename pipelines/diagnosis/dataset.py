@@ -133,15 +133,16 @@ class Rows:
     def mixed(self, model: Exact) -> Table | None:
         """Return the slopes by the nominal numbers beside the effects; None: they are `nominal`."""
         slopes = nominal_slopes(model)
-        return None if slopes is None else self.table(self.data.lay(slopes))
+        return None if slopes is None else self.table(self.data.lay_each(slopes))
 
     def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
         """Return the slopes of the torque by the numbers of the effects, and their names.
 
-        At the joint of an effect the shape of the friction law is one of them: fitted without the
-        effect, it has taken some of it.
+        At the joint of an effect the shape of the friction law is one of them, and of an effect on
+        the whole arm that of every law: fitted without the effect, it has taken some of it.
         """
-        joints = {one.effect.joint for one in model.effects}
+        own = {one.effect.joint for one in model.effects if one.log is None}
+        joints = range(1, 1 + self.n_joints) if None in own else own
         every, names = further_slopes(model, self.data, joints)
         return self.table(every), names
 
@@ -263,13 +264,13 @@ def _session_start(data: Data) -> float | None:
 
 
 def _columns(prepared: Prepared) -> Columns:
-    """Return the nominal columns; without reference logs the sign change's curve is fitted too.
+    """Return the nominal columns; the curve by which friction changes its sign is fitted too.
 
-    The curve of the sign change is not known, and no such curve is a fault. With reference logs the
-    form of friction (`prior`) contains it.
+    That curve is not known, and none is a fault. Effects on the load or the drive act on the
+    friction as well, and do so by its curve.
     """
     own = prepared.columns
-    if prepared.reference is not None or any(speed > 0.0 for speed in prepared.recipe.min_speed):
+    if any(speed > 0.0 for speed in prepared.recipe.min_speed):
         return own
     laws = (law.forms()[-1] if law.evidence == "none" else law for law in own.laws)
     return replace(own, laws=tuple(laws))

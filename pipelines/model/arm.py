@@ -122,11 +122,11 @@ class Arm:
         """Torque (samples, joints) [N m] that a log of this motion should show.
 
         Args:
-            inside: torque that is added to that of rigid body and friction, before any effect acts on it.
+            inside: the torque that effects act on, in place of that of rigid body and friction.
         """
         def predict(motion: Motion, arm: ArmModel, acting: tuple[Acting, ...]) -> Array:
             if not acting:
-                return arm.torque(motion) if inside is None else arm.torque(motion) + inside(motion, arm)
+                return arm.torque(motion) if inside is None else inside(motion, arm)
             *inner, last = acting
             return last.effect.apply(motion, arm, last.values, lambda m, a: predict(m, a, tuple(inner)))
 

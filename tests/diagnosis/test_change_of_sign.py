@@ -95,10 +95,10 @@ def test_root_and_arc_tangent_are_met_by_their_sigmoids(roundness: float, curve:
     [
         (0.0, (), ("sharpness", "roundness")),
         (0.05, (), ("sharpness",)),  # the change of sign is not among the equations then
-        (0.0, before(hidden(2)), ("sharpness",)),  # their residual shows the form of friction
+        (0.0, before(hidden(2)), ("sharpness", "roundness")),  # effects act on the friction as it is
     ],
 )
-def test_the_curve_is_fitted_where_nothing_else_tells_it(
+def test_the_curve_is_fitted_where_the_change_of_sign_is_among_the_rows(
     slowest: float, reference: tuple[ExperimentLog, ...], free: tuple[str, ...]
 ) -> None:
     logs = Logs((hidden(1),), reference=reference)

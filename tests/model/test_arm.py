@@ -97,7 +97,7 @@ def test_what_is_kept_of_a_motion_is_that_of_the_very_arm(arm: Arm, motion: Moti
         torque += 1.0
     assert asked.count(id(still.q)) == 3
     half = arm.nominal.extended(Acting(HalfTorque(), (Parameter("part", 0.5, None, "1"),)))
-    inside = half.torque(still, lambda there, _: np.ones_like(there.q))
+    inside = half.torque(still, lambda there, own: own.torque(there) + 1.0)
     np.testing.assert_allclose(inside, half.torque(motion) + 0.5, rtol=0, atol=1e-12)  # it acts on what stands inside too
 
 

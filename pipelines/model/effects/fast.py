@@ -10,7 +10,6 @@ An effect that has some is a `Fast`, and overrides what it can do faster. Caller
     speed_curve(effect, values)                 a torque that depends on the speed of its joint alone
     own_load(effect, values)                    the load of `simulate` in plain numbers, for a simulation of one robot
     own_memory(effect, values)                  the same of a load with one state
-    mixing(effect, values, n_joints)            the matrix by which a drive mixes the torques of one instant
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ import numpy as np
 from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, OwnMemory, SpeedCurve, Values
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Fast", "from_motion", "mixing", "own_columns", "own_load", "own_memory",
+__all__ = ["Fast", "from_motion", "own_columns", "own_load", "own_memory",
            "several_columns", "shape_slopes", "speed_curve"]
 
 
@@ -54,10 +53,6 @@ class Fast(Effect):
         """Return the load of `simulate` as a function of angle and speed of its own joint, where it follows from these alone."""
         return None
 
-    def mixing(self, values: Values, n_joints: int) -> Array | None:
-        """Return (joints, joints) M, where `apply` gives M times the torque of the moment without it, whatever the motion."""
-        return None
-
     def own_memory(self, values: Values) -> OwnMemory | None:
         """Return the load of `simulate` where it has one state, whose rate follows from it and the speed of its own joint."""
         return None
@@ -82,11 +77,6 @@ def own_columns(shapes: Sequence[Effect], motion: Motion, arm: ArmModel) -> Arra
     if isinstance(first, Fast):
         return first.own_columns(shapes, motion, arm)  # type: ignore[arg-type]
     return np.stack([shape.columns(motion, arm)[:, (shape.joint or 1) - 1].T for shape in shapes])
-
-
-def mixing(effect: Effect, values: Values, n_joints: int) -> Array | None:
-    """Return M, where `apply` gives M times the torque of the moment; None where that is not known."""
-    return effect.mixing(values, n_joints) if isinstance(effect, Fast) else None
 
 
 def shape_slopes(effect: Effect, motion: Motion, amplitudes: Array) -> Array | None:

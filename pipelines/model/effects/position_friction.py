@@ -16,7 +16,7 @@ from pipelines.model.rigid.body import Array, Motion
 __all__ = ["PositionFriction"]
 
 _TAILS = ("", "_2", "_3")
-_HIGHEST = 8.0  # order that is searched for
+_HIGHEST = 16.0  # order that is searched for
 
 
 @dataclass(frozen=True)

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
-from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueCrosstalk"]
 
 
 @dataclass(frozen=True)
-class TorqueCrosstalk(Fast):
+class TorqueCrosstalk(Effect):
     """Applied torque of joint j = u_j - c u_i, so that the log shows u_j = τ_j + c τ_i. From the joint before, if none is given."""
 
     from_joint: float = 0.0  # i, 1-based
@@ -34,11 +31,6 @@ class TorqueCrosstalk(Fast):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, predicted(arm, motion)[:, int(self.from_joint) - 1])
-
-    def mixing(self, values: Values, n_joints: int) -> Array:
-        matrix = np.eye(n_joints)
-        matrix[self._index, int(values["from_joint"]) - 1] += values["coefficient"]
-        return matrix
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """Other effects on both joints included."""

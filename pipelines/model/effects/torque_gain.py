@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
-from pipelines.model.effects.fast import Fast
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueGain"]
@@ -17,7 +16,7 @@ _LEAST = 1e-6  # of the torque that arrives
 
 
 @dataclass(frozen=True)
-class TorqueGain(Fast):
+class TorqueGain(Effect):
     """Applied torque = (1 + ε) logged torque, so that the log shows τ/(1 + ε), τ the model's torque.
 
     The column is τ, its amplitude c = 1/(1 + ε) - 1.
@@ -42,11 +41,6 @@ class TorqueGain(Fast):
 
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         return {"gain_error": 1.0 / max(1.0 + float(amplitudes[0]), _LEAST) - 1.0}
-
-    def mixing(self, values: Values, n_joints: int) -> Array:
-        matrix = np.eye(n_joints)
-        matrix[self._index, self._index] = 1.0 / (1.0 + values["gain_error"])
-        return matrix
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque is scaled, other effects included."""

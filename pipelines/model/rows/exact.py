@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,8 @@ import numpy as np
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
-from pipelines.model.effects.fast import from_motion, mixing
+from pipelines.model.effects.fast import from_motion
+from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
@@ -147,7 +148,7 @@ class Exact:
 
         def inside(there: Motion, own: ArmModel) -> Array:
             same = there is motion and isinstance(own, Arm) and own.base is self.nominal.base and own.body is self.nominal.body
-            return known if same else _added(self.standing, there, own)
+            return own.torque(there) + (known if same else _added(self.standing, there, own))
 
         return np.asarray(arm.torque(motion, inside) - known)
 
@@ -196,18 +197,6 @@ class Exact:
         rows = several_rows(data, [one.effect.at(one.values) for one in several], self.nominal)
         return [np.asarray(one.effect.amplitudes(one.values) @ self._of_log(data, one, own))
                 for one, own in zip(several, rows, strict=True)]
-
-    def friction_numbers(self, joint: int | None) -> list[int]:
-        """Return which numbers of `beta` are amplitudes of friction laws of a joint."""
-        owners = [law.joint for law in self.columns.laws for q in law.parameters if not q.shape]
-        return [len(self.columns.kept) + k for k, owner in enumerate(owners) if owner == joint]
-
-    def slope_of(self, one: Named, number: int, motion: Motion) -> Array:
-        """Return the slope (samples, joints) of the torque of an effect by number `number` of `beta`."""
-        moved = self.beta.copy()
-        moved[number] += _DIFFERENCE
-        there, here = (one.effect.torque(motion, arm, one.values) for arm in (replace(self, beta=moved).nominal, self.nominal))
-        return np.asarray((there - here) / _DIFFERENCE)
 
     def columns_of(self, data: Data, one: Named) -> Array:
         """(k, rows) the same of each of its amplitudes."""
@@ -280,34 +269,49 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
     further, names = further_slopes(model, data, range(1, data.n_joints + 1), laid)
     by_nominal = nominal_slopes(model)
     if by_nominal is not None:
-        return np.concatenate([data.lay(by_nominal), further]), names
+        return np.concatenate([data.lay_each(by_nominal), further]), names
     laws = [law_rows(data, law, model.columns) for law in model.columns.laws]
     return np.concatenate([rigid, *laws, further]), names
 
 
-def nominal_slopes(model: Exact) -> Callable[[Motion], Array] | None:
-    """Return what gives the slopes (samples, joints, k) by base parameters and friction; None: no effect changes them.
+def nominal_slopes(model: Exact) -> Callable[[int, Motion], Array] | None:
+    """Return what gives the slopes (samples, joints, k) by base parameters and friction in a log; None: no effect changes them.
 
-    A drive may mix or scale what it passes on, a record may lag, and an effect by the session's clock is a share of the friction at
-    its joint. What delays a drive, clips or misreads changes slopes by the share that it adds, which is neglected.
+    Each is a difference of the torque that effects make of the nominal one, at the motion as they read it.
     """
-    columns, kept = model.columns, list(model.columns.kept)
-    n = columns.body.robot.n_joints
-    mixed = [m for m in (mixing(one.effect, one.values, n) for one in model.effects) if m is not None]
-    shares = [one for one in model.effects if one.effect.clock == "session"]
-    if not mixed and not shares and not _through(model):
+    session = [k + 1 for k, one in enumerate(model.effects) if one.effect.clock == "session"]  # a share of the joint's friction
+    if not (count := max([model.core, *session])):
         return None
-    matrix = reduce(np.matmul, reversed(mixed), np.eye(n))
+    core, columns = replace(model, effects=model.effects[:count]), model.columns
+    size = _DIFFERENCE * np.where(core.beta != 0.0, np.abs(core.beta), 1.0)  # what acts on the torque may have kinks
 
-    def slopes(motion: Motion) -> Array:
-        rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept]
-        table = np.concatenate([rigid, *(law.columns(motion, columns.arm) for law in columns.laws)], axis=2)
-        for one in shares:
-            for number in model.friction_numbers(one.effect.joint):
-                table[:, :, number] += model.slope_of(one, number, motion)
-        return recorded(model.arm, np.asarray(matrix @ table), motion)
+    def by_column(motion: Motion) -> Array:
+        laws = [law.columns(motion, columns.arm) * isinstance(law, FrictionLaw) for law in columns.laws]  # others are effects
+        rigid = columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, list(columns.kept)]
+        return np.ascontiguousarray(np.moveaxis(np.concatenate([rigid, *laws], axis=2), 2, 0))
+
+    def slopes(log: int, motion: Motion) -> Array:
+        seen: list[tuple[Motion, Array, Array]] = []
+
+        def torque(arm: Arm, number: int | None = None) -> Array:
+            def inside(read: Motion, _: ArmModel) -> Array:
+                if not seen or not _alike(seen[0][0], read):
+                    each = by_column(read)
+                    seen[:] = [(read, each, np.tensordot(core.beta, each, 1))]
+                each, whole = seen[0][1:]
+                return np.array(whole) if number is None else np.asarray(whole + size[number] * each[number])
+
+            return arm.torque(motion, inside)
+
+        here = torque(core.arm_in(log))
+        there = (torque(replace(core, beta=core.beta + step).arm_in(log), k) for k, step in enumerate(np.diag(size)))
+        return np.stack([(one - here) / by for one, by in zip(there, size, strict=True)], axis=2)
 
     return slopes
+
+
+def _alike(one: Motion, other: Motion) -> bool:
+    return one is other or all(map(np.array_equal, (one.q, one.dq, one.ddq), (other.q, other.dq, other.ddq)))
 
 
 def further_slopes(

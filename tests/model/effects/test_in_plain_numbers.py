@@ -8,7 +8,7 @@ import pytest
 from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, Formula
-from pipelines.model.effects.fast import Fast, mixing, own_load, own_memory
+from pipelines.model.effects.fast import Fast, own_load, own_memory
 from pipelines.model.effects.terms import WRITTEN, summed
 from pipelines.model.rigid.body import Motion
 from tests.model.effects.test_every_effect import arm, drawn, every_effect, motion, placed
@@ -65,18 +65,6 @@ def test_a_drive_in_plain_numbers(kind: type[Effect], arm: Arm, motion: Motion) 
 
 
 @every_effect
-def test_torques_of_a_moment_mixed(kind: type[Effect], arm: Arm, motion: Motion) -> None:
-    """Where it is one matrix at all times, that is what it makes of any torque."""
-    values, some = drawn(placed(kind), 10), Motion(*(x[::50] for x in (motion.t, motion.q, motion.dq, motion.ddq)))
-    matrix = mixing(placed(kind), values, arm.n_joints)
-    if matrix is None:
-        return
-    torque = np.random.default_rng(3).uniform(-50.0, 50.0, some.q.shape)
-    np.testing.assert_allclose(placed(kind).apply(some, arm, values, lambda m, a: torque.copy()), torque @ matrix.T, rtol=1e-12)
-    assert np.abs(matrix - np.eye(arm.n_joints)).max() > 1e-3
-
-
-@every_effect
 def test_what_is_written_out_is_what_is_called(kind: type[Effect]) -> None:
     """With any sign of its numbers, and within a product."""
     load = own_load(placed(kind), drawn(placed(kind), 11))
@@ -94,7 +82,6 @@ def test_some_effects_have_them(arm: Arm) -> None:
     fast = [kind for kind in all_effects() if issubclass(kind, Fast)]
     assert any(kind.own_memory is not Fast.own_memory for kind in fast)
     assert any(kind.own_load is not Fast.own_load for kind in fast)
-    assert any(issubclass(kind, Fast) and kind.mixing is not Fast.mixing for kind in all_effects())
 
 
 @pytest.mark.parametrize("samples", [1, 400])

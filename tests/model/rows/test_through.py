@@ -17,8 +17,10 @@ from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
+from pipelines.model.effects.load_friction import LoadFriction
 from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.effects.torque_lag import TorqueLag
+from pipelines.model.effects.viscous_drift import ViscousDrift
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact, nominal_slopes, slopes_of
@@ -60,7 +62,8 @@ def test_slopes_of_a_model_behind_a_lag_are_those_of_its_torque() -> None:
         assert np.linalg.norm(moved - done.slopes[k]) < 1e-6 * np.linalg.norm(moved)
     by_nominal = nominal_slopes(model)  # what a diagnosis steps along
     assert by_nominal is not None
-    assert np.allclose(data.lay(by_nominal), done.slopes[:len(model.beta)], rtol=0.0, atol=1e-12)
+    for one, other in zip(data.lay_each(by_nominal), done.slopes, strict=False):
+        assert np.linalg.norm(one - other) < 1e-9 * np.linalg.norm(other)
 
 
 def test_a_lag_shows_in_the_ripple_that_it_delays() -> None:
@@ -90,6 +93,24 @@ def test_sharpness_of_each_joint_is_found_behind_a_lag() -> None:
     assert done.model.effects[0].values["time_constant"] == pytest.approx(LAG, rel=0.005)
     found = [law.sharpness for law in done.model.columns.laws if isinstance(law, Coulomb)]
     assert found == pytest.approx([30.0, 90.0], rel=0.02)
+
+
+@pytest.mark.parametrize(("effect", "amplitudes"), [
+    (EncoderEccentricity(joint=1), [0.02, 0.0]), (TimeDelay(joint=1), [0.004]), (DriveLag(joint=1), [0.004]),
+    (LoadFriction(joint=1, behind=1.0, input_side=1.0), [0.1]), (ViscousDrift(joint=1), [0.3])],
+    ids=["misread", "late", "slow drive", "load friction", "drift"])
+def test_nominal_numbers_are_sloped_as_the_whole_torque_is(effect: Effect, amplitudes: list[float]) -> None:
+    """A fit that steps along the slopes of the arm without the effect stops away from the best numbers."""
+    prepared = prepare(Logs((turned(1, {}, lag=0.0, mean=0.1),)), Recipe(cutoff_hz=40.0))
+    columns, fit = fit_nominal(prepared.data, prepared.columns)
+    model, data = Exact.start(columns, fit).with_effect(effect, np.array(amplitudes)), prepared.data
+    model = model.moved(np.zeros(len(model.beta)), [])  # what an effect shares with friction is that of its joint now
+    by_nominal = nominal_slopes(model)
+    assert by_nominal is not None
+    for k, slope in enumerate(data.lay_each(by_nominal)):
+        step = 1e-3 * model.beta[k] * np.eye(len(model.beta))[k]
+        moved = (model.moved(step, []).torque(data) - model.torque(data)) / (1e-3 * model.beta[k])
+        assert np.linalg.norm(moved - slope) < 1e-6 * np.linalg.norm(slope)
 
 
 @pytest.mark.parametrize(("effect", "amplitudes"), [(EncoderEccentricity(joint=1), [0.02, 0.0]), (TimeDelay(joint=1), [0.004]),
