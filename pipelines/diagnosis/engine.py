@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from pipelines.diagnosis.decision import Decision, decide
 from pipelines.diagnosis.prior import Prior, prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.selection import SearchStart, Selection, select
+from pipelines.diagnosis.state import State
 from pipelines.diagnosis.variance import settle
 from pipelines.fit.joint_table import Array, Table
 from pipelines.log.experiment import ExperimentLog
@@ -63,6 +65,16 @@ class Look:
         alone = self.later.dataset.reference is None
         return None if alone else (self.later.prior, self.baseline)
 
+    @cached_property
+    def told(self) -> State:
+        """The causes found, with the numbers that are told.
+
+        Without reference logs standing numbers are as large as what a cause left before it was
+        found. They may have taken in a part of it, and a cause more than it is: they are left out.
+        """
+        end = self.selection.end
+        return end if self.reference is not None else self.later.without_standing(end)
+
     @property
     def reference(self) -> tuple[Rows, Table] | None:
         """The rows and columns of the reference."""
@@ -79,7 +91,7 @@ def _usual(
 
 def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:
     """Return the torque (rows,) [N m] of the causes, and of all that was fitted with them."""
-    rows, end, prior = rough.later, look.selection.end, look.later.prior
+    rows, end, prior = rough.later, look.told, look.later.prior
     whole = end.model.torque(rows.data)
     small = every.later.take(prior.standing).times(end.theta[prior.n_nominal :])
     standing = np.empty(rows.count)

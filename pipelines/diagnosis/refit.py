@@ -423,6 +423,11 @@ class Later:
             return state
         return self.fit(state.model, state.theta, state.belief.held(at))
 
+    def without_standing(self, state: State) -> State:
+        """Return the state refitted with all standing numbers held at their prior mean."""
+        at = np.arange(self.prior.n_nominal, self.base.width)
+        return self.fit(state.model, state.theta, state.belief.held(at))
+
     def beside(self, belief: Belief, effect: Effect) -> Belief:
         """Return the belief for a model that contains an effect.
 

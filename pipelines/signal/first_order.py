@@ -3,6 +3,8 @@
     lagging(x, t, T)        x goes straight from sample to sample
     held_mean(u, h, T)      u is held over each sample; y is averaged over it
     rate_of_change(x, t)    dx/dt by differences, not across gaps
+    computed(T, h)          the lag of a filter that is computed once a sample, which acts half a sample sooner
+    moved(x, t, by)         x a little later
 """
 
 from __future__ import annotations
@@ -15,17 +17,20 @@ import numpy.typing as npt
 
 from pipelines.signal.blocks import scan
 
-__all__ = ["held_mean", "lagging", "rate_of_change"]
+__all__ = ["computed", "held_mean", "lagging", "moved", "rate_of_change"]
 
 Array = npt.NDArray[np.float64]
 
 _GAP = 1.5  # sample times
+_MANY = 500.0  # time constants in a sample: no lag is left
 
 
-def lagging(x: Array, t: Array, time_constant: float, start: Array | float | None = None, since: int = 0) -> Array:
+def lagging(
+    x: Array, t: Array, time_constant: float, start: Array | float | None = None, since: int = 0, digital: bool = False
+) -> Array:
     """y (…, samples) of x (…, samples), settled at the start and behind every gap of t [s]; or `start` up to sample `since`.
 
-        y_{k+1} = a y_k + (m - a) x_k + (1 - m) x_{k+1},   a = exp(-h/T),   m = (1 - a) T/h
+        y_{k+1} = a y_k + (m - a) x_k + (1 - m) x_{k+1},   a = exp(-h/T),   m = (1 - a) T/h,   m = a of a digital filter
     """
     if time_constant <= 0.0 or len(t) < 2:
         return np.array(x, dtype=np.float64)
@@ -33,6 +38,7 @@ def lagging(x: Array, t: Array, time_constant: float, start: Array | float | Non
     for part, h in _stretches(t):
         own = np.array(x[..., part].reshape(-1, part.stop - part.start), dtype=np.float64)
         a, m = _decay(h, time_constant)
+        m = a if digital else m
         drive = np.concatenate([own[:, :1], (m - a) * own[:, :-1] + (1.0 - m) * own[:, 1:]], axis=1)
         first = since if start is not None and part.start == 0 and since < own.shape[1] else 0
         if start is not None and part.start == 0:
@@ -61,6 +67,20 @@ def rate_of_change(x: Array, t: Array) -> Array:
         if part.stop - part.start > 1:
             out[part] = np.gradient(x[part], t[part])
     return out
+
+
+def computed(time_constant: float, h: float) -> float:
+    """[s] of the lag that, half a sample h sooner, does as one of T that is computed once a sample.
+
+        h / (e^(h/T) - 1) + h/2 = T (1 + (h/T)²/12 - …)
+    """
+    return h / float(np.expm1(h / time_constant)) + 0.5 * h if 0.0 < h < _MANY * time_constant else 0.5 * h
+
+
+def moved(x: Array, t: Array, by: float) -> Array:
+    """x(t + `by`) (samples,), of a time in which it changes little: by Taylor's series."""
+    once = rate_of_change(x, t)
+    return np.asarray(x + by * once + 0.5 * by**2 * rate_of_change(once, t))
 
 
 def _decay(h: float, time_constant: float) -> tuple[float, float]:

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.signal.first_order import rate_of_change
+from pipelines.signal.first_order import computed, moved, rate_of_change
 
-__all__ = ["DriveLag"]
+__all__ = ["DIGITAL", "DriveLag"]
+
+DIGITAL = Quantity("digital", "1", 0.0, 1.0, "1 where the lag is that of a filter that is computed once a sample", shape=True,
+                   discrete=True, unsaid=0.0)
 
 
 @dataclass(frozen=True)
 class DriveLag(Effect):
-    """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt: earlier than the arm feels it."""
+    """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt: earlier than the arm feels it.
+
+    A filter that is computed once a sample h acts at once, half a sample earlier: τ_k = a τ_{k-1} + (1 - a) u_k, a = exp(-h/T).
+    """
+
+    digital: float = 0.0  # 1: computed once a sample
 
     name = "drive_lag"
     parameters = Parameters(
-        Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command", healthy=2e-4))  # a current loop of 800 Hz
+        Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command", healthy=2e-4),  # a current loop of 800 Hz
+        DIGITAL)
     words = Words("Drive lag", size="time_constant",
         signature="The logged torque leads the torque that the arm feels, on one joint; more so the faster the torque changes.",
         explanation="The current loop is slow, or the amplifier filters its command.",
@@ -30,26 +40,35 @@ class DriveLag(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, rate_of_change(self.own(predicted(arm, motion)), motion.t))
 
+    def forms(self) -> tuple[Self, ...]:
+        return replace(self, digital=0.0), replace(self, digital=1.0)
+
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque lags, other effects included."""
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
-        tau[:, self._index] += values["time_constant"] * rate_of_change(self.own(tau), motion.t)
+        own, time, t = self.own(tau), values["time_constant"], motion.t
+        if values.get("digital", 0.0):
+            h = motion.sample_time
+            tau[:, self._index] = moved(own + computed(time, h) * rate_of_change(own, t), t, -0.5 * h)
+        else:
+            tau[:, self._index] += time * rate_of_change(own, t)
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """Exact while a command is held: τ = u + (τ_k - u) e^(-(t - t_k)/T). The memory is τ_k, t_k and u; the drive has
-        settled at the first command, and until then there is none.
+        settled at the first command, and until then there is none. A digital filter is at once where the other ends.
         """
-        time = max(values["time_constant"], 1e-9)
+        time, digital = max(values["time_constant"], 1e-9), bool(values.get("digital", 0.0))
 
         def update(motion: Motion, command: Array, states: Array) -> Array:
             now = self.own(command)
-            reached = np.where(np.isnan(states[:, 0]), now, _reached(states, motion.t, states[:, 2], time))
+            towards = now if digital else states[:, 2]
+            reached = np.where(np.isnan(states[:, 0]), now, _reached(states, motion.t, towards, time))
             return np.stack([reached, motion.t, now], axis=1)
 
         def applied(command: Array, motion: Motion, states: Array) -> Array:
             late = command.copy()
-            late[..., self._index] = _reached(states, motion.t, self.own(command), time)
+            late[..., self._index] = states[:, 0] if digital else _reached(states, motion.t, self.own(command), time)
             return late
 
         return Hooks(actuator=applied, states=3, start=lambda motion, _: np.full((len(motion.t), 3), np.nan), update=update)

@@ -9,8 +9,9 @@ from typing import Self
 import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
+from pipelines.model.effects.drive_lag import DIGITAL
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.signal.first_order import held_mean, lagging, rate_of_change
+from pipelines.signal.first_order import computed, held_mean, lagging, moved, rate_of_change
 
 __all__ = ["TorqueLag"]
 
@@ -20,14 +21,19 @@ _LOOKED_FOR = (0.0, 0.01, 0.03, 0.1)  # [s]
 
 @dataclass(frozen=True)
 class TorqueLag(Effect):
-    """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once."""
+    """T dy/dt = τ - y, y the logged torque: y = τ - T dτ/dt to first order. The arm feels τ at once.
 
+    A filter that is computed once a sample h acts half a sample earlier: y_k = a y_{k-1} + (1 - a) τ_k, a = exp(-h/T).
+    """
+
+    digital: float = 0.0  # 1: computed once a sample
     looked_for: float = 0.0  # [s] the lag whose columns a search compares; 0: their limit for a small one
 
     name = "torque_lag"
     parameters = Parameters(
         Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one",
-                 healthy=2e-4))  # a current that is measured within 800 Hz
+                 healthy=2e-4),  # a current that is measured within 800 Hz
+        DIGITAL)
     words = Words("Torque logging delay", size="time_constant",
         signature="The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative.",
         explanation="The recorder, or the current measurement, filters the torque before it is logged.",
@@ -50,7 +56,8 @@ class TorqueLag(Effect):
 
     def forms(self) -> tuple[Self, ...]:
         """Return the lag of any length."""
-        return (replace(self, looked_for=0.0),)
+        any_length = replace(self, looked_for=0.0, digital=0.0)
+        return any_length, replace(any_length, digital=1.0)
 
     def _start(self, motion: Motion) -> float | None:
         """The torque [N m] that the log shows first, where it was measured."""
@@ -63,19 +70,24 @@ class TorqueLag(Effect):
         log shows first, where it was measured; the second keeps its slope at T = 0 and is exact to the differences' error.
         """
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
-        time, own, t = values["time_constant"], self.own(tau), motion.t
-        long = len(t) > 1 and time > _LONG * float(np.median(np.diff(t)))
-        if long:
-            tau[:, self._index] = lagging(own, t, time, self._start(motion), motion.since)
+        own, t, h = self.own(tau), motion.t, motion.sample_time
+        digital = bool(values.get("digital", 0.0))
+        time = computed(values["time_constant"], h) if digital else values["time_constant"]
+        if len(t) > 1 and time > _LONG * float(np.median(np.diff(t))):
+            late = lagging(own, t, time, self._start(motion), motion.since)
         else:
-            tau[:, self._index] = own - time * lagging(rate_of_change(own, t), t, time)
+            late = own - time * lagging(rate_of_change(own, t), t, time)
+        tau[:, self._index] = moved(late, t, 0.5 * h) if digital else late
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm moves as without it; only the log differs."""
         def record(t: Array, command: Array) -> Array:
-            logged = command.copy()
-            logged[:, self._index] = held_mean(self.own(command), float(np.median(np.diff(t))), values["time_constant"])
+            logged, own = command.copy(), self.own(command)
+            if values.get("digital", 0.0):
+                logged[:, self._index] = lagging(own, t, values["time_constant"], digital=True)
+            else:
+                logged[:, self._index] = held_mean(own, float(np.median(np.diff(t))), values["time_constant"])
             return logged
 
         return Hooks(record=record)

@@ -376,7 +376,8 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     asked = tau if equations.held else None  # a measured torque was there: nothing of it can have been kept back
     since = _first_known(runs[0], pieces[0])
     logged = None if equations.held else tau[since]
-    return LogData(log, equations, Motion(t, q, dq, ddq, asked, logged, since=since), y, ~slow.T, pieces, runs, kept, place)
+    motion = Motion(t, q, dq, ddq, asked, logged, since=since, of=log.sample_time)
+    return LogData(log, equations, motion, y, ~slow.T, pieces, runs, kept, place)
 
 
 def _first_known(run: Run, piece: slice) -> int:

@@ -27,22 +27,23 @@ from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows, several_rows
-from pipelines.signal.first_order import lagging
 
 __all__ = ["Exact", "Named", "Which", "further_slopes", "law_of", "nominal_slopes", "number_moved", "recorded", "slopes_of"]
 
 def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
-    """Return torque (samples, joints), or columns (samples, joints, k), as `arm` records them.
+    """Return columns (samples, joints, k) as `arm` records them.
 
     Where the log tells the torque at its start, that is no column's: each begins with nothing.
     """
-    start = None if motion.logged is None else 0.0
     for acting in arm.effects:
         if acting.effect.acts_on != "record":
             continue
-        joint, time = (acting.effect.joint or 1) - 1, float(acting.effect.amplitudes(acting.values)[0])
-        own, table = np.ascontiguousarray(table[:, joint].T), table.copy()
-        table[:, joint] = lagging(own, motion.t, time, start, motion.since).T
+
+        def through(torque: Array, one: Acting = acting) -> Array:
+            return one.effect.apply(motion, arm, one.values, lambda *_: torque.copy())
+
+        nothing = through(np.zeros(table.shape[:2]))
+        table = np.stack([through(column) - nothing for column in np.moveaxis(table, 2, 0)], axis=2)
     return table
 
 
