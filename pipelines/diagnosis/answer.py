@@ -54,7 +54,7 @@ def answer(
     causes, worth, worse = _worth(prepared, found, blocks, whole)
     own = {id(one.cause): alternatives_of(one) for one in look.selection.rounds}
     named = [(one.probability[one.key], own[id(one)]) for one in causes]
-    findings = findings_of(worth, look.later, look.told, named, found.responses)
+    findings = findings_of(worth, look.later, look.reported, named, found.responses)
     verdict = "unknown" if worse and not causes else found.decision.verdict
     reason = "; ".join(one for one in (worse, found.decision.reason) if one)
     limits = _limits(found, findings, exclude) if whole else Limits((), ())
@@ -111,7 +111,7 @@ def _worth(
     """
     causes = found.decision.causes
     standing = standing_of(prepared.reference, found.look.later)
-    effects = found.look.told.model.effects if causes else ()
+    effects = found.look.reported.model.effects if causes else ()
     trained = train(prepared, found.look.later, effects, blocks, standing)
     worth, why = weigh(prepared, trained, standing, whole), ""
     while causes:

@@ -66,8 +66,8 @@ class Look:
         return None if alone else (self.later.prior, self.baseline)
 
     @cached_property
-    def told(self) -> State:
-        """The causes found, with the numbers that are told.
+    def reported(self) -> State:
+        """The causes found, with the numbers that are reported.
 
         Without reference logs standing numbers are as large as what a cause left before it was
         found. They may have taken in a part of it, and a cause more than it is: they are left out.
@@ -91,7 +91,7 @@ def _usual(
 
 def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:
     """Return the torque (rows,) [N m] of the causes, and of all that was fitted with them."""
-    rows, end, prior = rough.later, look.told, look.later.prior
+    rows, end, prior = rough.later, look.reported, look.later.prior
     whole = end.model.torque(rows.data)
     small = every.later.take(prior.standing).times(end.theta[prior.n_nominal :])
     standing = np.empty(rows.count)

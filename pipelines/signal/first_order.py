@@ -70,7 +70,7 @@ def rate_of_change(x: Array, t: Array) -> Array:
 
 
 def computed(time_constant: float, h: float) -> float:
-    """[s] of the lag that, half a sample h sooner, does as one of T that is computed once a sample.
+    """Return the time constant [s] of a continuous lag that acts, half a sample h later, like a digital one of T.
 
         h / (e^(h/T) - 1) + h/2 = T (1 + (h/T)²/12 - …)
     """

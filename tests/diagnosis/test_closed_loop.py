@@ -42,6 +42,26 @@ def test_a_delay_is_found_alone_and_to_a_twentieth() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("seed", "number", "cause", "time"), [(52, 163, "torque_lag", 5.684e-3), (53, 108, "drive_lag", 6.538e-3)])
+def test_a_filter_that_is_computed_once_a_sample_is_one_lag_of_its_length(seed: int, number: int, cause: str, time: float) -> None:
+    """It acts half a sample sooner than a continuous lag, which got a second lag beside it; standing numbers, in which noise of the
+    drive looks like a lag, made 7.3 ms of the first."""
+    found = diagnosed(*next(case for case in drawn(number, seed) if case.number_in_name == 1000 * seed + number).logs())
+    assert causes(found) == [(cause, 1)]
+    (one,) = found.look.reported.model.effects
+    assert one.values["time_constant"] == pytest.approx(time, rel=0.01)
+
+
+@pytest.mark.slow
+def test_friction_that_grows_with_load_grows_with_friction_as_it_is() -> None:
+    """Friction that changes its sign by an arc tangent loads its gear too: by a hyperbolic tangent a third of it was left."""
+    found = diagnosed(*next(case for case in drawn(111, 52) if case.number_in_name == 52111).logs())
+    assert causes(found) == [("load_friction", 2)]
+    assert effects(found)[0].values["mu"] == pytest.approx(0.14077, rel=0.01)
+    assert found.look.selection.end.mean_squares.max() < 1.2
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "number"), [(31, 4), (18, 20)])
 def test_a_torque_that_hops_is_no_delay_and_no_contact(seed: int, number: int) -> None:
     """A force of constant size that changes its sign at random: no cause of the library."""

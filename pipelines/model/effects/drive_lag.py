@@ -56,7 +56,7 @@ class DriveLag(Effect):
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """Exact while a command is held: τ = u + (τ_k - u) e^(-(t - t_k)/T). The memory is τ_k, t_k and u; the drive has
-        settled at the first command, and until then there is none. A digital filter is at once where the other ends.
+        settled at the first command; before that there is none. The torque of a digital filter is constant over a sample.
         """
         time, digital = max(values["time_constant"], 1e-9), bool(values.get("digital", 0.0))
 
