@@ -10,13 +10,25 @@ from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Coulomb"]
+__all__ = ["Coulomb", "sign_curve"]
 
 # x/√(1 + x²) and (2/π) arctan x as sigmoids, within 0.0012 of them at every x: sharpnesses, as parts of w, and heights.
 _TANH = ((1.0, 1.0),)
 _ROOT = ((1.307, 0.608), (0.563, 0.344), (0.1505, 0.048))
 _ARCTAN = ((1.1537, 0.3622), (0.4719, 0.4021), (0.1463, 0.1731), (0.0335, 0.052), (0.004, 0.0106))
 _BETWEEN = 1.5  # tanh and the root: a roundness that is fitted begins there
+
+
+def sign_curve(level: float, sharpness: float, roundness: float = 1.0) -> SpeedCurve:
+    """Return the torque of `Coulomb` as sigmoids of the speed."""
+    w, more = sharpness, roundness - 1.0
+    if more == 0.0:
+        return SpeedCurve(heights=(level,), sharpnesses=(w,))
+    sharper, rounder = (_TANH, _ROOT) if more <= 1.0 else (_ROOT, _ARCTAN)
+    share = more if more <= 1.0 else more - 1.0
+    return SpeedCurve(heights=tuple(level * part * height for part, curve in ((1.0 - share, sharper), (share, rounder))
+                                    for _, height in curve),
+                      sharpnesses=tuple(w * part for part, _ in (*sharper, *rounder)))
 
 
 @dataclass(frozen=True)
@@ -56,18 +68,10 @@ class Coulomb(FrictionLaw, Fast):
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return self.on_own_row(arm, self.speed_curve({"level": 1.0, "sharpness": self.sharpness, "roundness": self.roundness})
-                               .torque(self.own(motion.dq)))
+        return self.on_own_row(arm, sign_curve(1.0, self.sharpness, self.roundness).torque(self.own(motion.dq)))
 
     def speed_curve(self, values: Values) -> SpeedCurve:
-        level, w, more = values["level"], values["sharpness"], values.get("roundness", 1.0) - 1.0
-        if more == 0.0:
-            return SpeedCurve(heights=(level,), sharpnesses=(w,))
-        sharper, rounder = (_TANH, _ROOT) if more <= 1.0 else (_ROOT, _ARCTAN)
-        share = more if more <= 1.0 else more - 1.0
-        return SpeedCurve(heights=tuple(level * part * height for part, curve in ((1.0 - share, sharper), (share, rounder))
-                                        for _, height in curve),
-                          sharpnesses=tuple(w * part for part, _ in (*sharper, *rounder)))
+        return sign_curve(values["level"], values["sharpness"], values.get("roundness", 1.0))
 
     def forms(self) -> tuple[Self, ...]:
         return self, replace(self, roundness=_BETWEEN)

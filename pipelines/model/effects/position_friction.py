@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 
 from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
+from pipelines.model.effects.coulomb import sign_curve
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 
@@ -21,16 +22,17 @@ _HIGHEST = 16.0  # order that is searched for
 
 @dataclass(frozen=True)
 class PositionFriction(Fast):
-    """τ = Σ A_m sin(m k q + φ_m) tanh(w v), m = 1, 2, 3: Coulomb friction that varies along the turn.
+    """τ = Σ A_m sin(m k q + φ_m) c(v), m = 1, 2, 3: Coulomb friction that varies along the turn, c(v) its sign as in `Coulomb`.
 
     Where it rubs in bands a wave is no sine, and its harmonics carry over to where one alone would not. The columns are
-    sin(m k q) tanh(w v) and cos(m k q) tanh(w v); their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks for m = 1 alone.
+    sin(m k q) c(v) and cos(m k q) c(v); their amplitudes A_m cos φ_m and A_m sin φ_m. A search looks for m = 1 alone.
     What turns with the joint repeats with it, so that k is whole; what turns behind a gear has a k of its own, and on a prismatic
     joint k counts waves in 2π metres.
     """
 
     order: float = 1.0  # k [1/rev of the joint]
     sharpness: float = 100.0  # w [s/rad]
+    roundness: float = 1.0  # of c
     harmonics: int = 3  # how many m there are
     most: int = 3  # how many a refit takes
     whole: bool = False  # whether k is held as it is
@@ -42,6 +44,8 @@ class PositionFriction(Fast):
         Quantity("phase", "rad", -math.pi, math.pi, "angle of the wave at the joint's zero", period=2.0 * math.pi),
         Quantity("sharpness", "s/rad", 5.0, 2000.0, "inverse of the speed over which it changes sign", shape=True,
                  shared=True),
+        Quantity("roundness", "1", 0.4, 3.5, "how gradually it changes sign; 1: as tanh, 3: as arctan", shape=True, unsaid=1.0,
+                 held=1.0, shared=True),
         Quantity("amplitude_2", "N m", 0.0, LARGE, "of the second harmonic", unsaid=0.0),
         Quantity("phase_2", "rad", -math.pi, math.pi, "of the second harmonic", unsaid=0.0, period=2.0 * math.pi),
         Quantity("amplitude_3", "N m", 0.0, LARGE, "of the third harmonic", unsaid=0.0),
@@ -55,7 +59,8 @@ class PositionFriction(Fast):
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        wave, once = np.tanh(self.sharpness * self.own(motion.dq)), np.exp(1j * self.order * self.own(motion.q))
+        wave = sign_curve(1.0, self.sharpness, self.roundness).torque(self.own(motion.dq))
+        once = np.exp(1j * self.order * self.own(motion.q))
         parts: list[Array] = []
         for _ in range(self.harmonics):
             wave = wave * once
@@ -88,10 +93,11 @@ class PositionFriction(Fast):
         return (full, *finer, replace(full, whole=False)) if self.whole else (full, *finer)
 
     def own_load(self, values: Values) -> OwnLoad:
-        shaped, sharpness = self.at(values), values["sharpness"]
+        shaped, curve = self.at(values), sign_curve(1.0, values["sharpness"], values.get("roundness", 1.0))
         parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
         waves = [(m * shaped.order, in_phase, across) for m, (in_phase, across) in enumerate(parts, start=1)]
-        return Formula.of_waves(waves, f"tanh({sharpness!r} * {{v}}) * ")
+        sides = (f"({h!r}) * tanh({w!r} * {{v}})" for h, w in zip(curve.heights, curve.sharpnesses, strict=True))
+        return Formula.of_waves(waves, f"({' + '.join(sides)}) * ")
 
     def amplitudes(self, values: Values) -> Array:
         waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in _TAILS[:self.harmonics]]
@@ -99,7 +105,7 @@ class PositionFriction(Fast):
 
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         pairs = [*np.reshape(np.asarray(amplitudes, dtype=float), (-1, 2)).tolist(), *[[0.0, 0.0]] * (3 - self.harmonics)]
-        found = {"order": self.order, "sharpness": self.sharpness}
+        found = {"order": self.order, "sharpness": self.sharpness, "roundness": self.roundness}
         for tail, (cosine, sine) in zip(_TAILS, pairs, strict=True):
             found |= {f"amplitude{tail}": math.hypot(cosine, sine), f"phase{tail}": math.atan2(sine, cosine)}
         return {q.name: found[q.name] for q in self.parameters}
