@@ -15,14 +15,28 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.signal.blocks import impulse_toeplitz
 
-__all__ = ["KEEP", "LowPass", "ample", "centre_hold", "centre_samples", "choose_decimation", "design_low_pass", "fast_length",
-           "passed_both_ways", "thinned", "zero_phase"]
+__all__ = [
+    "AMPLE",
+    "COARSE",
+    "KEEP",
+    "LowPass",
+    "ample",
+    "centre_hold",
+    "centre_samples",
+    "choose_decimation",
+    "design_low_pass",
+    "fast_length",
+    "passed_both_ways",
+    "thinned",
+    "zero_phase",
+]
 
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 
 _BLOCK = 48
-_AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed at least
+AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed: what it lets through shows no difference
+COARSE = 12.0  # at which those of a search are: a change of sign within a sample then shows in a few hundredths of the noise
 KEEP = 4.0  # samples left per period of the cut-off: the filter is down by 2 × 6 dB per octave and order at the new Nyquist
 
 
@@ -125,9 +139,9 @@ def choose_decimation(cutoff_hz: float, rate: float, keep: float = KEEP) -> int:
     return most - most % step
 
 
-def ample(cutoff_hz: float, rate: float) -> int:
-    """Every how many samples a column is computed before a low-pass at `cutoff_hz`: what it lets through shows no difference."""
-    return max(1, int(rate / (_AMPLE * cutoff_hz)))
+def ample(cutoff_hz: float, rate: float, per_period: float = AMPLE) -> int:
+    """Return every how many samples a column is computed before a low-pass at `cutoff_hz`."""
+    return max(1, int(rate / (per_period * cutoff_hz)))
 
 
 def centre_hold(command: Array) -> Array:

@@ -32,7 +32,7 @@ from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.rigid.body import Motion
-from pipelines.signal.filters import ample, fast_length, passed_both_ways, thinned
+from pipelines.signal.filters import AMPLE, COARSE, ample, fast_length, passed_both_ways, thinned
 from pipelines.signal.prediction import prediction_errors, prediction_weights
 
 __all__ = ["PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "run_of"]
@@ -207,6 +207,21 @@ class LogData:
         return replace(self, y=whitening.through(self.y, range(self.n_joints), self.stretches), whitening=whitening, kept=kept,
                        unwhitened=self.y)
 
+    def coarse(self, kept: Kept) -> LogData:
+        """Return the same rows of a motion at fewer samples, which meet torques to a few hundredths of their noise."""
+        own, fewer = _skipped(self.equations), _skipped(self.equations, COARSE)
+        by = fewer // own if fewer % own == 0 else 1
+        some = [np.arange(piece.start, piece.stop, by) for piece in self.pieces]
+        at, ends = np.concatenate(some), np.cumsum([0, *map(len, some)]).tolist()
+        m, pieces = self.motion, tuple(slice(a, b) for a, b in pairwise(ends))
+        runs = tuple(run_of(self.equations, run, own * by) for run in self.equations.runs)
+        t, q, dq, ddq = (x[at] for x in (m.t, m.q, m.dq, m.ddq))
+        for x in (t, q, dq, ddq):
+            x.flags.writeable = False
+        since, tau = _first_known(runs[0], pieces[0]), None if m.tau is None else m.tau[at]
+        motion = Motion(t, q, dq, ddq, tau, m.logged, since=since, of=m.of)
+        return replace(self, motion=motion, pieces=pieces, runs=runs, kept=kept)
+
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """What `x` (samples, …) is at the moments of the rows, unfiltered."""
         return np.concatenate([x[piece][run.chosen * run.every] for piece, run in self._parts])
@@ -258,6 +273,12 @@ class Data:
     def t(self) -> Array:
         """(rows,) [s] within each log."""
         return np.concatenate([np.tile(one.t, one.n_joints) for one in self.logs])
+
+    @cached_property
+    def coarse(self) -> Data:
+        """The same rows with columns from fewer samples: exact enough for a search, and not for a fit."""
+        kept = Kept()
+        return replace(self, logs=tuple(one.coarse(kept) for one in self.logs))
 
     @cached_property
     def counts(self) -> Mask:
@@ -388,11 +409,11 @@ def _first_known(run: Run, piece: slice) -> int:
     return int(max(0, min(first - run.pad // int(PAD), piece.stop - 1)))
 
 
-def _skipped(equations: LogEquations) -> int:
-    """Every how many samples columns are worked out: far more often than the low-pass leaves anything to be seen."""
+def _skipped(equations: LogEquations, per_period: float = AMPLE) -> int:
+    """Return every how many samples columns are computed, at least so many times in a period of the low-pass."""
     how = equations.conditioning
     if how.cutoff_hz is None:
         return 1
     step = equations.found.good.log.sample_time
     highest = min(how.cutoff_hz, 0.5 / (step * how.decimation))  # rows further apart than the low-pass asks for show less
-    return max(k for k in range(1, ample(highest, 1.0 / step) + 1) if how.decimation % k == 0)
+    return max(k for k in range(1, ample(highest, 1.0 / step, per_period) + 1) if how.decimation % k == 0)
