@@ -41,7 +41,7 @@ Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 PAD = 4.0  # periods of the cut-off by which a stretch is continued
-_END = 1.0  # periods of the cut-off left out at either end of a stretch
+_END = 2.0  # periods of the cut-off left out at either end of a stretch: so far the low-pass carries what was before it
 _AT_ONCE = 8  # numerics: channels, which stay near the processor
 _ORDER = 20  # rows: as far as the noise of the low-pass reaches, and a fifth of a second
 _RIDGE = 1e-4  # of the noise's power: what the low-pass keeps back is not brought back by more
