@@ -69,11 +69,11 @@ class Look:
     def reported(self) -> State:
         """The causes found, with the numbers that are reported.
 
-        Without reference logs standing numbers are as large as what a cause left before it was
-        found. They may have taken in a part of it, and a cause more than it is: they are left out.
+        Without reference logs standing numbers may have taken in a part of a cause, and the cause
+        more than it is: they are left out.
         """
         end = self.selection.end
-        return end if self.reference is not None else self.later.without_standing(end)
+        return end if self.reference is not None else self.later.unchanged(end)
 
     @property
     def reference(self) -> tuple[Rows, Table] | None:

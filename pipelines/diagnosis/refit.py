@@ -24,13 +24,14 @@ from pipelines.diagnosis.unnamed import Key
 from pipelines.fit.joint_table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.families import first_samples
 
 __all__ = ["Later"]
 
 _STEPS = 20  # numerics: of Levenberg-Marquardt, at most
+_FRESH = 3  # numerics: of these, that see anew how effects change what the nominal model does
 _DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
 _HALF = 0.5  # numerics: of the rows
@@ -118,9 +119,10 @@ class Later:
 
     def fit(self, model: Exact, theta: Array, belief: Belief, steps: int = _STEPS) -> State:
         """Return the model with all its numbers fitted; those of effects have no prior."""
-        here = self._at(model, theta, belief)
+        here, known = self._at(model, theta, belief), belief
         for k in range(1 + steps):
-            there = self._better(here, belief, linear=not k)  # linear numbers first
+            known = self._exact(belief, here.model) if k < _FRESH else known
+            there = self._better(here, known, linear=not k)  # linear numbers first
             gained, here = here.cost - there.cost, there
             if k and gained < 2.0 + _SETTLED * here.cost:
                 break
@@ -145,17 +147,17 @@ class Later:
             cost = belief.cost(theta, residual) + self._read_off(model)
         return _Point(model, theta, residual, cost)
 
-    def _better(self, here: _Point, belief: Belief, linear: bool) -> _Point:
+    def _better(self, here: _Point, known: Belief, linear: bool) -> _Point:
         """Return where a step of Levenberg and Marquardt leads; `here` where none leads lower."""
         slopes, names = self.slopes(replace(here.model, effects=()) if linear else here.model)
         size = _unit(slopes.norms)
-        unit, known = slopes.scaled(1.0 / size), self._exact(belief, here.model)
+        unit = slopes.scaled(1.0 / size)
         gradient = np.r_[known.slope(here.theta, here.residual), unit.moments(here.residual)]
         for damping in _DAMPING if names else _DAMPING[:1]:
             step = known.beside(unit, damping).solve(gradient)
             way, more = step[: len(here.theta)], step[len(here.theta) :] / size
             own = way[: self.prior.n_nominal] / self.prior.scale
-            there = self._at(here.model.moved(np.r_[own, more], names), here.theta + way, belief)
+            there = self._at(here.model.moved(np.r_[own, more], names), here.theta + way, known)
             if np.isfinite(there.cost) and there.cost <= here.cost:
                 return there
             if damping == RIDGE and gradient @ step < 2.0 + _SETTLED * here.cost:  # if linear
@@ -295,9 +297,7 @@ class Later:
 
     def amplitudes_of(self, effect: Effect) -> int:
         """Return how many amplitudes the effect has, in the form that is refitted."""
-        one = self.rows.data.logs[0].motion
-        tau = None if one.tau is None else one.tau[:8]
-        some = Motion(one.t[:8], one.q[:8], one.dq[:8], one.ddq[:8], tau)
+        some = first_samples(self.rows.data)
         return int(effect.columns(some, self.dataset.arm).shape[2])
 
     def acting(self, state: State) -> Array:
@@ -415,17 +415,12 @@ class Later:
             lasting=lasting,
         )
 
-    def unchanged(self, state: State, key: Key) -> State:
-        """Return the state refitted with a cause's standing numbers held at their prior mean."""
-        own = [group.key == key for group in self.prior.groups]
+    def unchanged(self, state: State, key: Key | None = None) -> State:
+        """Return the state refitted with standing numbers, of a cause or all, at their mean."""
+        own = [key in (None, group.key) for group in self.prior.groups]
         at = self.prior.n_nominal + np.flatnonzero(own)
         if not len(at):
             return state
-        return self.fit(state.model, state.theta, state.belief.held(at))
-
-    def without_standing(self, state: State) -> State:
-        """Return the state refitted with all standing numbers held at their prior mean."""
-        at = np.arange(self.prior.n_nominal, self.base.width)
         return self.fit(state.model, state.theta, state.belief.held(at))
 
     def beside(self, belief: Belief, effect: Effect) -> Belief:

@@ -127,7 +127,7 @@ def select(
     causes, rounds, most = list[Cause](), list[Round](), later.config.causes
     if before is not None:
         causes, rounds = list(before.causes), list(before.rounds)
-        state = later.start(before.model)
+        state = _reformed(later, later.start(before.model))
     cut = tuple[Key, ...]()
     while True:
         step = _Step(later.composed(state.model), start, state, baseline, causes)
@@ -454,6 +454,19 @@ def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
             if other is not None and other.possible:
                 every.append(other)
     return min(every, key=lambda one: float(one.scores(later).sum())) if every[1:] else chosen
+
+
+def _reformed(later: Later, state: State) -> State:
+    """Return the state with each lasting cause by the law of it that predicts best now."""
+    for one in state.model.effects:
+        rest = state.model.without(0)
+        before = replace(state, model=rest, belief=later.belief_of(rest))
+        form = one.effect if one.log is not None else one.effect.forms()[0]
+        same = _candidate(later, before, form, np.array(one.amplitudes), log=one.log)
+        if same is None:
+            return state
+        state = _other_form(later, before, same).state
+    return state
 
 
 def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause], State]:

@@ -278,12 +278,13 @@ def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | No
 def nominal_slopes(model: Exact) -> Callable[[int, Motion], Array] | None:
     """Return what gives the slopes (samples, joints, k) by base parameters and friction in a log; None: no effect changes them.
 
-    Each is a difference of the torque that effects make of the nominal one, at the motion as they read it.
+    Each is a difference of the torque that effects make of the nominal one, at the motion as they read it. Effects that add their
+    torque change none; of an effect by the session's clock it is a share of the friction at its joint.
     """
-    session = [k + 1 for k, one in enumerate(model.effects) if one.effect.clock == "session"]  # a share of the joint's friction
-    if not (count := max([model.core, *session])):
+    acting = tuple(one for one in model.effects if not adds(one.effect) or one.effect.clock == "session")
+    if not acting:
         return None
-    core, columns = replace(model, effects=model.effects[:count]), model.columns
+    core, columns, adding = replace(model, effects=acting), model.columns, [one for one in model.effects if one not in acting]
     size = _DIFFERENCE * np.where(core.beta != 0.0, np.abs(core.beta), 1.0)  # what acts on the torque may have kinks
 
     def by_column(motion: Motion) -> Array:
@@ -297,8 +298,9 @@ def nominal_slopes(model: Exact) -> Callable[[int, Motion], Array] | None:
         def torque(arm: Arm, number: int | None = None) -> Array:
             def inside(read: Motion, _: ArmModel) -> Array:
                 if not seen or not _alike(seen[0][0], read):
-                    each = by_column(read)
-                    seen[:] = [(read, each, np.tensordot(core.beta, each, 1))]
+                    each, more = by_column(read), [one for one in adding if one.log in (None, log)]
+                    added = sum((one.effect.torque(read, core.nominal, one.values) for one in more), np.zeros_like(read.q))
+                    seen[:] = [(read, each, np.tensordot(core.beta, each, 1) + added)]
                 each, whole = seen[0][1:]
                 return np.array(whole) if number is None else np.asarray(whole + size[number] * each[number])
 

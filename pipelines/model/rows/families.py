@@ -26,7 +26,7 @@ from pipelines.model.effects.fast import from_motion, own_columns, several_colum
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data, LogData
 
-__all__ = ["Family", "Laid", "Wanted", "families", "lay_family", "place_of", "usable", "whole_motion"]
+__all__ = ["Family", "Laid", "Wanted", "families", "first_samples", "lay_family", "place_of", "usable", "whole_motion"]
 
 Indices = npt.NDArray[np.intp]
 Columns = npt.NDArray[np.floating]  # in single precision: there are many, and none is fitted
@@ -102,7 +102,7 @@ def whole_motion(data: Data) -> Motion:
 def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
     """The columns of every shape, a few shapes at a time."""
     with np.errstate(all="ignore"):
-        width = int(family.shapes[0].columns(_first_samples(data), arm).shape[2])
+        width = int(family.shapes[0].columns(first_samples(data), arm).shape[2])
     size = max(1, _AT_ONCE // max(width, 1))
     for first in range(0, len(family.shapes), size):
         yield _lay_some(data, family.shapes[first:first + size], first, arm)
@@ -150,7 +150,8 @@ def _finite(table: Array) -> Array:
     return table if bool((np.abs(table) < _AWAY).all()) else np.zeros_like(table)
 
 
-def _first_samples(data: Data) -> Motion:
+def first_samples(data: Data) -> Motion:
+    """Return a few samples of the motion, from which the number of columns is seen."""
     motion = data.logs[0].motion
     return Motion(motion.t[:8], motion.q[:8], motion.dq[:8], motion.ddq[:8], None if motion.tau is None else motion.tau[:8])
 
