@@ -27,9 +27,7 @@ from pipelines.model.rows.prepare import Logs, Prepared, prepare
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
 
 _LOOKS = 4  # numerics: after the first, at most
-_SETTLED = (
-    0.1  # numerics: ln of the power of a joint's noise, by which a further look changes nothing
-)
+_SETTLED = 0.1  # numerics: change of ln(power of a joint's noise) at which looks end
 
 
 @dataclass(frozen=True, eq=False)

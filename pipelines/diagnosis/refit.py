@@ -268,7 +268,7 @@ class Later:
         step = factor.solve(state.slope)[first:] / _unit(slopes.norms)
         deviations = np.sqrt(max(self.config.deviations**2, self.config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
-        within = last.possible
+        within, timing = last.possible, self.rows.data.logs[0].motion.sample_time
         if last.effect.parameters.reads_torque and self._mostly_acting(last.effect):
             return False
         for (of_effect, which, name), by, reach in zip(names, step, deviations * std, strict=True):
@@ -278,7 +278,7 @@ class Later:
                 if abs(by) > reach and last.effect.at_end(name, float(by)):
                     return False
                 continue
-            if abs(last.amplitudes[int(name)]) + reach < last.effect.parameters.slight:
+            if abs(last.amplitudes[int(name)]) + reach < last.effect.parameters.slight(timing):
                 return False
             for way in np.outer((-reach, reach), _TRIED).ravel():
                 amplitudes = np.array(last.amplitudes)

@@ -131,7 +131,7 @@ def select(
     cut = tuple[Key, ...]()
     while True:
         step = _Step(later.composed(state.model), start, state, baseline, causes)
-        if len(causes) >= most:
+        if len({one.key for one in causes}) >= most:  # a push in several logs is one
             cut = step.relevant_keys
             break
         found, after = step.round(() if causes else responses)

@@ -77,6 +77,9 @@ WRITTEN: Mapping[str, Any] = {name: getattr(math, name) for name in ("cos", "exp
 PlainDrive = Callable[[tuple[float, ...], tuple[float, ...]], tuple[float, ...]]  # command [N m], speeds [rad/s] -> [N m], by joint
 
 
+_TIMING = 0.1  # of a sample: as well as a log tells when something was, stamps of 0.1 ms at 1 kHz
+
+
 @dataclass(frozen=True)
 class Formula:
     """An `OwnLoad` that a simulation can write out among its own sums: there a call costs more than the arithmetic."""
@@ -180,11 +183,11 @@ class Parameters(tuple[Quantity, ...]):
         """As much of it as healthy machines have: `Quantity.healthy` of the first amplitude."""
         return next((q.healthy for q in self if not q.shape and not q.derived), None)
 
-    @property
-    def slight(self) -> float:
-        """Size of an amplitude that surely is no cause."""
-        known = self.healthy
-        return 0.0 if known is None or math.isinf(known) else known
+    def slight(self, sample_time: float = 0.0) -> float:
+        """Size of an amplitude that surely is no cause; of a time it is at least a tenth of a sample [s]."""
+        known, first = self.healthy, next((q.unit for q in self if not q.shape and not q.derived), "")
+        least = _TIMING * sample_time if first == "s" else 0.0
+        return least if known is None or math.isinf(known) else max(known, least)
 
     @property
     def reads_torque(self) -> bool:
