@@ -416,8 +416,8 @@ def _candidate(
     log: int | None = None,
 ) -> Candidate | None:
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
-    start = np.zeros(max(len(amplitudes), later.amplitudes_of(effect)))
-    start[: len(amplitudes)] = amplitudes
+    start = np.zeros(later.amplitudes_of(effect))
+    start[: len(amplitudes)] = amplitudes[: len(start)]
     belief = later.beside(state.belief, effect)
     model = state.model.with_effect(effect, start, log=log)
     try:

@@ -74,8 +74,9 @@ class Spring(Fast):
         yield replace(self, degree=1, highest=1 if closed else self.highest, seen_from=float(q.min()), seen_to=float(q.max()))
 
     def forms(self) -> tuple[Self, ...]:
-        full = replace(self, degree=self.highest)
-        return (full, replace(self, degree=_MORE, highest=_MORE)) if self.highest == _DEGREE else (full,)
+        """Of fewer terms where these are enough: beside gravity many powers of an angle are no powers of their own."""
+        degrees = (_DEGREE, 1, 3, _MORE) if self.highest == _DEGREE else (self.highest,)
+        return tuple(replace(self, degree=d, highest=d) for d in degrees)
 
     def own_load(self, values: Values) -> OwnLoad:
         slope, constant, *rest = self.amplitudes(values).tolist()
