@@ -156,7 +156,8 @@ def _lay(
 
 def laid(rows: Rows, family: Family, arm: Arm) -> Iterator[tuple[Laid, Table]]:
     """Return the columns of every shape of a cause over rows, and which shapes they are of."""
-    for one in lay_family(rows.data.coarse, family, arm):
+    fine = family.shapes[0].evidence == "reversals"  # a gap is crossed within samples
+    for one in lay_family(rows.data if fine else rows.data.coarse, family, arm):
         shapes, width, _ = one.table.shape
         yield one, rows.table(one.table.reshape(shapes * width, -1), one.rows).compact()
 

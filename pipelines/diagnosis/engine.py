@@ -53,38 +53,33 @@ class Look:
         Args:
             usual: prior and baseline, where reference logs have given them; None: compute them.
         """
-        prior, known = usual or _usual(dataset, dictionary, config)
+        if usual is None:
+            prior = prior_of(dataset, dictionary, config)
+            usual = prior, baseline(dataset, dictionary, prior, config)
+        prior, known = usual
         later = Later.of(dataset, dictionary, prior, config)
         return cls(later, known, select(later, known, responses, found))
 
     @property
     def usual(self) -> tuple[Prior, Baseline] | None:
         """Prior and baseline of the reference logs, equal in all looks; None without these."""
-        alone = self.later.dataset.reference is None
-        return None if alone else (self.later.prior, self.baseline)
+        return None if self.reference is None else (self.later.prior, self.baseline)
 
     @cached_property
     def reported(self) -> State:
         """The causes found, with the numbers that are reported.
 
-        Without reference logs standing numbers may have taken in a part of a cause, and the cause
-        more than it is: they are left out.
+        Without reference logs standing numbers are left out: they may hold a part of a cause.
         """
         end = self.selection.end
-        return end if self.reference is not None else self.later.unchanged(end)
+        known = self.reference is not None or not end.model.effects
+        return end if known else self.later.unchanged(end)
 
     @property
     def reference(self) -> tuple[Rows, Table] | None:
         """The rows and columns of the reference."""
         rows, columns = self.later.dataset.reference, self.later.dictionary.reference
         return None if rows is None or columns is None else (rows, columns)
-
-
-def _usual(
-    dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig
-) -> tuple[Prior, Baseline]:
-    prior = prior_of(dataset, dictionary, config)
-    return prior, baseline(dataset, dictionary, prior, config)
 
 
 def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:

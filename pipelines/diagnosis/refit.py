@@ -95,10 +95,6 @@ class Later:
         )
 
     @cached_property
-    def y(self) -> tuple[Array, ...]:
-        return self.rows.y
-
-    @cached_property
     def belief(self) -> Belief:
         """The prior of all numbers."""
         return Belief(*self.prior.start, self.base, self.gram, self.prior.structure, self.block)
@@ -329,7 +325,7 @@ class Later:
         It is zero with reference logs: they contain what this machine has.
         """
         share = self.config.healthy_share if self.dataset.reference is None else 0.0
-        return share * np.array([float(np.linalg.norm(y)) for y in self.y])
+        return share * np.array([float(np.linalg.norm(y)) for y in self.rows.y])
 
     def slight(self, torque: Sequence[Array]) -> bool:
         """Return whether torque is as small as healthy machines have some, at every joint."""
@@ -465,7 +461,8 @@ class Later:
         standing[: self.prior.n_nominal] = 0.0
         torque = self.rows.torque(model)
         return tuple(
-            y - t - s for y, t, s in zip(self.y, torque, self.base.times(standing), strict=True)
+            y - t - s
+            for y, t, s in zip(self.rows.y, torque, self.base.times(standing), strict=True)
         )
 
 

@@ -131,10 +131,15 @@ def select(
     cut = tuple[Key, ...]()
     while True:
         step = _Step(later.composed(state.model), start, state, baseline, causes)
-        if len({one.key for one in causes}) >= most:  # a push in several logs is one
+        pushes = sum(one.log is not None for one in state.model.effects)  # together they are one
+        full = len(causes) - pushes + min(pushes, 1) >= most
+        if full and not 0 < pushes < len(later.rows.data.logs):
             cut = step.relevant_keys
             break
         found, after = step.round(() if causes else responses)
+        if full and after is not None and after.model.effects[-1].log is None:
+            cut = step.relevant_keys
+            break
         rounds.append(found)
         if found.cause is None or after is None:
             break
@@ -421,7 +426,8 @@ def _candidate(
     belief = later.beside(state.belief, effect)
     model = state.model.with_effect(effect, start, log=log)
     try:
-        fits = [later.fit(one, state.theta, belief) for one in (model, *_plainer(model))]
+        others = _plainer(model) if later.dataset.reference is None else ()
+        fits = [later.fit(one, state.theta, belief) for one in (model, *others)]
     except np.linalg.LinAlgError:
         return None
     fitted = min(fits, key=lambda one: one.cost)
@@ -458,15 +464,15 @@ def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
 
 def _reformed(later: Later, state: State) -> State:
     """Return the state with each lasting cause by the law of it that predicts best now."""
-    for one in state.model.effects:
-        rest = state.model.without(0)
-        before = replace(state, model=rest, belief=later.belief_of(rest))
-        form = one.effect if one.log is not None else one.effect.forms()[0]
-        same = _candidate(later, before, form, np.array(one.amplitudes), log=one.log)
-        if same is None:
+    new = state
+    for _ in state.model.effects:
+        one, rest = new.model.effects[0], new.model.without(0)
+        before = later.fit(rest, new.theta, later.belief_of(rest))
+        same = _candidate(later, before, one.effect, np.array(one.amplitudes), log=one.log)
+        if same is None or not same.possible:
             return state
-        state = _other_form(later, before, same).state
-    return state
+        new = _other_form(later, before, same).state
+    return new
 
 
 def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause], State]:
@@ -504,7 +510,9 @@ def _scores(later: Later, state: State, numbers: int = 0) -> Array:
     return np.asarray(log_scores(state.losses, later.block_rows) + price / len(later.block_rows))
 
 
-def refit(later: Later, state: State, effect: Effect, amplitudes: Array) -> Candidate | None:
+def refit(
+    later: Later, state: State, effect: Effect, amplitudes: Array, laws: bool = True
+) -> Candidate | None:
     """Return a cause that somebody names, refitted, by the law of it that predicts best."""
     one = _candidate(later, state, effect, amplitudes)
-    return None if one is None else _other_form(later, state, one)
+    return _other_form(later, state, one) if one is not None and laws else one

@@ -108,12 +108,12 @@ def _first(own: Later, state: State, every: dict[Key, Screened], later: Rows) ->
     seen = [s for key, s in every.items() if s.group.kind == "named" and key not in taken]
     known, motions = ([one.motion for one in rows.data.logs] for rows in (own.rows, later))
     for one in sorted(seen, key=lambda one: -one.gain)[:_REFITS]:
-        done = refit(own, state, own.form(one.group), one.amplitudes)
+        done = refit(own, state, own.form(one.group), one.amplitudes, laws=False)
         if done is None or not done.possible:
             continue
         without = state.mean_squares / done.state.mean_squares
         effect = done.state.model.effects[-1].effect
         beyond = any(q.seen for q in effect.parameters) and effect.goes_beyond(motions, known)
         if without.max() > own.config.excess and not beyond:
-            return done
+            return refit(own, state, own.form(one.group), one.amplitudes)
     return None

@@ -3,8 +3,8 @@
     lagging(x, t, T)        x goes straight from sample to sample
     held_mean(u, h, T)      u is held over each sample; y is averaged over it
     rate_of_change(x, t)    dx/dt by differences, not across gaps
-    computed(T, h)          the lag of a filter that is computed once a sample, which acts half a sample sooner
-    moved(x, t, by)         x a little later
+    continuous(T, h)        the lag of a filter that is computed once a sample, and how much sooner it acts
+    later(x, t, by)         x a little later
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from pipelines.signal.blocks import scan
 
-__all__ = ["computed", "held_mean", "lagging", "moved", "rate_of_change"]
+__all__ = ["continuous", "held_mean", "lagging", "later", "rate_of_change"]
 
 Array = npt.NDArray[np.float64]
 
@@ -69,16 +69,20 @@ def rate_of_change(x: Array, t: Array) -> Array:
     return out
 
 
-def computed(time_constant: float, h: float) -> float:
-    """Return the time constant [s] of a continuous lag that acts, half a sample h later, like a digital one of T.
+def continuous(time_constant: float, h: float) -> tuple[float, float]:
+    """Return a continuous lag [s] and the time [s] by which a digital one of T acts sooner: half a sample h.
 
         h / (e^(h/T) - 1) + h/2 = T (1 + (h/T)²/12 - …)
     """
-    return h / float(np.expm1(h / time_constant)) + 0.5 * h if 0.0 < h < _MANY * time_constant else 0.5 * h
+    if h <= 0.0 or time_constant * _MANY <= h:
+        return time_constant * float(h <= 0.0), 0.0
+    return h / float(np.expm1(h / time_constant)) + 0.5 * h, 0.5 * h
 
 
-def moved(x: Array, t: Array, by: float) -> Array:
-    """x(t + `by`) (samples,), of a time in which it changes little: by Taylor's series."""
+def later(x: Array, t: Array, by: float) -> Array:
+    """Return x(t + `by`) (samples,) by Taylor's series, of a time [s] in which x changes little."""
+    if by == 0.0:
+        return x
     once = rate_of_change(x, t)
     return np.asarray(x + by * once + 0.5 * by**2 * rate_of_change(once, t))
 

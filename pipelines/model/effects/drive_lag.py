@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Self
 
@@ -9,12 +10,12 @@ import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.signal.first_order import computed, moved, rate_of_change
+from pipelines.signal.first_order import continuous, later, rate_of_change
 
-__all__ = ["DIGITAL", "DriveLag"]
+__all__ = ["SAMPLED", "DriveLag"]
 
-DIGITAL = Quantity("digital", "1", 0.0, 1.0, "1 where the lag is that of a filter that is computed once a sample", shape=True,
-                   discrete=True, unsaid=0.0)
+SAMPLED = Quantity("sample_time", "s", 0.0, 0.02, "of the filter that is the lag, where it is computed once a sample; else 0",
+                   shape=True, derived=True, unsaid=0.0)
 
 
 @dataclass(frozen=True)
@@ -24,12 +25,13 @@ class DriveLag(Effect):
     A filter that is computed once a sample h acts at once, half a sample earlier: τ_k = a τ_{k-1} + (1 - a) u_k, a = exp(-h/T).
     """
 
-    digital: float = 0.0  # 1: computed once a sample
+    sample_time: float = 0.0  # h [s]; 0: not computed once a sample
+    step: float = 0.0  # [s] of the logs
 
     name = "drive_lag"
     parameters = Parameters(
         Quantity("time_constant", "s", 0.0, 0.2, "of the torque behind its command", healthy=2e-4),  # a current loop of 800 Hz
-        DIGITAL)
+        SAMPLED)
     words = Words("Drive lag", size="time_constant",
         signature="The logged torque leads the torque that the arm feels, on one joint; more so the faster the torque changes.",
         explanation="The current loop is slow, or the amplifier filters its command.",
@@ -40,25 +42,24 @@ class DriveLag(Effect):
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self.on_own_row(arm, rate_of_change(self.own(predicted(arm, motion)), motion.t))
 
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        yield replace(self, step=motion.sample_time)
+
     def forms(self) -> tuple[Self, ...]:
-        return replace(self, digital=0.0), replace(self, digital=1.0)
+        return replace(self, sample_time=0.0), replace(self, sample_time=self.step)
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         """The whole torque lags, other effects included."""
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
-        own, time, t = self.own(tau), values["time_constant"], motion.t
-        if values.get("digital", 0.0):
-            h = motion.sample_time
-            tau[:, self._index] = moved(own + computed(time, h) * rate_of_change(own, t), t, -0.5 * h)
-        else:
-            tau[:, self._index] += time * rate_of_change(own, t)
+        own, (time, sooner) = self.own(tau), continuous(values["time_constant"], values.get("sample_time", 0.0))
+        tau[:, self._index] = later(own + time * rate_of_change(own, motion.t), motion.t, -sooner)
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """Exact while a command is held: τ = u + (τ_k - u) e^(-(t - t_k)/T). The memory is τ_k, t_k and u; the drive has
         settled at the first command; before that there is none. The torque of a digital filter is constant over a sample.
         """
-        time, digital = max(values["time_constant"], 1e-9), bool(values.get("digital", 0.0))
+        time, digital = max(values["time_constant"], 1e-9), values.get("sample_time", 0.0) > 0.0
 
         def update(motion: Motion, command: Array, states: Array) -> Array:
             now = self.own(command)

@@ -75,8 +75,8 @@ class Spring(Fast):
 
     def forms(self) -> tuple[Self, ...]:
         """Of fewer terms where these are enough: beside gravity many powers of an angle are no powers of their own."""
-        degrees = (_DEGREE, 1, 3, _MORE) if self.highest == _DEGREE else (self.highest,)
-        return tuple(replace(self, degree=d, highest=d) for d in degrees)
+        degrees = (_DEGREE, 1, 3, _MORE) if self.highest > 1 else (1,)
+        return tuple(replace(self, degree=d) for d in degrees)
 
     def own_load(self, values: Values) -> OwnLoad:
         slope, constant, *rest = self.amplitudes(values).tolist()

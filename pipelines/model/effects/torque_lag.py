@@ -9,9 +9,9 @@ from typing import Self
 import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
-from pipelines.model.effects.drive_lag import DIGITAL
+from pipelines.model.effects.drive_lag import SAMPLED
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.signal.first_order import computed, held_mean, lagging, moved, rate_of_change
+from pipelines.signal.first_order import continuous, held_mean, lagging, later, rate_of_change
 
 __all__ = ["TorqueLag"]
 
@@ -26,14 +26,15 @@ class TorqueLag(Effect):
     A filter that is computed once a sample h acts half a sample earlier: y_k = a y_{k-1} + (1 - a) τ_k, a = exp(-h/T).
     """
 
-    digital: float = 0.0  # 1: computed once a sample
+    sample_time: float = 0.0  # h [s]; 0: not computed once a sample
+    step: float = 0.0  # [s] of the logs
     looked_for: float = 0.0  # [s] the lag whose columns a search compares; 0: their limit for a small one
 
     name = "torque_lag"
     parameters = Parameters(
         Quantity("time_constant", "s", 0.0, 1.0, "of the logged torque behind the true one",
                  healthy=2e-4),  # a current that is measured within 800 Hz
-        DIGITAL)
+        SAMPLED)
     words = Words("Torque logging delay", size="time_constant",
         signature="The logged torque trails the torque that the arm feels; inertia or friction comes out too small, or negative.",
         explanation="The recorder, or the current measurement, filters the torque before it is logged.",
@@ -52,12 +53,12 @@ class TorqueLag(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """The limit, and long lags: a torque that turns within one of these is no longer its Taylor series."""
         for time in _LOOKED_FOR:
-            yield replace(self, looked_for=time)
+            yield replace(self, looked_for=time, step=motion.sample_time)
 
     def forms(self) -> tuple[Self, ...]:
         """Return the lag of any length."""
-        any_length = replace(self, looked_for=0.0, digital=0.0)
-        return any_length, replace(any_length, digital=1.0)
+        any_length = replace(self, looked_for=0.0, sample_time=0.0)
+        return any_length, replace(any_length, sample_time=self.step)
 
     def _start(self, motion: Motion) -> float | None:
         """The torque [N m] that the log shows first, where it was measured."""
@@ -70,21 +71,20 @@ class TorqueLag(Effect):
         log shows first, where it was measured; the second keeps its slope at T = 0 and is exact to the differences' error.
         """
         tau = predict(motion, arm) if predict is not None else arm.torque(motion)
-        own, t, h = self.own(tau), motion.t, motion.sample_time
-        digital = bool(values.get("digital", 0.0))
-        time = computed(values["time_constant"], h) if digital else values["time_constant"]
+        own, t = self.own(tau), motion.t
+        time, sooner = continuous(values["time_constant"], values.get("sample_time", 0.0))
         if len(t) > 1 and time > _LONG * float(np.median(np.diff(t))):
-            late = lagging(own, t, time, self._start(motion), motion.since)
+            lagged = lagging(own, t, time, self._start(motion), motion.since)
         else:
-            late = own - time * lagging(rate_of_change(own, t), t, time)
-        tau[:, self._index] = moved(late, t, 0.5 * h) if digital else late
+            lagged = own - time * lagging(rate_of_change(own, t), t, time)
+        tau[:, self._index] = later(lagged, t, sooner)
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm moves as without it; only the log differs."""
         def record(t: Array, command: Array) -> Array:
             logged, own = command.copy(), self.own(command)
-            if values.get("digital", 0.0):
+            if values.get("sample_time", 0.0) > 0.0:
                 logged[:, self._index] = lagging(own, t, values["time_constant"], digital=True)
             else:
                 logged[:, self._index] = held_mean(own, float(np.median(np.diff(t))), values["time_constant"])

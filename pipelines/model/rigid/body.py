@@ -29,14 +29,14 @@ class Motion:
     tau: Array | None = None  # [N m] (samples, joints) as logged, held from each sample to the next; None: not known
     logged: Array | None = None  # [N m] (joints,) measured torque at sample `since`, before which the motion is vague
     since: int = field(default=0, kw_only=True)
-    of: float | None = field(default=None, kw_only=True)  # [s] sample time of its log, of which this may be every other sample
+    log_sample_time: float | None = field(default=None, kw_only=True)  # [s] this may be every other sample of it
     _kept: list[tuple[tuple[object, ...], Array]] = field(
         default_factory=list, init=False, repr=False, compare=False)
 
     @property
     def sample_time(self) -> float:
         """[s] between two samples of its log."""
-        return self.of or (float(np.median(np.diff(self.t))) if len(self.t) > 1 else 0.0)
+        return self.log_sample_time or (float(np.median(np.diff(self.t))) if len(self.t) > 1 else 0.0)
 
     def kept(self, key: tuple[object, ...], work: Callable[[], Array]) -> Array:
         """Return what `work` makes of this motion: once for the objects of a key, of the last few.

@@ -211,6 +211,8 @@ class LogData:
         """Return the same rows of a motion at fewer samples, which meet torques to a few hundredths of their noise."""
         own, fewer = _skipped(self.equations), _skipped(self.equations, COARSE)
         by = fewer // own if fewer % own == 0 else 1
+        if by == 1:
+            return self
         some = [np.arange(piece.start, piece.stop, by) for piece in self.pieces]
         at, ends = np.concatenate(some), np.cumsum([0, *map(len, some)]).tolist()
         m, pieces = self.motion, tuple(slice(a, b) for a, b in pairwise(ends))
@@ -218,8 +220,8 @@ class LogData:
         t, q, dq, ddq = (x[at] for x in (m.t, m.q, m.dq, m.ddq))
         for x in (t, q, dq, ddq):
             x.flags.writeable = False
-        since, tau = _first_known(runs[0], pieces[0]), None if m.tau is None else m.tau[at]
-        motion = Motion(t, q, dq, ddq, tau, m.logged, since=since, of=m.of)
+        tau = None if m.tau is None else m.tau[at]
+        motion = Motion(t, q, dq, ddq, tau, m.logged, since=-(-m.since // by), log_sample_time=m.log_sample_time)
         return replace(self, motion=motion, pieces=pieces, runs=runs, kept=kept)
 
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -397,7 +399,7 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     asked = tau if equations.held else None  # a measured torque was there: nothing of it can have been kept back
     since = _first_known(runs[0], pieces[0])
     logged = None if equations.held else tau[since]
-    motion = Motion(t, q, dq, ddq, asked, logged, since=since, of=log.sample_time)
+    motion = Motion(t, q, dq, ddq, asked, logged, since=since, log_sample_time=log.sample_time)
     return LogData(log, equations, motion, y, ~slow.T, pieces, runs, kept, place)
 
 

@@ -279,12 +279,15 @@ def nominal_slopes(model: Exact) -> Callable[[int, Motion], Array] | None:
     """Return what gives the slopes (samples, joints, k) by base parameters and friction in a log; None: no effect changes them.
 
     Each is a difference of the torque that effects make of the nominal one, at the motion as they read it. Effects that add their
-    torque change none; of an effect by the session's clock it is a share of the friction at its joint.
+    torque change none; of an effect by the session's clock it is a share of the friction at its joint. What effects on the whole
+    arm change, as a tilt by its angle, is neglected.
     """
-    acting = tuple(one for one in model.effects if not adds(one.effect) or one.effect.clock == "session")
+    acting = tuple(one for one in model.effects if one.effect.scope == "joint"
+                   and (not adds(one.effect) or one.effect.clock == "session"))
     if not acting:
         return None
-    core, columns, adding = replace(model, effects=acting), model.columns, [one for one in model.effects if one not in acting]
+    core, columns = replace(model, effects=acting), model.columns
+    adding = [one for one in model.effects if adds(one.effect) and one not in acting]
     size = _DIFFERENCE * np.where(core.beta != 0.0, np.abs(core.beta), 1.0)  # what acts on the torque may have kinks
 
     def by_column(motion: Motion) -> Array:

@@ -94,7 +94,8 @@ def whole_motion(data: Data) -> Motion:
     """The motions of all logs one behind the other, time from the start of each: for ranges, never for slopes."""
     motions = [one.motion for one in data.logs]
     t = np.concatenate([motion.t - motion.t[0] for motion in motions])  # logs of one session may share its clock
-    whole = Motion(t, *(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq")))
+    whole = Motion(t, *(np.concatenate([getattr(motion, name) for motion in motions]) for name in ("q", "dq", "ddq")),
+                   log_sample_time=max(motion.sample_time for motion in motions))
     asked = [motion.tau for motion in motions if motion.tau is not None]
     return replace(whole, tau=np.concatenate(asked)) if len(asked) == len(motions) else whole
 

@@ -22,12 +22,12 @@ def test_a_digital_filter_is_met_on_all_samples_and_on_some(every: int) -> None:
     a = np.exp(-_H / _T)
     filtered = lfilter([1.0 - a], [1.0, -a], command, axis=0)
     zero = np.zeros_like(command[::every])
-    motion, inner = Motion(t[::every], zero, zero, zero, of=_H), slice(100, -5)
+    motion, inner = Motion(t[::every], zero, zero, zero, log_sample_time=_H), slice(100, -5)
     for kind, before, behind in ((TorqueLag, command, filtered), (DriveLag, filtered, command)):
         for joint in (1, 2, 3):
             off = []
             for digital in (1.0, 0.0):
-                values = {"time_constant": _T, "digital": digital}
+                values = {"time_constant": _T, "sample_time": digital * _H}
                 found = kind(joint=joint).at(values).apply(motion, arm, values, lambda m, a, x=before: x[::every].copy())
                 off.append(np.abs(found - behind[::every])[inner, joint - 1].max())
             assert off[0] < 2e-3 < 5e-3 < off[1]
@@ -36,7 +36,7 @@ def test_a_digital_filter_is_met_on_all_samples_and_on_some(every: int) -> None:
 def test_a_simulated_digital_drive_is_the_filter() -> None:
     arm = described()
     command = np.random.default_rng(0).normal(size=(200, 1, arm.n_joints))
-    values = {"time_constant": _T, "digital": 1.0}
+    values = {"time_constant": _T, "sample_time": _H}
     hooks = DriveLag(joint=2).simulate(arm, values)
     assert hooks.update is not None
     assert hooks.actuator is not None

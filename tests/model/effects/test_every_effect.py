@@ -61,7 +61,8 @@ def drawn(effect: Effect, seed: int) -> dict[str, float]:
     """Values out of the prior ranges; what counts joints or time is one of this arm, and within this motion."""
     rng = np.random.default_rng(seed)
     values = {q.name: float(rng.uniform(max(q.low, -1e3), min(q.high, 1e3))) for q in effect.parameters}
-    chosen = {q.name: float(getattr(effect, q.name)) for q in effect.parameters if q.discrete}
+    chosen = {q.name: float(getattr(effect, q.name)) for q in effect.parameters
+              if q.discrete or q.name == "sample_time"}  # lags of digital filters: `test_digital_lags`
     moment = {q.name: float(getattr(effect, q.name)) for q in effect.parameters if q.shape and effect.clock == "log"}
     values |= chosen | moment
     return effect.at(values).values(effect.at(values).amplitudes(values))
