@@ -90,6 +90,17 @@ def test_both_of_two_causes_are_found_where_a_soft_base_would_predict_one_of_the
 
 
 @pytest.mark.slow
+def test_a_push_in_each_of_five_logs_leaves_room_for_a_cause(tmp_path: Path) -> None:
+    """Four of the five used up the largest number of causes."""
+    pair = next(case for case in campaign(63, ["pairs"]) if case.key == "ef91ec1374")
+    list(make_cases([pair], tmp_path))
+    logs = [open_log(path).log for path in sorted((tmp_path / "logs" / pair.key).rglob("*.h5"))]
+    found = diagnosed(*logs)
+    assert causes(found) == [("contact", None)] * 5 + [("torque_offset", 3)]
+    assert effects(found)[-1].values["offset"] == pytest.approx(0.03, rel=0.05)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [3, 13])
 def test_the_slack_of_precise_gears_is_no_fault(number: int) -> None:
     """103 and 15 µrad of backlash were named in healthy arms whose friction has another law; both have reference logs."""

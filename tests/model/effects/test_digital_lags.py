@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pipelines.model.effects.drive_lag import DriveLag
+from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rigid.body import Motion
 from tests.model.effects.on_bench import arm as described
@@ -52,3 +53,9 @@ def test_a_simulated_digital_drive_is_the_filter() -> None:
     expected = u.copy()
     expected[:, 1] = lfilter([1.0 - a], [1.0, -a], u[:, 1], zi=np.array([a * u[0, 1]]))[0]
     np.testing.assert_allclose(made, expected, rtol=0.0, atol=1e-12)
+
+
+def test_a_time_is_slight_within_a_tenth_of_a_sample_and_a_share_within_its_own() -> None:
+    assert DriveLag.parameters.slight(_H) == pytest.approx(2e-4)  # a current loop of 800 Hz
+    assert DriveLag.parameters.slight(4.0 * _H) == pytest.approx(4e-4)
+    assert TorqueCrosstalk.parameters.slight(4.0 * _H) == pytest.approx(2e-3)
