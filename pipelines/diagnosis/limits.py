@@ -122,9 +122,9 @@ def _limit(
         one = shapes[int(np.argsort(reach)[int(_QUARTER * (len(reach) - 1))])]
         least = needed[one.freedom] / np.sqrt(max(one.hidden[0, 0], 1e-300))
         share = later.shares[later.dictionary.groups.index(one.group)]
-        acting = one.length[0] * np.sqrt(share)  # (joints,) length of its column
-        usual = later.usual / np.maximum(acting, 1e-300)
-        least = max(least, float(usual.min()))
+        usual = later.usual / np.maximum(one.length[0] * np.sqrt(share), 1e-300)  # (joints,)
+        slight = first.parameters.slight(later.rows.data.logs[0].motion.sample_time)
+        least = max(least, float(usual.min()), slight)
         return _told(later, one, least * np.eye(one.freedom)[0], visible)
     amplitudes = np.array(first.parameters.fixed)
     seen = [s for s in shapes if s.power(amplitudes) > needed[s.freedom] ** 2]
