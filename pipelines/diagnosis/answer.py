@@ -22,7 +22,7 @@ from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.trained import train
 from pipelines.diagnosis.unnamed import Key
 from pipelines.model.rows.families import place_of
-from pipelines.model.rows.fit import worse_log
+from pipelines.model.rows.fit import no_better, worse_log
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.rows.residual_analysis import Evidence, evidence, with_simulation
 
@@ -106,8 +106,8 @@ def _worth(
 ) -> tuple[tuple[Cause, ...], Worth, str]:
     """Return the causes, their worth on held-out rows, and why the last of them are dropped.
 
-    A gain counts on rows that a model was not fitted to: a cause with which the torque of a
-    held-out log is predicted worse than by the nominal model has no name.
+    A gain counts on rows that a model was not fitted to: a cause has no name with which the torque
+    of a held-out log is predicted worse than by the nominal model, or no better than without it.
     """
     causes = found.decision.causes
     standing = standing_of(prepared.reference, found.look.later)
@@ -115,7 +115,10 @@ def _worth(
     trained = train(prepared, found.look.later, effects, blocks, standing)
     worth, why = weigh(prepared, trained, standing, whole), ""
     while causes:
-        worse = worse_log(trained.data, worth.left[0], worth.left[len(causes)])
+        first, *_, last, now = worth.left[0], *worth.left[: len(causes) + 1]
+        worse = worse_log(trained.data, first, now)
+        if len(causes) > 1 and effects[len(causes) - 1].log is None:
+            worse = worse or no_better(trained.data, last, now)
         if not worse:
             break
         why = f"with {place_of(*causes[-1].key)} {worse}"

@@ -15,10 +15,7 @@ class DiagnosisConfig:
 
     cutoff_hz: float | None = None  # zero-phase low-pass of all rows; None: as `recipe`
     lowest_hz: float = 10.0  # of a low-pass that is found: blocks and whitening need rows enough
-    keep: float = (
-        2.6  # rows in a period of the low-pass; more would fill a band, from 1.3 of the cut-off,
-        # where it lets a tenth through, with nothing but what whitening amplifies
-    )
+    keep: float = 2.6  # rows a period of the low-pass; more fill a band that it keeps back
     highest_hz: float = 25.0  # of a low-pass that is found: above it quantised positions dominate
     alpha: float = 0.01  # family-wise error of screening, all candidates together
     set_alpha: float = 0.05  # of the model confidence set (Hansen, Lunde & Nason 2011)

@@ -18,7 +18,7 @@ from pipelines.log import shared_work
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact
-from pipelines.model.rows.fit import TorqueGain, worse_log
+from pipelines.model.rows.fit import TorqueGain, no_better, worse_log
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, prepare
 from pipelines.model.simulation import comparison as gains
@@ -138,6 +138,14 @@ def test_no_held_out_log_may_get_worse_by_more_than_a_twentieth() -> None:
     assert not worse_log(data, large, np.where(first, 0.2, 1.04) * large)
     assert "second" in worse_log(data, large, np.where(first, 0.2, 1.06) * large)
     assert "second" in worse_log(data, large, np.where(first | (data.joint == 0), 1.0, 2.0) * large)
+
+
+def test_a_further_cause_has_to_predict_held_out_torque_better() -> None:
+    """By a thousandth at one joint, and not worse by as much at the other, however small its torque is."""
+    data, large = two_logs(), np.tile(np.repeat([1.0, 0.01], 100), 2)
+    assert not no_better(data, large, np.where(data.joint == 0, 0.999, 1.0) * large)
+    assert no_better(data, large, large)
+    assert no_better(data, large, np.where(data.joint == 0, 0.999, 1.002) * large)
 
 
 def test_rows_of_a_joint_that_is_held_do_not_count() -> None:
