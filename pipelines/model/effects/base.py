@@ -38,6 +38,7 @@ import numpy as np
 from pipelines.model.effects.placed import Placed
 from pipelines.model.effects.terms import (
     LARGE,
+    SAMPLED,
     SHARPNESSES,
     ArmModel,
     Formula,
@@ -57,7 +58,7 @@ from pipelines.model.effects.terms import (
 )
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["LARGE", "SHARPNESSES", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory",
+__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory",
            "Parameters", "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "adds", "everywhere",
            "friction_at", "joints_of", "predicted"]
 

@@ -7,28 +7,12 @@ from typing import Self
 
 from pipelines.model.effects.base import LARGE, SHARPNESSES, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
 from pipelines.model.effects.fast import Fast
-from pipelines.model.effects.kinds import FrictionLaw
+from pipelines.model.effects.kinds import FrictionLaw, sign_curve
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Coulomb", "sign_curve"]
+__all__ = ["Coulomb"]
 
-# x/√(1 + x²) and (2/π) arctan x as sigmoids, within 0.0012 of them at every x: sharpnesses, as parts of w, and heights.
-_TANH = ((1.0, 1.0),)
-_ROOT = ((1.307, 0.608), (0.563, 0.344), (0.1505, 0.048))
-_ARCTAN = ((1.1537, 0.3622), (0.4719, 0.4021), (0.1463, 0.1731), (0.0335, 0.052), (0.004, 0.0106))
 _BETWEEN = 1.5  # tanh and the root: a roundness that is fitted begins there
-
-
-def sign_curve(level: float, sharpness: float, roundness: float = 1.0) -> SpeedCurve:
-    """Return the torque of `Coulomb` as sigmoids of the speed."""
-    w, more = sharpness, roundness - 1.0
-    if more == 0.0:
-        return SpeedCurve(heights=(level,), sharpnesses=(w,))
-    sharper, rounder = (_TANH, _ROOT) if more <= 1.0 else (_ROOT, _ARCTAN)
-    share = more if more <= 1.0 else more - 1.0
-    return SpeedCurve(heights=tuple(level * part * height for part, curve in ((1.0 - share, sharper), (share, rounder))
-                                    for _, height in curve),
-                      sharpnesses=tuple(w * part for part, _ in (*sharper, *rounder)))
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,11 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
+from pipelines.model.effects.base import SAMPLED, ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import continuous, later, rate_of_change
 
-__all__ = ["SAMPLED", "DriveLag"]
-
-SAMPLED = Quantity("sample_time", "s", 0.0, 0.02, "of the filter that is the lag, where it is computed once a sample; else 0",
-                   shape=True, derived=True, unsaid=0.0)
+__all__ = ["DriveLag"]
 
 
 @dataclass(frozen=True)

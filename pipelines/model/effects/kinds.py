@@ -2,6 +2,7 @@
 
     FrictionLaw    every column takes power out of its joint
     Event          happens once, in one log
+    sign_curve     the curve by which dry friction changes its sign
 """
 
 from __future__ import annotations
@@ -11,10 +12,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from pipelines.model.effects.base import ArmModel, Effect
+from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["Event", "FrictionLaw", "plainer"]
+__all__ = ["Event", "FrictionLaw", "plainer", "sign_curve"]
+
+# x/√(1 + x²) and (2/π) arctan x as sigmoids, within 0.0012 of them at every x: sharpnesses, as parts of w, and heights.
+_TANH = ((1.0, 1.0),)
+_ROOT = ((1.307, 0.608), (0.563, 0.344), (0.1505, 0.048))
+_ARCTAN = ((1.1537, 0.3622), (0.4719, 0.4021), (0.1463, 0.1731), (0.0335, 0.052), (0.004, 0.0106))
 
 
 @dataclass(frozen=True)
@@ -43,3 +49,15 @@ class Event(Effect):
 def plainer(law: Effect) -> tuple[tuple[str, ...], ...]:
     """Return the names of laws with fewer terms; none where `law` is no law of friction."""
     return law.plainer if isinstance(law, FrictionLaw) else ()
+
+
+def sign_curve(level: float, sharpness: float, roundness: float = 1.0) -> SpeedCurve:
+    """Return the torque of `Coulomb` as a sum of sigmoids of the speed."""
+    w, more = sharpness, roundness - 1.0
+    if more == 0.0:
+        return SpeedCurve(heights=(level,), sharpnesses=(w,))
+    sharper, rounder = (_TANH, _ROOT) if more <= 1.0 else (_ROOT, _ARCTAN)
+    share = more if more <= 1.0 else more - 1.0
+    return SpeedCurve(heights=tuple(level * part * height for part, curve in ((1.0 - share, sharper), (share, rounder))
+                                    for _, height in curve),
+                      sharpnesses=tuple(w * part for part, _ in (*sharper, *rounder)))

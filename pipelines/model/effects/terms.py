@@ -25,8 +25,8 @@ import numpy as np
 from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["LARGE", "SHARPNESSES", "WRITTEN", "ArmModel", "Formula", "Hooks", "Numbered", "OwnLoad", "OwnMemory", "Parameters",
-           "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "friction_at", "predicted", "summed"]
+__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "WRITTEN", "ArmModel", "Formula", "Hooks", "Numbered", "OwnLoad", "OwnMemory",
+           "Parameters", "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "friction_at", "predicted", "summed"]
 
 Values = Mapping[str, float]
 
@@ -161,6 +161,10 @@ class Quantity:
         if revolute or self.period is not None:
             return self.unit
         return self.unit.replace("N m", "N").replace("kg m^2", "kg").replace("rad", "m").replace("1/rev", "1/(2 pi m)")
+
+
+SAMPLED = Quantity("sample_time", "s", 0.0, 0.02, "of the filter that is the lag, where it is computed once a sample; else 0",
+                   shape=True, derived=True, unsaid=0.0)
 
 
 class Parameters(tuple[Quantity, ...]):
