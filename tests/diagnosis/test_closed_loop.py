@@ -13,12 +13,19 @@ import pytest
 from benchmarks.hidden_effects.cases import campaign
 from benchmarks.hidden_effects.make import make_cases
 from benchmarks.other_plants.drawn import drawn
+from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.estimation.conditioning import wanted_cutoff
 from pipelines.model.estimation.logs import Recipe, motions_of, with_cutoff
 from pipelines.model.motion import Reconstruction
 from tests.diagnosis.arms import hidden
 from tests.diagnosis.asking import causes, diagnosed, effects
+
+
+def pair(seed: int, key: str, folder: Path) -> list[ExperimentLog]:
+    """The logs of two causes that the bench hides together."""
+    list(make_cases([case for case in campaign(seed, ["pairs"]) if case.key == key], folder))
+    return [open_log(path).log for path in sorted((folder / "logs" / key).rglob("*.h5"))]
 
 
 @pytest.mark.parametrize(("orders", "lowest", "highest", "band"), [
@@ -79,10 +86,7 @@ def test_no_law_of_friction_stands_beside_friction_of_another_joint() -> None:
 @pytest.mark.slow
 def test_both_of_two_causes_are_found_where_a_soft_base_would_predict_one_of_them_better(tmp_path: Path) -> None:
     """Without frequency responses a base has no name; it explained the lag of joint 2, and the gain of joint 3 stayed unnamed."""
-    pair = next(case for case in campaign(41, ["pairs"]) if case.key == "65a9417a5b")
-    list(make_cases([pair], tmp_path))
-    logs = [open_log(path).log for path in sorted((tmp_path / "logs" / pair.key).rglob("*.h5"))]
-    found = diagnosed(*logs)
+    found = diagnosed(*pair(41, "65a9417a5b", tmp_path))
     assert causes(found) == [("torque_gain", 3), ("torque_lag", 2)]
     gain, lag = effects(found)
     assert gain.values["gain_error"] == pytest.approx(-0.03, abs=0.003)
@@ -92,10 +96,7 @@ def test_both_of_two_causes_are_found_where_a_soft_base_would_predict_one_of_the
 @pytest.mark.slow
 def test_a_push_in_each_of_five_logs_leaves_room_for_a_cause(tmp_path: Path) -> None:
     """Four of the five used up the largest number of causes."""
-    pair = next(case for case in campaign(63, ["pairs"]) if case.key == "ef91ec1374")
-    list(make_cases([pair], tmp_path))
-    logs = [open_log(path).log for path in sorted((tmp_path / "logs" / pair.key).rglob("*.h5"))]
-    found = diagnosed(*logs)
+    found = diagnosed(*pair(63, "ef91ec1374", tmp_path))
     assert causes(found) == [("contact", None)] * 5 + [("torque_offset", 3)]
     assert effects(found)[-1].values["offset"] == pytest.approx(0.03, rel=0.05)
 

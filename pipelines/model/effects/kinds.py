@@ -52,7 +52,7 @@ def plainer(law: Effect) -> tuple[tuple[str, ...], ...]:
 
 
 def sign_curve(level: float, sharpness: float, roundness: float = 1.0) -> SpeedCurve:
-    """Return the torque of `Coulomb` as a sum of sigmoids of the speed."""
+    """Return dry friction of a level [N m], by sharpness w [s/rad] and roundness r, as sigmoids: the law of `Coulomb`."""
     w, more = sharpness, roundness - 1.0
     if more == 0.0:
         return SpeedCurve(heights=(level,), sharpnesses=(w,))

@@ -208,7 +208,7 @@ class LogData:
                        unwhitened=self.y)
 
     def coarse(self, kept: Kept) -> LogData:
-        """Return the same rows of a motion at fewer samples, which meet torques to a few hundredths of their noise."""
+        """Return the same rows of a motion at fewer samples; columns of causes are met to a fifteenth, that of a gap is not."""
         own, fewer = _skipped(self.equations), _skipped(self.equations, COARSE)
         by = fewer // own if fewer % own == 0 else 1
         if by == 1:

@@ -6,7 +6,8 @@
     slopes, names = slopes_of(model, data, rigid)
 
 The numbers are the base parameters, amplitudes and shapes of the friction laws, amplitudes and free
-shapes of the effects. Slopes by what is linear are columns; all others are differences of the torque.
+shapes of the effects. Slopes by what is linear are columns; all others, and those by
+base parameters and friction beside effects that act on the torque, are differences of the torque.
 """
 
 from __future__ import annotations
