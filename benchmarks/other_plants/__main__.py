@@ -4,6 +4,8 @@
     python -m benchmarks.other_plants gantry-cogging six-tanh  these
     python -m benchmarks.other_plants --count 5 --keep FOLDER  the first five; logs stay in FOLDER, and are taken from there
     python -m benchmarks.other_plants --drawn 3 --count 40     forty drawn at random, the third time
+    python -m benchmarks.other_plants --drawn 3 --pairs        with two faults each
+    python -m benchmarks.other_plants --noise 10               ten times the noise of the drives
     python -m benchmarks.other_plants --part 1/2               every second
 """
 
@@ -14,6 +16,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +25,7 @@ from pipelines.log.files import write_log
 try:
     from benchmarks.hidden_effects.judge import asked
     from benchmarks.other_plants.cases import CASES, Case
-    from benchmarks.other_plants.drawn import drawn
+    from benchmarks.other_plants.drawn import drawn, pairs
 except ModuleNotFoundError as missing:
     if missing.name != "mujoco":
         raise
@@ -36,7 +39,9 @@ _USUAL = 48
 def main() -> None:
     parser = _parser()
     arguments = parser.parse_args()
-    cases = CASES if arguments.drawn is None else drawn(arguments.count or _USUAL, arguments.drawn)
+    draw = pairs if arguments.pairs else drawn
+    cases = CASES if arguments.drawn is None else draw(arguments.count or _USUAL, arguments.drawn)
+    cases = tuple(replace(case, noise=arguments.noise * case.noise) for case in cases)
     if unknown := sorted(set(arguments.names) - {case.name for case in cases}):
         parser.error(f"no such case: {', '.join(unknown)}")
     chosen = [case for case in cases if not arguments.names or case.name in arguments.names][:arguments.count]
@@ -58,6 +63,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--count", type=int, help="no more than so many")
     parser.add_argument("--drawn", type=_seed, metavar="SEED",
                         help=f"cases drawn at random, {_USUAL} where no --count says how many")
+    parser.add_argument("--pairs", action="store_true", help="those that are drawn have two faults each")
+    parser.add_argument("--noise", type=float, default=1.0, help="times the noise of the drives")
     parser.add_argument("--part", default="1/1", help="1/2, 2/2, …: every second of them")
     parser.add_argument("--keep", type=Path, help="where logs stay")
     return parser
@@ -93,9 +100,9 @@ def judged(case: Case, line: Mapping[str, Any]) -> tuple[str, str]:
     Args:
         line: as `asked` answers.
 
-    A healthy arm is right with nothing wrong, and a cause with its name at its joint and no other name; an "unknown" is open where
-    something is wrong, and wrong where nothing is; "cannot-judge" is open. Friction that the nominal model lacks may be named, or
-    not, but not otherwise.
+    A healthy arm is right with nothing wrong, and causes with their names at their joints and no other name, one of two is open; an
+    "unknown" is open where something is wrong, and wrong where nothing is; "cannot-judge" is open. Friction that the nominal model
+    lacks may be named, or not, but not otherwise.
     """
     for none in ("refused", "crashed"):
         if none in line:
@@ -103,15 +110,15 @@ def judged(case: Case, line: Mapping[str, Any]) -> tuple[str, str]:
     answer = line["answer"]
     verdict = answer["verdict"]
     names = [(one["cause"], one["joint"]) for one in answer["findings"]]
-    good = [cause in case.answers and (not case.fault or joint in (None, case.joint) or case.fault == "torque_delay")
-            for cause, joint in names]
-    if not all(good):
+    told = [[cause in one.answers and (not one.fault or joint in (None, one.joint) or one.fault == "torque_delay")
+             for one in case.faults] for cause, joint in names]
+    if not all(map(any, told)):
         outcome = "wrong"
     elif not case.fault:
         silent = case.answers or verdict == "cannot-judge"
         outcome = "right" if verdict == "no-fault-found" or names else "open" if silent else "wrong"
     elif case.answers:
-        outcome = "right" if names else "open"
+        outcome = "right" if names and all(map(any, zip(*told, strict=True))) else "open"
     else:
         outcome = "right" if verdict == "unknown" else "open"
     found = ", ".join(cause if joint is None else f"{cause}:{joint}" for cause, joint in names)

@@ -52,11 +52,17 @@ class Case:
     answers: tuple[str, ...] = ()  # names that are right; none: a healthy arm, or an "unknown"
     geared: bool = True  # the description tells the gears
     number_in_name: int = 0
+    beside: Case | None = None  # whose fault this arm has too
+
+    @property
+    def faults(self) -> tuple[Case, ...]:
+        """This case, and the one whose fault is beside its own."""
+        return (self,) if self.beside is None else (self, self.beside)
 
     @property
     def name(self) -> str:
         rest = f"-{self.number_in_name}" if self.number_in_name else ""
-        return f"{self.arm}-{(self.fault or self.law).replace(' ', '-')}{rest}"
+        return f"{self.arm}-{'+'.join(one.fault or one.law for one in self.faults).replace(' ', '-')}{rest}"
 
     def logs(self) -> list[ExperimentLog]:
         """Everything that was recorded, the reference logs without the fault."""
@@ -70,15 +76,15 @@ class Case:
         limit = np.ceil(6.0 * typical)
         robot = arm.described(tuple(resolution.tolist()), limit, self.geared)
         counts = 12.0 * typical / 2**13
-        sick = self._fault(typical, law, speed)
+        sick = [fault for one in self.faults if (fault := one._fault(typical, law, speed))]
         logs = []
         for place, (kind, role) in enumerate(self.motions):
             own = np.random.default_rng([seed, place])
             t: Array = np.arange(round(self.duration / self.sample_time)) * self.sample_time
             path = motion(kind, arm, t, own)
             loop = Loop(self.loop, arm, self.sample_time, inertia, min(5.0, 0.02 / self.sample_time), counts, limit)
-            now = None if role == "reference" or (self.fault == "contact" and place != _TOUCHED) else sick
-            plant = Plant(arm if now is None else self._bent(arm), law, now, self.noise * typical, self.coloured, resolution)
+            now = () if role == "reference" else tuple(one for one in sick if one.kind != "contact" or place == _TOUCHED)
+            plant = Plant(self._bent(arm) if now else arm, law, now, self.noise * typical, self.coloured, resolution)
             q, tau = plant.run(loop, path, self.sample_time, own)
             values = {"t": t + 3.0 * place, "q": q, "tau": tau, **dict(zip(("q_ref", "dq_ref", "ddq_ref"), path, strict=True))}
             signals = {name: Signal(array, schema.unit_of(name, "pd"), schema.SIGNALS[name][1]) for name, array in values.items()}
@@ -107,10 +113,9 @@ class Case:
 
     def _bent(self, arm: Arm) -> Arm:
         """With the link before a joint as long as it truly is; its description and its loop know no better."""
-        if self.fault != "link_length":
-            return arm
-        axes, j = list(arm.axes), self.joint - 1
-        axes[j] = replace(axes[j], a=axes[j].a + self.size)
+        axes = list(arm.axes)
+        for j, size in ((one.joint - 1, one.size) for one in self.faults if one.fault == "link_length"):
+            axes[j] = replace(axes[j], a=axes[j].a + size)
         return replace(arm, axes=tuple(axes))
 
 

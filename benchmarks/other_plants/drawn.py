@@ -1,6 +1,7 @@
 """Cases drawn at random, of arms, laws of friction, loops, motions and faults in any combination.
 
     drawn(40, seed=3)       the same forty whenever they are asked for
+    pairs(20, seed=3)       arms with two faults
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from benchmarks.other_plants.arms import ARMS
 from benchmarks.other_plants.cases import BEFORE, DELAY, FIVE, FOUR, SLOW, THREE, Case
 
-__all__ = ["drawn"]
+__all__ = ["drawn", "pairs"]
 
 _LAWS = ("tanh", "root", "arctan")
 _HEALTHY, _OUTSIDE = 0.45, 0.1  # of the cases
@@ -36,6 +37,22 @@ def drawn(count: int, seed: int) -> tuple[Case, ...]:
     """`count` cases."""
     rng = np.random.default_rng([20040601, seed])
     return tuple(replace(_one(rng), number_in_name=1000 * seed + k) for k in range(1, count + 1))
+
+
+def pairs(count: int, seed: int) -> tuple[Case, ...]:
+    """`count` cases with two faults, neither of which may be told by the other's name at its joint."""
+    rng = np.random.default_rng([20040602, seed])
+    return tuple(replace(_pair(rng), number_in_name=1000 * seed + k) for k in range(1, count + 1))
+
+
+def _pair(rng: np.random.Generator) -> Case:
+    while True:
+        plain = _plain(rng, str(rng.choice(sorted(ARMS))))
+        kinds = rng.choice(sorted(_FAULTS), 2, replace=False)
+        first, second = (_FAULTS[kind](plain, rng) for kind in kinds)
+        if first.arm == second.arm and not (set(first.answers) & set(second.answers)):
+            return replace(first, beside=second, sample_time=min(first.sample_time, second.sample_time),
+                           duration=max(first.duration, second.duration), motions=max(first.motions, second.motions, key=len))
 
 
 def _one(rng: np.random.Generator) -> Case:

@@ -5,6 +5,8 @@
     load = acting.load(now)                     at every stage of the integrator
     acting.after(applied, v)                    once a sample
     seen, logged = acting.seen(q), acting.logged(commands)
+
+`Several` is more than one fault with the same methods.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import numpy as np
 from benchmarks.other_plants.friction import Friction
 from pipelines.log.experiment import Array
 
-__all__ = ["Acting", "Fault", "Now"]
+__all__ = ["Acting", "Fault", "Now", "Several"]
 
 _HEATING, _HOPS = 5.0, 0.7  # [s] time constant of a gear that warms, mean time between two hops
 _DRIFTING = 6.0  # [s] time constant of viscous friction that drifts
@@ -137,4 +139,41 @@ class Acting:
         out, kept = commands.copy(), np.exp(-self._lasting / self.size)
         for k in range(1, len(out)):
             out[k, self.j] = kept * out[k - 1, self.j] + (1.0 - kept) * commands[k, self.j]
+        return out
+
+
+class Several:
+    """All faults of an arm during one run, each after the one before it."""
+
+    def __init__(self, faults: tuple[Fault, ...], law: Friction, sample_time: float, rng: np.random.Generator) -> None:
+        self._all = [Acting(fault, law, sample_time, rng) for fault in faults]
+
+    def driven(self, command: Array) -> Array:
+        """What the drives make of the command."""
+        made = command
+        for one in self._all:
+            made = one.driven(made)
+        return made
+
+    def load(self, now: Now) -> Array:
+        """(joints,) [N m] that acts beside friction, in the direction of motion."""
+        return sum((one.load(now) for one in self._all), np.zeros_like(now.q))
+
+    def after(self, applied: Array, v: Array) -> None:
+        """A sample has gone by."""
+        for one in self._all:
+            one.after(applied, v)
+
+    def seen(self, q: Array) -> Array:
+        """What the encoders see of q, before they count it."""
+        out = q
+        for one in self._all:
+            out = one.seen(out)
+        return out
+
+    def logged(self, commands: Array) -> Array:
+        """What the log holds of the commands (samples, joints)."""
+        out = commands
+        for one in self._all:
+            out = one.logged(out)
         return out

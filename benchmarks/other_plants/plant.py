@@ -1,6 +1,6 @@
-"""What moves: MuJoCo's bodies under a held torque, with friction, drive, encoder and one fault in plain numpy.
+"""What moves: MuJoCo's bodies under a held torque, with friction, drive, encoder and faults in plain numpy.
 
-    plant = Plant(arm, Friction("lugre", …), Fault("cogging", 1, 0.4), noise, …)
+    plant = Plant(arm, Friction("lugre", …), (Fault("cogging", 1, 0.4),), noise, …)
     q, tau = plant.run(loop, motion, sample_time, rng)     (samples, joints) what a log holds
 
 MuJoCo integrates by Runge-Kutta with many steps a sample; what rubs, pulls or sticks is asked for at each of its stages.
@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 
 from benchmarks.other_plants.arms import Arm
-from benchmarks.other_plants.faults import Acting, Fault, Now
+from benchmarks.other_plants.faults import Fault, Now, Several
 from benchmarks.other_plants.friction import Friction
 from benchmarks.other_plants.loops import Loop
 from pipelines.log.experiment import Array
@@ -33,7 +33,7 @@ class Plant:
 
     arm: Arm
     friction: Friction
-    fault: Fault | None
+    faults: tuple[Fault, ...]
     noise: Array  # [N m] (joints,) of the drives, rms
     coloured: bool
     resolution: Array  # [rad] (joints,) of the encoders
@@ -60,7 +60,7 @@ class _State:
     """One run: what friction, drive and fault remember."""
 
     def __init__(self, plant: Plant, inertia: Array, sample_time: float, rng: np.random.Generator, shape: tuple[int, ...]) -> None:
-        self.plant, self.rng, fault = plant, rng, plant.fault
+        self.plant, self.rng = plant, rng
         law = plant.friction
         rate = (law.coulomb * law.breakaway / law.width + law.viscous) / inertia
         if law.kind == "lugre":  # a spring of so much a rad, with a damper
@@ -69,13 +69,13 @@ class _State:
             rate = 2.0 * np.sqrt(self.stiff / inertia)
         self.steps = int(np.ceil(sample_time / min(_LONGEST, _STABLE / float(rate.max()))))
         self.h = sample_time / self.steps
-        kind, size, towards = ("", 0.0, 0.0) if fault is None else (fault.kind, fault.size, fault.number)
-        tilt = size if kind == "gravity_tilt" else 0.0  # [rad] towards an angle [rad] from the base's x axis
+        tilt, towards = next(((one.size, one.number) for one in plant.faults if one.kind == "gravity_tilt"), (0.0, 0.0))  # [rad]
+        payload = sum(one.size for one in plant.faults if one.kind == "payload")
         down = np.cos(tilt) * np.array(plant.arm.gravity) + 9.81 * np.sin(tilt) * np.array([np.cos(towards), np.sin(towards), 0.0])
-        self.model = plant.arm.model(self.h, tuple(down.tolist()), payload=size if kind == "payload" else 0.0)
+        self.model = plant.arm.model(self.h, tuple(down.tolist()), payload=payload)
         self.data: Any = mujoco.MjData(self.model)
         self.z = np.zeros(shape[1])
-        self.acting = Acting(fault, law, sample_time, rng)
+        self.acting = Several(plant.faults, law, sample_time, rng)
         self.applied = np.zeros(shape[1])
         self.blur = np.zeros(shape[1])
         self.share = 1.0 - np.exp(-2.0 * np.pi * _FASTEST_HZ * sample_time)
