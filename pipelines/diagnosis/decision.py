@@ -88,7 +88,7 @@ def _explained(later: Later, selection: Selection, beyond: Array, strained: bool
     start, end = selection.start, selection.end
     acting = later.acting(end)
     weight = acting / max(float(acting.max()), 1e-12) if acting.any() else np.ones(len(acting))
-    gained = np.maximum((start.mean_squares - end.mean_squares) * _counts(end), 0.0)
+    gained = np.maximum(start.squares - end.squares, 0.0)
     before, after = (one.cost - one.rss for one in (start, end))
     taken = float(weight @ gained) + max(before - after, 0.0)
     rest = float(weight @ beyond) + (after if strained else 0.0)

@@ -25,7 +25,7 @@ from pipelines.fit.joint_table import Array, Arrow, Indices, Table
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.orders import NEARLY
-from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.exact import Exact, Named
 from pipelines.model.rows.families import first_samples
 
 __all__ = ["Later"]
@@ -301,22 +301,26 @@ class Later:
 
         An event counts in the whole alone: beyond its moment it leaves nothing.
         """
-        lasting, every = self._powers(state)
-        return np.asarray(lasting / max(float(every.sum()), 1e-300))
-
-    def lasting(self, state: State) -> Array:
-        """Return the share (joints,) of the lasting effects in the torque of all at each joint."""
-        lasting, every = self._powers(state)
-        return np.asarray(np.minimum(lasting / np.maximum(every, 1e-300), 1.0))
-
-    def _powers(self, state: State) -> tuple[Array, Array]:
-        """Return the power (joints,) of the torque of lasting effects, and of all."""
         effects = state.model.effects
-        some = ((), tuple(one for one in effects if one.log is None), effects)
-        plain, *others = (self.rows.torque(replace(state.model, effects=own)) for own in some)
-        each = [zip(torque, plain, strict=True) for torque in others]
-        lasting, every = (np.array([float(np.sum((x - y) ** 2)) for x, y in own]) for own in each)
-        return lasting, every
+        lasting = self._power(state, [one for one in effects if one.log is None])
+        return np.asarray(lasting / max(float(self._power(state, effects).sum()), 1e-300))
+
+    def inexact(self, state: State) -> Array:
+        """Return the share (joints,) of effects with an inexact law in the torque of all.
+
+        What changes base parameters acts as the rigid body does, and an event leaves nothing beyond
+        its moment.
+        """
+        effects = state.model.effects
+        laws = [o for o in effects if o.log is None and o.effect.evidence != "base parameters"]
+        share = self._power(state, laws) / np.maximum(self._power(state, effects), 1e-300)
+        return np.asarray(np.minimum(share, 1.0))
+
+    def _power(self, state: State, effects: Sequence[Named]) -> Array:
+        """Return the power (joints,) of the torque of some of the effects."""
+        models = (replace(state.model, effects=tuple(own)) for own in (effects, ()))
+        each = zip(*(self.rows.torque(model) for model in models), strict=True)
+        return np.array([float(np.sum((x - y) ** 2)) for x, y in each])
 
     @property
     def usual(self) -> Array:

@@ -231,10 +231,9 @@ class _Step:
         """
         start, state = self.start, self.state
         prior = max(start.cost - start.rss - state.cost + state.rss, 0.0)
-        saved = np.maximum(_power(start.residual) - _power(state.residual), 0.0)
-        saved = saved * self.later.lasting(state)  # beyond its moment an event leaves nothing
-        saved = saved + prior * self.later.acting(state) + self.later.standing
-        return np.asarray(self.later.config.relevance * saved)
+        saved = np.maximum(start.squares - state.squares, 0.0)
+        saved = (saved + prior * self.later.acting(state)) * self.later.inexact(state)
+        return np.asarray(self.later.config.relevance * (saved + self.later.standing))
 
     def _torque(self, one: Screened) -> tuple[Array, ...]:
         """Return the torque of a screened candidate, joint by joint, in units of the noise."""
@@ -260,7 +259,7 @@ class _Step:
             return False
         group = self.significant[one.key].group
         shares = later.shares[later.dictionary.groups.index(group)]
-        saved = _power(state.residual) - _power(new.residual)
+        saved = state.squares - new.squares
         more = later.taken(state, [group])[0]
         if one.key[1] is not None:  # of the whole arm base parameters are freed: that saves nothing
             more += state.cost - state.rss - new.cost + new.rss
@@ -493,11 +492,6 @@ def _backward(later: Later, causes: list[Cause], end: State) -> tuple[list[Cause
         else:
             place += 1
     return causes, end
-
-
-def _power(residual: Sequence[Array]) -> Array:
-    """(joints,) sum of squares."""
-    return np.array([float(r @ r) for r in residual])
 
 
 def _scores(later: Later, state: State, numbers: int = 0) -> Array:

@@ -48,8 +48,13 @@ class State:
         return Fit(self.model, self.cost, self.residual)
 
     @property
+    def squares(self) -> Array:
+        """(joints,) sum of squares."""
+        return np.array([float(r @ r) for r in self.residual])
+
+    @property
     def rss(self) -> float:
-        return sum(float(r @ r) for r in self.residual)
+        return float(self.squares.sum())
 
     @cached_property
     def cost(self) -> float:
