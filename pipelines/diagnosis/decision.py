@@ -51,7 +51,8 @@ def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
     rest = _rest(later, selection.rounds[-1], missing, shapes, left, bound)
     if causes:
         power = np.array([float(y @ y) for y in later.rows.y])
-        too_much = np.where(left < bound, 0.0, left - baseline.usual_fit) * _counts(end)
+        counts = [len(y) for y in later.rows.y]
+        too_much = np.where(left < bound, 0.0, left - baseline.usual_fit) * counts
         beyond = np.maximum(np.maximum(missing**2 * power, too_much), followed)
         strained = end.cost / later.rows.count >= bound
         explained = _explained(later, selection, beyond, strained)
@@ -71,11 +72,6 @@ def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
         return Decision("no-fault-found", "", ())
     told = (rest or _too_large(left, bound), selection.rounds[-1].stopped)
     return Decision("unknown", "; ".join(one for one in told if one), ())
-
-
-def _counts(state: State) -> Array:
-    """(joints,) rows of each."""
-    return np.array([len(r) for r in state.residual], dtype=np.float64)
 
 
 def _explained(later: Later, selection: Selection, beyond: Array, strained: bool) -> float:
