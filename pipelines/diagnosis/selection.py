@@ -26,7 +26,7 @@ from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact
 
-__all__ = ["Candidate", "Cause", "Round", "SearchStart", "Selection", "refit", "select"]
+__all__ = ["Candidate", "Cause", "Round", "SearchStart", "Selection", "best_law", "refit", "select"]
 
 
 @dataclass(frozen=True)
@@ -176,11 +176,11 @@ class _Step:
         apart = {shape: self._apart(other) for shape, other in others.items()}
         pick, cause, stopped = self._contest(tried, others, apart)
         if pick is None:  # perhaps by another law of the same cause
-            tried = [_other_form(later, self.state, one) for one in tried]
+            tried = [best_law(later, self.state, one) for one in tried]
             pick, cause, stopped = self._contest(tried, others, apart)
         if pick is None:
             return replace(seen, stopped=stopped), None
-        chosen = _other_form(later, self.state, pick).state
+        chosen = best_law(later, self.state, pick).state
         return replace(seen, cause=cause, after=chosen.fit), chosen
 
     @cached_property
@@ -450,7 +450,7 @@ def _plainer(model: Exact) -> tuple[Exact, ...]:
     return (replace(model, columns=replace(columns, laws=plain)),)
 
 
-def _other_form(later: Later, state: State, chosen: Candidate) -> Candidate:
+def best_law(later: Later, state: State, chosen: Candidate) -> Candidate:
     """Return the chosen cause by the law of it that predicts best."""
     one, every = chosen.state.model.effects[-1], [chosen]
     if one.log is None:
@@ -470,7 +470,7 @@ def _reformed(later: Later, state: State) -> State:
         same = _candidate(later, before, one.effect, np.array(one.amplitudes), log=one.log)
         if same is None or not same.possible:
             return state
-        new = _other_form(later, before, same).state
+        new = best_law(later, before, same).state
     return new
 
 
@@ -509,4 +509,4 @@ def refit(
 ) -> Candidate | None:
     """Return a cause that somebody names, refitted, by the law of it that predicts best."""
     one = _candidate(later, state, effect, amplitudes)
-    return _other_form(later, state, one) if one is not None and laws else one
+    return best_law(later, state, one) if one is not None and laws else one

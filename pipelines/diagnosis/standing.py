@@ -20,7 +20,7 @@ from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.screening import Screened, best_of
-from pipelines.diagnosis.selection import Candidate, refit
+from pipelines.diagnosis.selection import Candidate, best_law, refit
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import Standing, told
 from pipelines.diagnosis.unnamed import FORM, Key
@@ -115,5 +115,5 @@ def _first(own: Later, state: State, every: dict[Key, Screened], later: Rows) ->
         effect = done.state.model.effects[-1].effect
         beyond = any(q.seen for q in effect.parameters) and effect.goes_beyond(motions, known)
         if without.max() > own.config.excess and not beyond:
-            return refit(own, state, own.form(one.group), one.amplitudes)
+            return best_law(own, state, done)
     return None
