@@ -277,18 +277,14 @@ class _Step:
         config = self.later.config
         named = {key: one for key, one in self.significant.items() if one.group.kind == "named"}
         gain = {key: one.gain for key, one in named.items() if self._matters(one)}
-        fine = sorted(named.keys() - gain.keys(), key=lambda key: -named[key].gain)[:1]
+        fine = sorted((k for k in named if k not in gain), key=lambda key: -named[key].gain)[:1]
         order: list[Key] = []
         if gain:
             taken = self.later.taken(self.state, [named[key].group for key in gain])
             worth = {key: gain[key] + more for key, more in zip(gain, taken, strict=True)}
-            best = {
-                key
-                for by in (gain, worth)
-                for key, x in by.items()
-                if x > config.promising * max(by.values())
-            }
-            most = max(gain.values())
+            most, top = max(gain.values()), max(worth.values())
+            near = {key: max(gain[key] / most, worth[key] / top) for key in gain}
+            best = [key for key in gain if near[key] > config.promising]
             order = sorted(best, key=lambda key: (gain[key] < most, -worth[key]))
         return [named[key] for key in (*order[: config.refits], *fine)]
 
