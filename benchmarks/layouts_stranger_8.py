@@ -85,9 +85,7 @@ def mujoco_angle_and_force(folder: Path, run: Run) -> Answer:
     specs = "time=t; *{}_cmd=q_ref; *{}_act=q"
     joints = run.arm.joints
     table(folder / "forces.csv", wide(run, "time=t; {}_force=tau", joints)[0])
-    answer = recorded(folder, run, "angles.csv", {"time": "s"}, specs, joints, joint_wise=True)
-    also(answer.right, "tau", "{}_force", joints, NM)
-    return answer
+    return recorded(folder, run, "angles.csv", {"time": "s"}, specs, joints, joint_wise=True)
 
 
 @layout(TWO, rate=500.0)
@@ -334,7 +332,7 @@ def set_point_and_process_value(folder: Path, run: Run) -> Answer:
     specs = "DateTime=serial; *J{}_SP_deg=q_ref°; *J{}_PV_deg=q°; *J{}_OUT=share:current:?"
     serial = [f"{45415.5848524306 + t / 86400:.10f}" for t in run.t]
     data = {"serial": np.array(serial), "share": share(run)}
-    time = {"DateTime": "days"}
+    time = {"DateTime": "d"}
     return recorded(folder, run, "pid_trend.csv", time, specs, data=data, joint_wise=True)
 
 
