@@ -320,18 +320,34 @@ def _array(value: Any) -> Array | None:
         return None
 
 
-def _cells(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
-    """Yield (path, group, value) of every number and text of a frame."""
-    for path, value in _named(frame, "", _DEEPEST):
-        for k, item in enumerate(value) if isinstance(value, list) else ():
-            if isinstance(item, dict):
-                for inner, cell in _named(item, "", _DEEPEST):
-                    if not isinstance(cell, list):
-                        yield f"{path}[{k}].{inner}", f"{path}[{k}].{inner}", cell
-            elif not isinstance(item, list):
-                yield f"{path}[{k}]", path, item
+def _cells(frame: Any, root: str = "", depth: int = _DEEPEST) -> Iterator[tuple[str, str, Any]]:
+    """Yield (path, group, value) of every number and text of a frame.
+
+    The only numbers of an object in a list go by the texts beside them, as many and all different:
+    values[effort] of ROS 2's DynamicJointState.
+    """
+    for path, value in _named(frame, root, depth):
         if not isinstance(value, list):
             yield path, path, value
+            continue
+        for k, item in enumerate(value):
+            if isinstance(item, dict) and depth > 0:
+                yield from _cells(_by_names(item), f"{path}[{k}]", depth - 1)
+            elif not isinstance(item, dict | list):
+                yield f"{path}[{k}]", path, item
+
+
+def _by_names(item: dict[str, Any]) -> dict[str, Any]:
+    """Return an object with a key for each number that a text beside it names; else as it is."""
+    lists = {key: value for key, value in item.items() if isinstance(value, list)}
+    texts = [v for v in lists.values() if v and all(isinstance(x, str) for x in v)]
+    if len(lists) != 2 or len(texts) != 1 or len(set(texts[0])) != len(texts[0]):
+        return item
+    key, numbers = next((key, value) for key, value in lists.items() if value is not texts[0])
+    if len(numbers) != len(texts[0]):
+        return item
+    rest = {name: value for name, value in item.items() if name not in lists}
+    return rest | {f"{key}[{x}]": number for x, number in zip(texts[0], numbers, strict=True)}
 
 
 def _table_of_frames(frames: Sequence[Mapping[str, Any]], source: str) -> RawTable:
