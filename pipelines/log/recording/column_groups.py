@@ -233,11 +233,25 @@ def _split(members: list[Member], n: int) -> list[list[Member]]:
     for member in members:
         words = tuple("#" if word.isdecimal() else word for word in member[0].label)
         parts.setdefault(words, []).append(member)
-    if all(len(part) > 1 for part in parts.values()):
-        return list(parts.values())
-    whole = [part for part in parts.values() if len(part) == n > 1]
+    found = [part for alike in parts.values() for part in _by_number(alike, n)]
+    if all(len(part) > 1 for part in found):
+        return found
+    whole = [part for part in found if len(part) == n > 1]
     rest = [member for member in members if not any(member in part for part in whole)]
     return [*whole, rest]
+
+
+def _by_number(members: list[Member], n: int) -> list[list[Member]]:
+    """Split columns by a number that does not count from 0 or 1, as joints do: J1.6064h."""
+    labels = [name.label for name, _ in members]
+    for at in range(len(labels[0]) if len(members) > n > 1 else 0):
+        parts: dict[str, list[Member]] = {}
+        for label, member in zip(labels, members, strict=True):
+            parts.setdefault(label[at].lstrip("0"), []).append(member)
+        counted = set(parts) <= {"", *map(str, range(len(parts) + 1))}
+        if not counted and all(len(part) == n for part in parts.values()):
+            return list(parts.values())
+    return [members]
 
 
 def _ordered(members: list[Member], joints: Sequence[str], texts: Sequence[str]) -> Group:
