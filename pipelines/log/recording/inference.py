@@ -160,7 +160,7 @@ class Inference:
                 group.side,
                 self.fits,
                 self.reading.message,
-                self.named(dq, table)[0] if dq else None,
+                self.named(dq, table)[min(turning[0], len(dq.columns) - 1)] if dq else None,
                 self._counts_of_turn,
             )
             guess, further = position_unit(self.q[:, turning], first, evidence)
