@@ -107,7 +107,8 @@ class Statement:
 def _clauses(notes: Sequence[str]) -> Iterator[str]:
     """Yield the parts of lines that say one thing each; two cells are a name and its value."""
     for line in notes:
-        text = narrow_signs(line).strip().lstrip("#%/*!;\"' ").strip(" ,;\t\"'")[:_LONGEST]
+        text = narrow_signs(line).replace('",', '";').strip().lstrip("#%/*!;\"' ")
+        text = text.strip(" ,;\t\"'")[:_LONGEST]
         split = re.split(r"[;\t]|,(?!\d)|(?<=[^\W\d]),", text)
         cells = [cell.strip() for cell in split if cell.strip()]
         values = cells[1 : 2 + (len(cells) > 3)]

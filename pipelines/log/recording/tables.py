@@ -52,7 +52,7 @@ _WORD = re.compile(r"[^\W\d_]{3}")
 _WIDEST = 100_000  # cells in a line: a signal of 100 s at 1 kHz, stored along its row
 _LONGEST_SIDE = 4  # times the other: a table of numbers is read along it
 _TIME_OF_DAY = re.compile(
-    r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?(?:\s?([AaPp])\.?[Mm]\b)?"
+    r"(?<!\d)(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:;](\d{1,9}))?(?:\s?([AaPp])\.?[Mm]\b)?"
 )
 _DATE = r"(?:\d{4}[-/.]\d\d[-/.]\d\d[T ])?\d{1,2}:\d\d:\d\d(?:[.,]\d{1,9})?Z?"
 _NUMBER = (
