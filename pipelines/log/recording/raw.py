@@ -345,6 +345,10 @@ def _by_key(table: RawTable, key: str, words: tuple[str, ...]) -> RawTable:
             groups[name] = tuple(f"{name}[{word}]" for word in words)
             columns |= zip(groups[name], map(np.ascontiguousarray, rows.T), strict=True)
     message = f"{k} rows a sample, one for each '{clean(key, 40)}': put beside each other"
+    for name in (name for name in groups if read_name(name).quantity == "time"):
+        times = np.column_stack([columns[member] for member in groups[name]])
+        apart = np.median(np.nan_to_num(abs(times - times[:, :1])), axis=0).max()
+        message += f"; '{clean(name, 40)}' differs by {apart:.3g} among them, the log has one time"
     remedy = "export one row a sample"
     check = Check.of("S11", "warn", message, where=table.source, remedy=remedy)
     units = {name: unit for name, unit in table.units.items() if name in columns}
