@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -61,6 +62,7 @@ alpha = 0.0
 d = 0.0
 offset = 0.0
 """
+_TORQUE_CONSTANT = re.compile(r"torque[ _-]?const|\bk_?t\b|N ?m/A", re.IGNORECASE)
 _MOTORS = "q_motor = N q_joint, tau_joint = N^T tau_motor"
 
 
@@ -349,6 +351,7 @@ class _Drafting:
             left = ", ".join(f"{clean(name, 40)} ({clean(text, 80)})" for name, text in items)
             further = [f"    # no columns of numbers: {left}"] if left else []
             needed = ", and a log needs a torque" if signal == "tau" else ""
+            further += self._other_files() if signal == "tau" else []
             return [f"{line}   # no column looks like it{needed}", *further]
         self.evidence.append(f"{signal}: {len(found)} candidates, none of them certain")
         lines = [line, f"    # {doubt}"] if doubt else [line]
@@ -365,10 +368,19 @@ class _Drafting:
             lines.append(f"    # {what}: {_columns(group.columns, table)}{self._file(table)}")
         if beside := [f"file = {_quoted(name)}" for name in self.reading.beside[:8]]:
             lines.append(f"    # as many columns and rows: {', '.join(beside)}")
-        return lines
+        return [*lines, *(self._other_files() if signal == "tau" and not beside else ())]
 
     def _file(self, table: RawTable) -> str:
         return f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
+
+    def _other_files(self) -> list[str]:
+        """Return a comment with the files beside this one that no number alone tells apart."""
+        path = self.reading.path
+        alike = re.sub(r"\d+", "#", path.name)
+        names = sorted(p.name for p in path.parent.iterdir() if p.suffix == path.suffix)
+        others = [_quoted(name) for name in names if re.sub(r"\d+", "#", name) != alike]
+        files = " or ".join(others[:4])
+        return [f"    # if the torques are in another file: file = {files}"] if others else []
 
     def _sister_lines(self) -> list[str]:
         sisters = self.reading.sisters
@@ -396,6 +408,7 @@ class _Drafting:
                 *(gear or [example]),
             ]
         if self.current:
+            lines += self._stated_constants()
             constant = f'torque_constant = "{self.blank("drive.torque_constant")}"'
             lines.append(f"{constant}             # N m/A, motor side: from the data sheet")
         return [*lines, ""]
@@ -409,6 +422,12 @@ class _Drafting:
         ratios = f": transmission = [{listed}]" if gear.value else ""
         said = f"the file states '{clean(gear.words.strip(chr(39)), 200)}'"
         return [f"# {said}{ratios}, + where motor and joint turn alike"]
+
+    def _stated_constants(self) -> list[str]:
+        """Return comments with the file's lines about torque constants."""
+        notes = self.reading.table.notes
+        said = [note.strip("# ") for note in notes if _TORQUE_CONSTANT.search(note)][:3]
+        return [f"# the file states '{clean(line, 200)}'" for line in said]
 
     def _missing(self) -> list[str]:
         """Return [missing] with what marks a lost sample: numbers, rows of zeros; or nothing."""
