@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -9,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.recorded_arm import THREE, Arm, Run, simulate
+from benchmarks.recorded_arm import LIFT, THREE, Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
 from pipelines.log.files import open_log
@@ -581,3 +582,76 @@ def test_the_last_noun_tells_a_clock_from_a_counter(name: str, quantity: str) ->
 def test_a_unit_with_its_prefix_is_one_word(name: str, unit: str) -> None:
     """Read as N m, a bench's torques would be a thousand times too large."""
     assert read_name(name).unit == unit
+
+
+def test_numbers_named_by_the_texts_beside_them_are_columns(tmp_path: Path) -> None:
+    """ROS 2's DynamicJointState: interface_names ["position", …] and values of each joint."""
+    moved = simulate(THREE, seed=3)
+    (tmp_path / "arm.urdf").write_text(THREE.urdf())
+    names = ["position", "velocity", "effort"]
+    lines = []
+    for t, *row in zip(moved.t, moved.q, moved.dq, moved.tau, strict=True):
+        held = [{"interface_names": names, "values": list(each)} for each in zip(*row, strict=True)]
+        message = {"time": t, "joint_names": list(THREE.joints), "interface_values": held}
+        lines.append(json.dumps(message))
+    draft = draft_recipe(write(tmp_path, "\n".join(lines), "states.jsonl")).text
+    assert '"interface_values[2].values[position]"], unit = "rad"' in draft
+    assert '"interface_values[2].values[effort]"], unit = "N m"' in draft
+
+
+@pytest.mark.parametrize("further", ["", "J#.6041h"])
+def test_the_number_of_a_signal_beside_that_of_the_joint_tells_signals_apart(
+    tmp_path: Path, further: str
+) -> None:
+    """Objects of CiA 402, 6064h a position, 6077h a torque; also where they are as many as joints."""
+
+    def columns(run: Run) -> dict[str, Array]:
+        more = _block(further, run.temperature) if further else {}
+        return _block("J#.6064h", run.q) | _block("J#.6077h", run.tau) | more
+
+    draft = _arm(tmp_path, columns)
+    assert 'candidate: columns = "J{j}.6064h"' in draft
+    assert 'candidate: columns = "J{j}.6077h"' in draft
+
+
+def test_a_turning_joint_behind_a_sliding_one_has_a_velocity_of_its_own_unit(tmp_path: Path) -> None:
+    moved = simulate(LIFT, seed=3)
+    (tmp_path / "arm.urdf").write_text(LIFT.urdf())
+    columns = {"t [s]": moved.t}
+    for j, (factor, unit) in enumerate([(1e3, "mm"), *[(180 / np.pi, "deg")] * 3]):
+        columns[f"q{j + 1} [{unit}]"] = factor * moved.q[:, j]
+        columns[f"dq{j + 1} [{unit}/s]"] = factor * moved.dq[:, j]
+        columns[f"tau{j + 1} [{'N m' if j else 'N'}]"] = moved.tau[:, j]
+    draft = draft_recipe(write(tmp_path, text(columns))).text
+    assert 'unit = ["mm", "deg", "deg", "deg"]' in draft
+
+
+def test_times_with_their_milliseconds_behind_a_semicolon_are_a_clock(tmp_path: Path) -> None:
+    """Studio 5000 writes 14:02:11;250."""
+    columns = stated(good())
+    seconds = columns.pop("t")
+    times = [f"14:{int(s // 60):02d}:{int(s % 60):02d};{round(s % 1 * 1e3):03d}" for s in seconds]
+    draft = drafted(tmp_path, pd.DataFrame({"Time": times} | columns).to_csv(index=False))
+    assert 'column = "Time"\nunit = "s"' in draft
+
+
+def test_times_that_differ_within_a_sample_are_reported(tmp_path: Path) -> None:
+    """Motors on one bus are polled in turn; the log has one time for all of them."""
+    moved = simulate(THREE, seed=3)
+    times = (moved.t[:, None] + [0.0, 0.0004, 0.0008]).ravel()
+    motor = np.tile([1, 2, 3], moved.t.size)
+    columns = {"time": times, "motor_id": motor, "pos": moved.q.ravel(), "torque": moved.tau.ravel()}
+    assert "'time' differs by 0.0008 among them" in drafted(tmp_path, text(columns))
+
+
+def test_a_stated_torque_constant_is_quoted(tmp_path: Path) -> None:
+    columns = {f"I_{key[-1]} [A]" if "tau" in key else key: v for key, v in good().items()}
+    line = "torque constants Kt [Nm/A]: 0.08, 0.08, 0.05"
+    assert f"# the file states '{line}'" in drafted(tmp_path, f"# {line}\n{text(columns)}")
+
+
+def test_another_file_that_may_hold_the_torques_is_named(tmp_path: Path) -> None:
+    moved = simulate(THREE, seed=3)
+    write(tmp_path, text({"t": moved.t} | _block("force_#", moved.tau)), "forces.csv")
+    draft = drafted(tmp_path, text({"t": moved.t} | _block("q#", moved.q)), "angles_1.csv")
+    assert 'if the torques are in another file: file = "forces.csv"' in draft

@@ -46,7 +46,7 @@ def test_a_line_that_states_no_unit_of_the_joints_leaves_it_open(tmp_path: Path,
 @pytest.mark.parametrize(("line", "rate"), [
     ("Sampling interval : 8 msec", 125.0), ("% fs = 2000 Hz", 2000.0), ("サンプリング周期,8ms", 125.0), ("fps = 30", 30.0),
     ("physics_dt = 0.005", 200.0), ("Abtastrate: 1 kHz", 1000.0), ("Sample Time;0,004;s", 250.0), ("sample_time_ms = 4", 250.0),
-    ("# low-pass filter 20 Hz, logged at 250 Hz", 250.0), ("SampleTime[ms]\t2\t2", 500.0),
+    ("# low-pass filter 20 Hz, logged at 250 Hz", 250.0), ("SampleTime[ms]\t2\t2", 500.0), ('"Sample Period:",10 ms', 100.0),
     ("p.setTimeStep(1./240.)", 240.0), ("dt = 1/50 s", 50.0)])
 def test_a_rate_is_read_from_its_line(line: str, rate: float) -> None:
     found = stated_rate([line])
