@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.fit.joint_table import Array, Indices, Table, by_joint
+from pipelines.fit.joint_table import Array, Indices, Table, by_joint, in_rows
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.regression import Columns
@@ -169,10 +169,7 @@ class Rows:
         its speed: at reversals no friction law is exact, and positions are coarse. The second that
         is returned brings columns over these rows there.
         """
-        flat = np.empty(self.count)
-        for j, own in enumerate(noise):
-            flat[self.joint == j] = own
-        flat = flat / self.weight
+        flat = in_rows(noise, self.joint) / self.weight
         whitening = Whitening.of(self.data, flat[None])
         white = self.data.through(whitening, flat)
         level = NoiseLevel.of(white, self.speed, self.joint, self.data.counts, bins)

@@ -19,7 +19,7 @@ from pipelines.diagnosis.score import chi2_bound
 from pipelines.diagnosis.selection import Cause, Round, Selection
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import in_words
-from pipelines.fit.joint_table import Array
+from pipelines.fit.joint_table import Array, in_rows
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.judgeable import cannot_judge
 from pipelines.model.estimation.negative_viscous import negative_viscous
@@ -137,9 +137,7 @@ def _missing(later: Later, state: State) -> Array:
     rows, config = later.rows, later.config
     if later.dataset.reference is not None:
         return np.zeros(rows.n_joints)
-    left = np.empty(rows.count)
-    for j, own in enumerate(state.residual):
-        left[rows.joint == j] = own
+    left = in_rows(state.residual, rows.joint)
     pairs = Repeated.of(rows.data)
     common, differing = pairs.parts(left)
     bound = fdtri(pairs.count, pairs.count, 1.0 - config.alpha / rows.n_joints)
@@ -170,29 +168,20 @@ def _torque_squared(later: Later) -> Array:
 
 
 def _confused(later: Later, end: State) -> dict[int, str]:
-    """Return {index of the effect: reason} of effects that wandering torque may look like.
+    """Return {index of the effect: reason} of pushes that wandering torque may look like.
 
-    In closed loop the drive answers such a torque a moment later, and so do the motion and its
-    record (Ljung 1999, 13.4): only a load that recurs with the motion, or one that is
-    larger at its moment than chance allows, is distinguished from it.
+    Only one that is larger at its moment than chance allows is distinguished from it.
     """
-    slow, config = _wandering(later), later.config
-    if slow.max() <= config.misfit:
-        return {}
+    slow, config, found = _wandering(later), later.config, {}
     lasting = slow**2 * _torque_squared(later)  # variance of means over a block
     bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
-    found = {}
-    for place, one in enumerate(end.model.effects):
-        told = np.zeros(len(slow), dtype=np.bool_)
+    for place, one in enumerate(end.model.effects if slow.max() > config.misfit else ()):
         if one.log is not None:
             motion = later.rows.data.logs[one.log - later.rows.data.first].motion
             size = np.abs(one.effect.torque(motion, end.model.nominal, one.values)).max(axis=0)
             chance = 2.0 * lasting * config.block / one.values["duration"]  # of a half sine
-            told = np.full(len(slow), np.sum(size**2 / chance) < bound)
-        elif one.effect.acts_on != "load":
-            told = (np.arange(len(slow)) + 1 == one.effect.joint) | (one.effect.joint is None)
-        if (slow * told).max() > config.misfit:
-            found[place] = _wanders(slow * told)
+            if np.sum(size**2 / chance) < bound:
+                found[place] = _wanders(slow)
     return found
 
 

@@ -19,7 +19,7 @@ from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.selection import SearchStart, Selection, select
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.variance import settle
-from pipelines.fit.joint_table import Array, Table
+from pipelines.fit.joint_table import Array, Table, in_rows
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
@@ -87,11 +87,8 @@ def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Arra
     rows, end, prior = rough.later, look.reported, look.later.prior
     whole = end.model.torque(rows.data)
     small = every.later.take(prior.standing).times(end.theta[prior.n_nominal :])
-    standing = np.empty(rows.count)
-    for j, own in enumerate(small):
-        standing[rows.joint == j] = own
     cause = whole - replace(end.model, effects=()).torque(rows.data)
-    return cause, whole + standing / rows.weight
+    return cause, whole + in_rows(small, rows.joint) / rows.weight
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,15 +18,15 @@ from pipelines.diagnosis.candidates import Dictionary, Group, laid
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
+from pipelines.diagnosis.score import chi2_bound
 from pipelines.diagnosis.screening import Screened, price, screen, squares_of
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
-from pipelines.fit.joint_table import Array, Arrow, Indices, Table
+from pipelines.fit.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.exact import Exact, Named
-from pipelines.model.rows.families import first_samples
 
 __all__ = ["Later"]
 
@@ -35,6 +35,7 @@ _FRESH = 3  # numerics: of these, that see anew how effects change what the nomi
 _DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
 _HALF = 0.5  # numerics: of the rows
+_NEAR = 6  # numerics: rows, two periods of the low-pass, within which a loop answers
 _PASS_ON = ("drive", "record")  # they act on the torque of all other effects
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
 
@@ -291,10 +292,30 @@ class Later:
         own = self.rows.data.counts & (self.rows.joint == (effect.joint or 1) - 1)
         return float(np.concatenate(acting)[own].mean()) > _HALF
 
-    def amplitudes_of(self, effect: Effect) -> int:
-        """Return how many amplitudes the effect has, in the form that is refitted."""
-        some = first_samples(self.rows.data)
-        return int(effect.columns(some, self.dataset.arm).shape[2])
+    def answers(self, state: State, explained: float) -> bool:
+        """Return whether the last effect is one of drive or encoder whose slopes follow the noise.
+
+        In closed loop motion and torque answer the noise a moment later, and a lag is not
+        distinguished from that (Ljung 1999, 16.6). What slopes gain on noise of other moments has
+        a χ² distribution where they are independent, but for a share of what is explained. Standing
+        numbers may leave of slopes what is noise alone: it has to hold without these as well.
+        """
+        last, config = state.model.effects[-1], self.config
+        if last.effect.acts_on == "load":
+            return False
+        bound = max(chi2_bound(config.alpha, 2 * _NEAR * last.count), config.relevance * explained)
+        return self._elsewhere(state) > bound and self._elsewhere(self.unchanged(state)) > bound
+
+    def _elsewhere(self, state: State) -> float:
+        """Return what slopes by the last effect's numbers gain on residuals of other moments."""
+        _, names = self.slopes(state.model)
+        own = np.array([which[:2] == (1, len(state.model.effects) - 1) for which in names])
+        columns, rest = (state.effects.take(np.flatnonzero(x)) for x in (own, ~own))
+        left, rows = in_rows(state.residual, self.rows.joint), self.rows
+        each = (rows.data.moved(left, by) for by in range(-_NEAR, _NEAR + 1) if by)
+        moved = [by_joint(x, rows.joint, rows.n_joints) for x in each]
+        others = Table.stacked([state.known.base, rest])
+        return float(gains(columns, others, state.known.beside(rest), moved).sum())
 
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.

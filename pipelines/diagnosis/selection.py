@@ -25,6 +25,7 @@ from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.families import first_samples
 
 __all__ = ["Candidate", "Cause", "Round", "SearchStart", "Selection", "best_law", "refit", "select"]
 
@@ -242,10 +243,10 @@ class _Step:
     def _relevant(self, one: Candidate) -> bool:
         """Return whether a cause, refitted, saves more than the laws found before it are inexact.
 
-        What it saves beyond that has to be above the threshold of chance. A cause whose torque is
-        within that of healthy machines is rejected. A joint where it saves less counts for nothing,
-        and one that it makes worse counts against it. What the standing numbers have taken of it is
-        a part of what it saves.
+        What it saves beyond that has to be above the threshold of chance. A cause within what
+        healthy machines have is rejected, and a lag that follows the noise. A joint where it saves
+        less counts for nothing, and one that it makes worse counts against it. What the standing
+        numbers have taken of it is a part of what it saves.
         """
         later, state, new = self.later, self.state, one.state
         if one.event:
@@ -255,7 +256,8 @@ class _Step:
         both = [
             later.rows.torque(x) for x in (new.model, new.model.without(len(new.model.effects) - 1))
         ]
-        if later.slight([a - b for a, b in zip(*both, strict=True)]):
+        slight = later.slight([a - b for a, b in zip(*both, strict=True)])
+        if slight or later.answers(new, state.cost - new.cost):
             return False
         group = self.significant[one.key].group
         shares = later.shares[later.dictionary.groups.index(group)]
@@ -416,7 +418,7 @@ def _candidate(
     log: int | None = None,
 ) -> Candidate | None:
     """Return the cause refitted; None where its fit fails, which costs that candidate alone."""
-    start = np.zeros(later.amplitudes_of(effect))
+    start = np.zeros(effect.columns(first_samples(later.rows.data), later.dataset.arm).shape[2])
     start[: len(amplitudes)] = amplitudes[: len(start)]
     belief = later.beside(state.belief, effect)
     model = state.model.with_effect(effect, start, log=log)

@@ -256,8 +256,7 @@ def _fitted(later: Later, state: State, names: Sequence[Which]) -> list[int]:
 def covariance(later: Later, state: State) -> Array:
     """Return the covariance of the nominal numbers and those of the effects, in their own units.
 
-    That of white noise of unit variance, P⁻¹, which the residual of plain rows is not; of a number
-    that blocks of time together tell worse,
+    That of white noise of unit variance, P⁻¹; of a number that blocks of time together tell worse,
     by the scores of the blocks, P⁻¹ Σ_b J_b r_b r_bᵀ J_bᵀ P⁻¹ (White 1980; Liang & Zeger 1986).
     Numbers that the rows do not tell have the variance 0.
     """

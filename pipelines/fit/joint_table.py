@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-__all__ = ["Array", "Arrow", "Indices", "Parts", "Structure", "Table", "by_joint"]
+__all__ = ["Array", "Arrow", "Indices", "Parts", "Structure", "Table", "by_joint", "gains", "in_rows"]
 
 _ROUNDING = 1e-13  # numerics: of each number's information: more than sums of 1e5 rows round off
 
@@ -32,6 +32,14 @@ Parts = Sequence[npt.NDArray[np.bool_]]
 def by_joint(x: npt.NDArray[Any], joint: Indices, n_joints: int) -> tuple[npt.NDArray[Any], ...]:
     """Return a signal (…, rows) split into an array (…, rows of the joint) for each joint."""
     return tuple(np.ascontiguousarray(x[..., joint == j]) for j in range(n_joints))
+
+
+def in_rows(each: Sequence[Array], joint: Indices) -> Array:
+    """Return the signal (rows,) that `by_joint` has split."""
+    out = np.empty(len(joint))
+    for j, own in enumerate(each):
+        out[joint == j] = own
+    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -262,3 +270,18 @@ def _backward(factor: Array, b: Array) -> Array:
     from scipy.linalg import solve_triangular
 
     return np.asarray(solve_triangular(factor, b, lower=True, trans="T", check_finite=False))
+
+
+def gains(columns: Table, others: Table, known: Arrow, signals: Sequence[Sequence[Array]]) -> Array:
+    """Return what columns C explain of each signal r beside others B: gᵀ H⁻¹ g (signals,).
+
+    g = C r - C Bᵀ P⁻¹ B r and H = C Cᵀ - C Bᵀ P⁻¹ B Cᵀ (Frisch & Waugh 1933, with a prior).
+
+    Args:
+        known: P, the information of the numbers of B.
+    """
+    cross = others.gram(columns)
+    into = known.solve(cross)
+    inverse = np.linalg.pinv(columns.gram(columns) - cross.T @ into, hermitian=True)
+    moments = np.array([columns.moments(r) - others.moments(r) @ into for r in signals])
+    return np.asarray(np.einsum("si,ij,sj->s", moments, inverse, moments))
