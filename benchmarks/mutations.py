@@ -119,7 +119,7 @@ def read_apart(kind: str, text: bytes) -> Reading:
         with os.fdopen(ours, "rb") as end:
             said = end.read().decode()
         os.waitpid(process, 0)
-        outcome, _, figures = (said or f"internal: killed|{_KILLED}|0").rpartition("\n")
+        outcome, _, figures = (said or f"internal: killed\n{_KILLED} 0").rpartition("\n")
         seconds, megabytes = map(float, figures.split())
         return Reading(kind, outcome, seconds, megabytes, text)
 
