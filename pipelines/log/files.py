@@ -29,7 +29,7 @@ from pipelines.log.structure import conform, refuse_bad_urdf, refuse_unlike_form
 __all__ = ["ENDINGS", "PROVENANCE", "RECORDINGS", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there",
            "open_log", "regular_file", "write_log"]
 
-RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".jsonl")  # what `import` reads; JSON as well, but so are results
+RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".npz", ".jsonl")  # `import` reads JSON too, but so are results
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
@@ -208,7 +208,7 @@ def _listed(folder: Path, path: Path) -> str | None:
         outputs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["outputs"]
         if isinstance(outputs.get(name), str):
             return str(outputs[name])
-    except (OSError, ValueError, KeyError, AttributeError, TypeError):
+    except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError):
         pass  # no manifest, or not one of ours
     try:
         lines = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
@@ -263,25 +263,27 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
 
 
 def nothing_there(where: object, checks: Sequence[Check], folders: Sequence[Path]) -> NothingMatched:
-    """C06, there is no log; and which links were passed over (X11), behind which those that are missed may lie, or which
-    recordings lie there that `import` makes logs of.
+    """C06, there is no log; with what to give instead: links to folders (X11) and results of rrrid, which are passed over unless
+    they are named, or recordings, of which `import` makes logs.
     """
-    links = [str(check.where) for check in checks if check.code == "RRID-X11"]
     passed, remedy = "", "logs end in .h5 or .parquet"
-    if links:
-        passed = f"; {len(links)} link{'s' * (len(links) > 1)} passed over, {'first ' * (len(links) > 1)}{links[0]}"
-        remedy = "give what a link leads to by its own path"
-    elif recorded := next((path for folder in folders for path in _recordings(folder)), None):
+    links = [str(check.where) for check in checks if check.code == "RRID-X11"]
+    results = [str(path.parent) for path in _within(folders, f"*/{PROVENANCE}") if (path.parent / "logs").is_dir()]
+    if over := list(dict.fromkeys([*links, *results])):
+        passed = f"; links and results of rrrid are passed over, here {len(over)}"
+        there = [path for path in over if os.path.isdir(path)]
+        remedy = f"give what is meant by its own path: {' '.join(there[:3])}{' …' * (len(there) > 3)}" if there else remedy
+    elif recorded := next((path for path in _within(folders, "*") if path.suffix.lower() in RECORDINGS), None):
         passed = f", but recordings such as {recorded.name}"
         remedy = f"make logs of them: 'rrrid import --guess {recorded}' drafts the recipe that does"
     return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
 
 
-def _recordings(folder: Path) -> list[Path]:
-    """The recorded files in `folder`, and in the folders in it."""
+def _within(folders: Sequence[Path], pattern: str) -> list[Path]:
+    """The files that match `pattern` in `folders`, and in the folders of the two levels below."""
     with contextlib.suppress(OSError):
-        return [path for pattern in ("*", "*/*") for path in sorted(folder.glob(pattern))
-                if path.suffix.lower() in RECORDINGS and path.is_file()]
+        return [path for folder in folders for above in ("", "*/", "*/*/") for path in sorted(folder.glob(f"{above}{pattern}"))
+                if path.is_file()]
     return []
 
 

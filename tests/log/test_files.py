@@ -208,17 +208,20 @@ def test_nothing_there_is_said(tmp_path: Path) -> None:
         find_logs([tmp_path / "nowhere"])
 
 
-def test_where_nothing_is_but_links_they_are_named(tmp_path: Path) -> None:
-    """X11: two folders of logs, gathered by links, are no empty folder: what was passed over is told, and what to give instead."""
+def test_where_nothing_is_but_links_and_results_they_are_named(tmp_path: Path) -> None:
+    """X11: folders of logs, gathered by links, and results are no empty folder: what was passed over is told, and what to give."""
     (tmp_path / "two").mkdir()
     for name in "ab":
         (tmp_path / "logs" / name).mkdir(parents=True)
         (tmp_path / "two" / name).symlink_to(tmp_path / "logs" / name)
-    with pytest.raises(NothingMatched, match=r"RRID-C06 .*no log there; 2 links passed over, first \S*two/a\. Give what"):
+    with pytest.raises(NothingMatched, match=r"RRID-C06 .*no log there; .* here 2\. Give what .*: \S*two/a \S*two/b\."):
         find_logs([tmp_path / "two"])
     (tmp_path / "two/b").unlink()
-    with pytest.raises(NothingMatched, match=r"1 link passed over, \S*two/a\."):
+    write_log(tmp_path / "two/c/logs/c.h5", small_log())
+    (tmp_path / "two/c/provenance.json").write_text('{"tool": "rrrid"}')
+    with pytest.raises(NothingMatched, match=r"here 2\. .*: \S*two/a \S*two/c\."):
         find_items(tmp_path / "two")
+    assert find_logs([tmp_path / "two/c"])[0]
 
 
 def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
