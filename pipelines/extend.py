@@ -220,7 +220,7 @@ def _other_model(result: Extension, folder: Path) -> tuple[str, ...]:
     try:
         earlier = tuple(place_of(one["cause"], one["joint"])
                         for one in json.loads((folder / "result.json").read_text(encoding="utf-8"))["findings"])
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return ()
     now = (place_of(one.cause, one.joint) for one in result.findings)
     anew = result.model is not None and sorted(earlier) == sorted(now)

@@ -72,7 +72,7 @@ class BatchFolder:
         """What the batch here says of itself; empty where none is."""
         try:
             about = json.loads((self.out / _MARK).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+        except (OSError, ValueError, RecursionError):
             return {}
         return about if isinstance(about, dict) and about.get("tool") == "rrrid" and about.get("command") == "batch" else {}
 

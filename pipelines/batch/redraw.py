@@ -89,7 +89,7 @@ def _tell(folder: Path, drawn: Mapping[str, str]) -> None:
     try:
         about = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
         others = {name: sha for name, sha in about["outputs"].items() if name != "report.html" and not name.startswith("figures/")}
-    except (OSError, ValueError, KeyError, AttributeError):
+    except (OSError, ValueError, KeyError, AttributeError, RecursionError):
         raise InputRejected("F05", "has no provenance.json that says what it is", where=folder, remedy=_AGAIN) from None
     whole = json_text(about | {"outputs": others | dict(drawn)})
     write_file(folder / PROVENANCE, lambda draft: _text(draft, whole))

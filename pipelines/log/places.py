@@ -132,7 +132,7 @@ def provenance_of(folder: Path) -> dict[str, Any]:
     """The provenance.json of rrrid's own output in `folder`; empty where there is none."""
     try:
         about = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (OSError, ValueError, RecursionError):
         return {}
     return about if isinstance(about, dict) and about.get("tool") == "rrrid" else {}
 

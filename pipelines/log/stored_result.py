@@ -71,5 +71,5 @@ def listed_outputs(folder: Path) -> dict[str, str]:
     try:
         outputs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["outputs"]
         return {str(name): str(value) for name, value in outputs.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return {}
