@@ -60,12 +60,12 @@ def local(plan: Plan, key: str, items: Sequence[Item], jobs: int,
 
 
 def _refuse_no_locks(context: ForkServerContext) -> None:
-    """P04: the locks of a pool lie in shared memory, which some containers do not let one write."""
+    """P04: the two locks of a pool lie in shared memory, which some containers do not let one write, or leave no room in."""
     try:
-        context.Lock()
+        _ = context.Lock(), context.Lock()
     except (OSError, ImportError) as problem:
         raise EnvironmentFault("P04", f"no worker can be started, for there is no shared memory: {problem}", where="batch",
-                               remedy="let /dev/shm be writable, or run the stage on each folder without batch") from None
+                               remedy="make room in /dev/shm and let it be writable, or run the stage without batch") from None
 
 
 def _begin(text: str, key: str, tell: Connection) -> None:
