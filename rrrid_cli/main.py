@@ -46,7 +46,7 @@ def entry() -> NoReturn:
         if debug:
             raise
         error = problem.as_error() if isinstance(problem, Interrupted) else as_given(_no_folder(problem), sys.argv[1:])
-        say_error(error, as_json=as_json)
+        _say(error, as_json)
         if isinstance(problem, Interrupted):
             _leave(error.exit_code)
         sys.exit(error.exit_code)
@@ -58,13 +58,13 @@ def entry() -> NoReturn:
         if debug:
             raise
         fault = _no_folder(fault_of(problem, Path("standard output")))
-        say_error(fault, as_json=False)
+        _say(fault, as_json=False)
         _mute()
         sys.exit(fault.exit_code)
     except Exception as problem:
         if debug:
             raise
-        say_error(_internal(problem), as_json=as_json)
+        _say(_internal(problem), as_json)
         sys.exit(70)
     _deaf()
     sys.exit(code)
@@ -81,6 +81,14 @@ def _ended(words: list[str]) -> int:
     return code
 
 
+def _say(error: RrridError, as_json: bool) -> None:
+    """Print the error where that can be written; its exit code tells it in any case."""
+    try:
+        say_error(error, as_json=as_json)
+    except OSError:
+        _mute()
+
+
 def _no_folder(problem: RrridError) -> RrridError:
     """`problem`, or that the working folder is gone, which explains what the machine could not do."""
     try:
@@ -93,8 +101,9 @@ def _no_folder(problem: RrridError) -> RrridError:
 
 
 def _mute() -> None:
-    """Discard what is still to be printed: the reader of the pipe has left."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    """Discard what is still to be printed: the reader of the pipe has left, or the disk is full."""
+    for stream in (sys.stdout, sys.stderr):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _call(words: list[str]) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from pipelines.errors import Check, EnvironmentFault, UsageError, did_you_mean
+from pipelines.errors import Check, EnvironmentFault, UsageError, did_you_mean, escaped
 from rrrid_cli.commands.application import STAGES, app, go
 from rrrid_cli.options import Common, StageCommand, with_common_but
 
@@ -61,7 +61,7 @@ def report(
 
         say_verdict(drawn)
         say_checks(checks)
-        print(f"→ {(out or folder) / 'report.html'}")
+        print(f"→ {escaped((out or folder) / 'report.html')}")
 
 
 @app.command()
