@@ -20,7 +20,7 @@ import numpy as np
 from pipelines.errors import Check, Gathering, InputRejected, UsageError
 from pipelines.log.doctor.checks_subject import many
 from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.files import write_log
+from pipelines.log.files import regular_file, write_log
 from pipelines.log.recording import filenames
 from pipelines.log.recording.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.log.recording.guess import Draft, guess_recipe
@@ -48,6 +48,7 @@ def draft_recipe(path: Path, robot: str | None = None) -> Draft:
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
+    regular_file(path, what="one recording, such as a CSV file")
     return guess_recipe(path, robot, _link_torque)
 
 

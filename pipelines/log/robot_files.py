@@ -86,7 +86,10 @@ def _refuse_recipe(text: str, path: Path) -> None:
     if "kinematics" in table or not {"log", "file", "time", "signals"} & set(table):
         return
     robot = table.get("robot")
-    use = robot.get("use") if isinstance(robot, dict) else None
+    use, tip = (robot.get(key) if isinstance(robot, dict) else None for key in ("use", "tip_link"))
+    if isinstance(use, str):
+        use = str(path.parent / use) if os.path.lexists(path.parent / use) else use
+        use = f"{use}:{tip}" if tip else use
     raise UsageError("C02", "this is a recipe of rrrid import, not a robot description", where=path,
                      remedy=f"give the robot that it names: {use}" if isinstance(use, str)
                      else "give a robot description (TOML), a URDF or a shipped robot")
