@@ -162,14 +162,34 @@ def test_control_characters_of_a_path_are_escaped(logs: Path) -> None:
     """An escape sequence in one's own --out reaches no terminal; the path can still be read."""
     done = rrrid("convert", "logs", "--to", "csv", "--out", "a\x1b[31mb", cwd=logs)
     assert done.returncode == 0
-    assert "\x1b" not in done.stdout + done.stderr
-    assert "a\\x1b[31mb" in done.stdout
+    again = rrrid("report", "a\x1b[31mb", cwd=logs)
+    assert again.returncode == 0
+    for said in (done, again):
+        assert "\x1b" not in said.stdout + said.stderr
+        assert "a\\x1b[31mb" in said.stdout
+
+
+@pytest.mark.parametrize("streams", ["2>/dev/full", ">/dev/full 2>/dev/full"])
+def test_an_error_that_cannot_be_printed_keeps_its_code(streams: str, tmp_path: Path) -> None:
+    """A full disk behind standard error."""
+    assert _shell(f"RRRID inspect nowhere {streams}", tmp_path).returncode == 2
+
+
+def test_json_nested_without_end_beside_a_log_is_no_provenance(logs: Path) -> None:
+    """A provenance.json of 200,000 brackets, in a folder of logs and in one that is given for a result: no exit 70."""
+    (logs / "logs" / "provenance.json").write_text("[" * 200_000)
+    (logs / "logs" / "result.json").write_text("{}")
+    for words, code in ((("convert", "logs/a.h5", "--to", "csv", "--out", "out"), 0), (("report", "logs"), 3),
+                        (("compare", "logs", "logs"), 3), (("convert", "logs/a.h5", "--out", "logs"), 2)):
+        done = rrrid(*words, cwd=logs)
+        assert done.returncode == code, done.stderr
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="mounts are Linux's")
-def test_without_shared_memory_a_batch_says_so(logs: Path) -> None:
+@pytest.mark.parametrize("how", ["ro", "size=4k"])
+def test_without_shared_memory_a_batch_says_so(how: str, logs: Path) -> None:
     """P04, exit 6: the locks of its workers need it."""
-    inside = f"mount -t tmpfs -o ro none /dev/shm && {shlex.join(RRRID)} batch logs --stage convert --jobs 2"
+    inside = f"mount -t tmpfs -o {how} none /dev/shm && {shlex.join(RRRID)} batch logs --stage convert --jobs 2"
     done = subprocess.run(["unshare", "-m", "bash", "-c", inside], capture_output=True, text=True, cwd=logs, check=False,
                           env=os.environ | {"PYTHONPATH": str(REPO)}, timeout=120)
     if "unshare" in done.stderr or "mount" in done.stderr:
@@ -216,11 +236,12 @@ def test_circles_of_links_cost_their_logs_alone(logs: Path) -> None:
 
 def test_recordings_point_to_the_import(tmp_path: Path) -> None:
     """`diagnose FOLDER_OF_CSV`: what drafts the recipe is named, with a file of that folder."""
-    (tmp_path / "rec").mkdir()
-    (tmp_path / "rec" / "run1.csv").write_text("t,q\n0,1\n")
-    done = rrrid("diagnose", "rec", cwd=tmp_path)
-    assert done.returncode == 5
-    assert "rrrid import --guess rec/run1.csv" in done.stderr
+    for place in ("rec/run1.csv", "days/monday/arm/run1.npz"):
+        (tmp_path / place).parent.mkdir(parents=True)
+        (tmp_path / place).write_text("t,q\n0,1\n")
+        done = rrrid("diagnose", place.partition("/")[0], cwd=tmp_path)
+        assert done.returncode == 5
+        assert f"rrrid import --guess {place}" in done.stderr
 
 
 def test_a_short_log_says_by_how_much(tmp_path: Path) -> None:
