@@ -238,3 +238,14 @@ def test_a_fault_of_another_plant_is_no_mistake_of_its_description(
     assert found.direction.vector is not None
     assert found.direction.angle is not None
     assert found.direction.angle < np.radians(3.0)
+
+
+def test_two_seconds_of_seven_joints_do_not_tell_their_order(shared: Path, tmp_path: Path) -> None:
+    """Case 46: another order, whose parameters take up the noise of a torque, is no finding."""
+    case = shared / "cases" / "46-panda-tip-link-remedy"
+    settings = import_log.Settings(recipe=str(case / "r2.toml"), source=case)
+    run_stage(import_log.STAGE, Request((), tmp_path / "logs", no_report=True), settings)
+    found = boundary_of(tmp_path / "logs")
+    assert boundary_findings(found, "panda") == ()
+    assert found.order.columns == (1, 2, 3, 4, 5, 6, 7)
+    assert "not identifiable" in found.order.reason

@@ -302,7 +302,10 @@ class _Estimate:
         gains = np.log(fits.best.variance / variances)
         likelihoods = 0.5 * gains @ moments[np.argmin(np.log(variances).sum(axis=1))]
         top = int(np.argmax(likelihoods))
-        gain = 0.5 * float(gains[top] @ np.minimum(fits.model.effective, moments[top]))
+        least = np.minimum(fits.model.effective, moments[top])
+        rows = fits.model.rows  # moments that the parameters take up are no evidence
+        free = 1.0 - (rows.inertial.shape[2] + n * rows.own.shape[2]) / float(least.sum())
+        gain = 0.5 * max(free, 0.0) * float(gains[top] @ least)
         if gain < -(config.decisive if mistaken else config.alike):
             return same, fits
         near = np.flatnonzero(likelihoods > likelihoods[top] - config.alike)
