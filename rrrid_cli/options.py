@@ -82,7 +82,7 @@ def numbers(texts: list[str] | None, where: str) -> tuple[float, ...] | None:
 def whole_numbers(texts: list[str] | None, where: str) -> tuple[int, ...] | None:
     """The same for whole numbers."""
     found = numbers(texts, where)
-    if found is not None and any(value != int(value) for value in found):
+    if found is not None and any(not value.is_integer() or abs(value) > 1e9 for value in found):
         raise UsageError("C02", f"'{','.join(texts or ())}' is no list of whole numbers", where=where,
                          remedy="write for example 20,20,10")
     return None if found is None else tuple(map(int, found))

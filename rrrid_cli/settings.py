@@ -11,7 +11,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pipelines.errors import UsageError, did_you_mean
+from pipelines.errors import UsageError, clean, did_you_mean
 from pipelines.log.text import read_small_text
 from pipelines.log.toml_text import TomlError, parse_toml
 
@@ -56,6 +56,9 @@ def make_settings(kind: type[S], stage: str, stages: Iterable[str], config: Path
                 {key: _value(owner, key, value, f"{where}, {name}.{key}") for key, value in options.items()})
     own = _said(fallback or {}) | chosen.pop(stage, {})
     for name, value in _said(given).items():
+        if type(value) is int and not _as_kind(int, value)[0]:
+            raise UsageError("C02", "more digits than a whole number has here", where=f"--{name.replace('_', '-')}",
+                             remedy="correct the value")
         of, dot, option = name.rpartition(".")
         (chosen.setdefault(of, {}) if dot else own)[option] = value
     if stage == "run":
@@ -141,8 +144,7 @@ def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
             return converted
     listed = typing.get_origin(options[0]) is tuple
     what = "a list" if listed else _KINDS.get(options[0], f"a {getattr(options[0], '__name__', options[0])}")
-    raise UsageError("C02", f"{value!r} is not {what}", where=where,
-                     remedy="correct the value")
+    raise UsageError("C02", f"{clean(repr(value), 60)} is not {what}", where=where, remedy="correct the value")
 
 
 def _as_kind(kind: Any, value: Any) -> tuple[bool, Any]:
@@ -152,8 +154,10 @@ def _as_kind(kind: Any, value: Any) -> tuple[bool, Any]:
         # Integers have no bound in TOML, floats do.
         fits = isinstance(value, int | float) and -sys.float_info.max <= value <= sys.float_info.max
         return fits, float(value) if fits else value
-    if kind in (int, str):
-        return isinstance(value, kind), value
+    if kind is int:
+        return isinstance(value, int) and abs(value) < 1 << 63, value
+    if kind is str:
+        return isinstance(value, str), value
     if kind is Path:
         return isinstance(value, str), Path(str(value))
     if typing.get_origin(kind) is tuple and isinstance(value, str):

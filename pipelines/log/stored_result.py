@@ -55,15 +55,23 @@ def read_result(path: Path) -> StoredResult:
         raise InputRejected("F05", "sha256 differs from provenance.json: it was changed since it was written", where=file,
                             remedy="run the command again")
     try:
-        object_ = json.loads(read_small_text(file, _LARGEST, what="a result.json"))
+        object_ = json.loads(read_small_text(file, _LARGEST, what="a result.json"), parse_int=_whole_number)
     except (ValueError, RecursionError):
-        raise InputRejected("F02", "not complete JSON", where=file, remedy="run the command again") from None
+        raise InputRejected("F02", "not complete JSON, or with numbers that no float holds", where=file,
+                            remedy="run the command again") from None
     if isinstance(object_, dict) and object_.get("format") == _MODEL:
         return StoredResult(file, "model", object_)
     if not isinstance(object_, dict) or not isinstance(object_.get("command"), str):
         raise InputRejected("S19", "not a result of rrrid", where=file, remedy="name a result.json, or the folder it is in")
     refuse_earlier(object_, file)
     return StoredResult(file, object_["command"], object_)
+
+
+def _whole_number(digits: str) -> int:
+    """Return the number; a longer one is no figure, and overflows where a float is wanted."""
+    if len(digits) > 300:
+        raise ValueError
+    return int(digits)
 
 
 def listed_outputs(folder: Path) -> dict[str, str]:

@@ -6,6 +6,7 @@ import pytest
 
 from pipelines.diagnose import Settings
 from pipelines.errors import UsageError
+from rrrid_cli.options import whole_numbers
 from rrrid_cli.settings import make_settings
 
 
@@ -33,3 +34,15 @@ def test_what_is_no_list_of_texts_is_refused(value: str) -> None:
 def test_what_is_no_number_is_refused_in_words(text: str, words: str) -> None:
     with pytest.raises(UsageError, match=words):
         made(text)
+
+
+def test_a_whole_number_of_hundreds_of_digits_is_refused() -> None:
+    """As an option, in a configuration, and in a list: no arithmetic of floats holds it."""
+    number = int("9" * 400)
+    with pytest.raises(UsageError, match="C02 --max-causes: "):
+        make_settings(Settings, "diagnose", ("diagnose",), None, (), {"max_causes": number})
+    with pytest.raises(UsageError, match="is not a whole number"):
+        made(f"diagnose.max_causes={number}")
+    for text in (str(number), "nan", "1e12"):
+        with pytest.raises(UsageError, match="C02 --harmonics"):
+            whole_numbers([text], "--harmonics")

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.errors import UsageError
+from pipelines.errors import InputRejected, UsageError
 from pipelines.log.compared import label_of, of_other_commands
 from pipelines.log.results import headed
 from pipelines.log.run_results import read_any_result
@@ -90,3 +90,11 @@ def test_what_can_be_compared_instead_is_named(runs: Path) -> None:
     assert "estimate-bps left none there" in str(of_other_commands(read_result(runs / "friday/estimate-bps"), extend))
     model = read_result(runs / "monday/extend/model.json")
     assert "with that of another result" in str(of_other_commands(extend, model))
+
+
+@pytest.mark.parametrize("text", ["9" * 400, "9" * 5000, "[" * 200_000])
+def test_a_result_of_numbers_that_no_float_holds_is_damaged(text: str, tmp_path: Path) -> None:
+    """F02, not an overflow where the number is used."""
+    (tmp_path / "result.json").write_text(f'{{"command": "inspect", "schema_version": 2, "joints": {text}}}')
+    with pytest.raises(InputRejected, match="F02"):
+        read_result(tmp_path)
