@@ -42,6 +42,8 @@ HOSTILE: dict[str, tuple[str, str]] = {
     "60,000 columns of one name": ("csv", ",".join(["q"] * 60_000) + "\n" + f"{_NUMBERS[:300_000]}\n" * 3),
     "one long line in a recording": ("csv", "t,q,tau\n" + "0,1,2\n" * 2000 + f"{_NUMBERS}\n" + "0,1,2\n" * 2000),
     "number of 400,000 digits": ("csv", "t,q\n" + "1" * 400_000 + ",2x\n" + "1,2\n" * 50),
+    "name of 400,000 digits and dashes beside others": ("csv", "t,joint,position,effort" + "2020-01-01" * 40_000 + "\n" + "".join(
+        f"{0.01 * k},joint_{j},{np.sin(0.1 * k + j):.4f},{np.cos(0.07 * k * j):.4f}\n" for k in range(300) for j in range(3))),
     "name of 400,000 digits": ("csv", "a" + "1" * 400_000 + "x\n1\n2\n"),
     "blanks before a unit": ("csv", "a" + " " * 200_000 + "[x" + " " * 200_000 + "\n1\n2\n3\n"),
     "400,000 separators": ("csv", ";" * 400_000 + "\n"),

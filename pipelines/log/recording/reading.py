@@ -105,7 +105,7 @@ class Reading:
         """Return the message that the columns are fields of, which defines units in SI; else ""."""
         columns = (*self.table.columns, *self.table.text, *self.table.labels)
         parts = (part for name in columns for part in re.split("[./]", name))
-        paths = {re.sub(r"[\W\d_]+$", "", part) for part in parts}
+        paths = {(re.match(r"(?s:.*)[^\W\d_]", part) or [""])[0] for part in parts}
         return next((message for message, fields in _MESSAGES if fields <= paths), "")
 
     @property

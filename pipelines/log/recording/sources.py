@@ -69,6 +69,7 @@ _KINDS = (
     (b"\x93NUMPY", "npy"), (b"PAR1", "parquet"), (b"\x89HDF\r\n\x1a\n", "mat73"),
     (b"MATLAB 7.3", "mat73"), (b"MATLAB 5.0", "mat5"),
 )  # fmt: skip
+_LONGEST = 1000  # characters of a column's name
 _PICKLES = (b"\x80\x02", b"\x80\x03", b"\x80\x04", b"\x80\x05")
 
 
@@ -94,7 +95,11 @@ def read_table(path: Path, text: TextFormat | None = None, name: str = "") -> Ra
         raise fault_of(problem, path) from None
     source = name or path.name
     kind = _kind(data, source)
-    table = unstacked(_read(kind, data, path, source, text))
+    table = _read(kind, data, path, source, text)
+    if (longest := max((*table.columns, *table.text, ""), key=len)) and len(longest) > _LONGEST:
+        message = f"the name of a column has {len(longest)} characters, {longest[:40]} …"
+        raise InputRejected("F16", message, where=source, remedy="export the table with a header of short names")
+    table = unstacked(table)
     checks = table.checks
     ending = path.suffix.lower()
     if ending not in _ENDINGS[kind] and _KIND_OF_ENDING.get(ending, "text") != kind:
