@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ import pytest
 
 from benchmarks.hidden_effects.cases import campaign
 from benchmarks.hidden_effects.make import make_cases
-from benchmarks.other_plants.drawn import drawn
+from benchmarks.other_plants.drawn import drawn, pairs
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.files import open_log
 from pipelines.model.estimation.conditioning import wanted_cutoff
@@ -66,6 +67,23 @@ def test_friction_that_grows_with_load_grows_with_friction_as_it_is() -> None:
     assert causes(found) == [("load_friction", 2)]
     assert effects(found)[0].values["mu"] == pytest.approx(0.14077, rel=0.01)
     assert found.look.selection.end.mean_squares.max() < 1.2
+
+
+@pytest.mark.slow
+def test_lags_of_a_noisy_loop_are_no_causes_beside_a_drag() -> None:
+    """With ten times the noise, motion answered it: a delay of 21 ms and a lag of 23 ms had names, and there are none."""
+    case = drawn(41, 62)[-1]
+    found = diagnosed(*replace(case, noise=10.0 * case.noise).logs())
+    assert causes(found) == [("quadratic_drag", 1)]
+    assert effects(found)[0].values["coefficient"] > 0.0
+
+
+@pytest.mark.slow
+def test_friction_beside_a_payload_is_found_at_a_joint_that_the_payload_moves_far_more() -> None:
+    """A payload acts as the rigid body does, exactly: 0.4 % of what it explains at joint 4 is more than the error of its law."""
+    found = diagnosed(*pairs(4, 61)[-1].logs())
+    assert sorted(causes(found), key=str) == [("payload", None), ("position_friction", 4)]
+    assert effects(found)[1].values["order"] == pytest.approx(3.0, rel=0.01)
 
 
 @pytest.mark.slow

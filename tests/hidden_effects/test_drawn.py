@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from benchmarks.other_plants.arms import ARMS
 from benchmarks.other_plants.cases import CASES
-from benchmarks.other_plants.drawn import drawn
+from benchmarks.other_plants.drawn import drawn, pairs
 
 MANY = drawn(200, seed=3)
 
@@ -15,6 +18,26 @@ def test_a_seed_draws_the_same_cases_and_fewer_are_the_first_of_them() -> None:
     assert drawn(200, seed=3) == MANY
     assert drawn(7, seed=3) == MANY[:7]
     assert drawn(7, seed=4) != MANY[:7]
+
+
+def test_pairs_are_two_faults_of_one_arm_that_no_name_covers_both_of() -> None:
+    several = pairs(60, seed=3)
+    assert pairs(7, seed=3) == several[:7]
+    for case in several:
+        first, second = case.faults
+        assert first.arm == second.arm
+        assert not set(first.answers) & set(second.answers)
+        assert "payload" not in (first.fault, second.fault) or "reference" in {role for _, role in case.motions}
+
+
+def test_both_faults_of_a_pair_act() -> None:
+    """Nothing pulls along a table but an offset, which its drive bears; and noise of what is logged late is smoothed away."""
+    plain = next(one for one in drawn(200, seed=3) if one.arm == "table")
+    late = replace(plain, fault="torque_lag", joint=2, size=0.02, beside=None)
+    tau = replace(plain, fault="torque_offset", joint=1, size=8.0, beside=late).logs()[-1].tau
+    assert np.mean(tau[:, 0]) == pytest.approx(-8.0, rel=0.1)
+    rough = np.std(np.diff(tau, axis=0), axis=0) / np.std(tau, axis=0)
+    assert rough[1] < 0.3 * rough[0]
 
 
 def test_no_two_cases_share_the_folder_of_their_logs() -> None:

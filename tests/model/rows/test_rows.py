@@ -34,6 +34,17 @@ def test_rows_are_those_of_a_zero_phase_butterworth(prepared: Prepared) -> None:
     assert np.abs(rows[inside] - expected[inside]).max() < 2e-3 * np.abs(x).max()
 
 
+@pytest.mark.parametrize("by", [-2, 1, 3])
+def test_a_signal_is_moved_by_rows_within_each_log_and_joint(prepared: Prepared, by: int) -> None:
+    data = prepared.data
+    x = 1.0 + np.arange(data.rows, dtype=float)
+    for now, then in zip(data.split(x), data.split(data.moved(x, by)), strict=True):
+        kept, gone = (slice(by, None), slice(None, by)) if by > 0 else (slice(None, by), slice(by, None))
+        there = slice(None, -by) if by > 0 else slice(-by, None)
+        assert np.array_equal(then[:, kept], now[:, there])
+        assert not then[:, gone].any()
+
+
 def test_a_held_command_is_centred(prepared: Prepared) -> None:
     """What a drive gave on average over a sample lies in the middle of it: the modelled torque fits the rows of the command."""
     truth = prepared.data.lay(arm().torque)
