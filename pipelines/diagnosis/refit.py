@@ -296,18 +296,19 @@ class Later:
         """Return whether the last effect is one of drive or encoder whose slopes follow the noise.
 
         In closed loop motion and torque answer the noise a moment later, and a lag is not
-        distinguished from that (Ljung 1999, 16.6). What slopes gain on noise of other moments has
-        a χ² distribution where they are independent, but for a share of what is explained. Standing
-        numbers may leave of slopes what is noise alone: it has to hold without these as well.
+        distinguished from that (Ljung 1999, 16.6). What slopes gain on the noise of another moment
+        has a χ² distribution where they are independent, as far as laws are exact. Standing numbers
+        may leave of slopes what is noise alone: it has to hold without these as well.
         """
-        last, config = state.model.effects[-1], self.config
+        last = state.model.effects[-1]
         if last.effect.acts_on == "load":
             return False
-        bound = max(chi2_bound(config.alpha, 2 * _NEAR * last.count), config.relevance * explained)
+        chance = chi2_bound(self.config.alpha / (2 * _NEAR), last.count)
+        bound = max(chance, self.config.relevance * explained)
         return self._elsewhere(state) > bound and self._elsewhere(self.unchanged(state)) > bound
 
     def _elsewhere(self, state: State) -> float:
-        """Return what slopes by the last effect's numbers gain on residuals of other moments."""
+        """Return the most that slopes by the last effect gain on residuals of other moments."""
         _, names = self.slopes(state.model)
         own = np.array([which[:2] == (1, len(state.model.effects) - 1) for which in names])
         columns, rest = (state.effects.take(np.flatnonzero(x)) for x in (own, ~own))
@@ -315,7 +316,7 @@ class Later:
         each = (rows.data.moved(left, by) for by in range(-_NEAR, _NEAR + 1) if by)
         moved = [by_joint(x, rows.joint, rows.n_joints) for x in each]
         others = Table.stacked([state.known.base, rest])
-        return float(gains(columns, others, state.known.beside(rest), moved).sum())
+        return float(gains(columns, others, state.known.beside(rest), moved).max())
 
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.

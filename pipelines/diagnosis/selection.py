@@ -253,9 +253,8 @@ class _Step:
             return one.gain >= later.config.relevance * (self.start.cost - state.cost)
         if one.key not in self.significant:  # frequency responses name it
             return True
-        both = [
-            later.rows.torque(x) for x in (new.model, new.model.without(len(new.model.effects) - 1))
-        ]
+        models = (new.model, new.model.without(len(new.model.effects) - 1))
+        both = [later.rows.torque(model) for model in models]
         slight = later.slight([a - b for a, b in zip(*both, strict=True)])
         if slight or later.answers(new, state.cost - new.cost):
             return False
