@@ -23,6 +23,7 @@ import numpy.typing as npt
 __all__ = ["Array", "Arrow", "Indices", "Parts", "Structure", "Table", "by_joint", "gains", "in_rows"]
 
 _ROUNDING = 1e-13  # numerics: of each number's information: more than sums of 1e5 rows round off
+_DEPENDENT = 1e-6  # numerics: of what columns have beside others, below which a direction is dependent
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -282,6 +283,6 @@ def gains(columns: Table, others: Table, known: Arrow, signals: Sequence[Sequenc
     """
     cross = others.gram(columns)
     into = known.solve(cross)
-    inverse = np.linalg.pinv(columns.gram(columns) - cross.T @ into, hermitian=True)
+    inverse = np.linalg.pinv(columns.gram(columns) - cross.T @ into, _DEPENDENT, hermitian=True)
     moments = np.array([columns.moments(r) - others.moments(r) @ into for r in signals])
     return np.asarray(np.einsum("si,ij,sj->s", moments, inverse, moments))
