@@ -33,7 +33,7 @@ __all__ = ["Decision", "decide", "limited_by_estimate"]
 class Decision:
     """The verdict, and why."""
 
-    verdict: Verdict  # "cause", "no-fault-found" or "unknown"
+    verdict: Verdict
     reason: str
     causes: tuple[Cause, ...]
 
@@ -68,8 +68,9 @@ def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
             return Decision("unknown", "several causes explain it", causes)
         return Decision("cause", rest, causes)
     fits = max(float(left.max()), end.cost / later.rows.count) < bound
-    if not rest and fits:
-        return Decision("no-fault-found", "", ())
+    doubt = selection.rounds[-1].doubt
+    if fits and not rest:
+        return Decision("cannot-judge" if doubt else "no-fault-found", doubt, ())
     told = (rest or _too_large(left, bound), selection.rounds[-1].stopped)
     return Decision("unknown", "; ".join(one for one in told if one), ())
 

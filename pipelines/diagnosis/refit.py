@@ -35,7 +35,7 @@ _FRESH = 3  # numerics: of these, that see anew how effects change what the nomi
 _DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
 _HALF = 0.5  # numerics: of the rows
-_NEAR = 6  # numerics: rows, two periods of the low-pass, within which a loop answers
+_PERIODS = 2.3  # numerics: of the low-pass, within which a loop answers
 _PASS_ON = ("drive", "record")  # they act on the torque of all other effects
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
 
@@ -292,31 +292,25 @@ class Later:
         own = self.rows.data.counts & (self.rows.joint == (effect.joint or 1) - 1)
         return float(np.concatenate(acting)[own].mean()) > _HALF
 
-    def answers(self, state: State, explained: float) -> bool:
+    def follows_noise(self, state: State, explained: float) -> bool:
         """Return whether the last effect is one of drive or encoder whose slopes follow the noise.
 
         In closed loop motion and torque answer the noise a moment later, and a lag is not
         distinguished from that (Ljung 1999, 16.6). What slopes gain on the noise of another moment
-        has a χ² distribution where they are independent, as far as laws are exact. Standing numbers
-        may leave of slopes what is noise alone: it has to hold without these as well.
+        has a χ² distribution where they are independent, as far as laws are exact.
         """
-        last = state.model.effects[-1]
+        last, rows = state.model.effects[-1], self.rows
         if last.effect.acts_on == "load":
             return False
-        chance = chi2_bound(self.config.alpha / (2 * _NEAR), last.count)
-        bound = max(chance, self.config.relevance * explained)
-        return self._elsewhere(state) > bound and self._elsewhere(self.unchanged(state)) > bound
-
-    def _elsewhere(self, state: State) -> float:
-        """Return the most that slopes by the last effect gain on residuals of other moments."""
-        _, names = self.slopes(state.model)
-        own = np.array([which[:2] == (1, len(state.model.effects) - 1) for which in names])
+        own = np.arange(state.effects.width) >= state.effects.width - last.count
         columns, rest = (state.effects.take(np.flatnonzero(x)) for x in (own, ~own))
-        left, rows = in_rows(state.residual, self.rows.joint), self.rows
-        each = (rows.data.moved(left, by) for by in range(-_NEAR, _NEAR + 1) if by)
-        moved = [by_joint(x, rows.joint, rows.n_joints) for x in each]
+        left, near = in_rows(state.residual, rows.joint), round(_PERIODS * self.config.keep)
+        each = (rows.data.moved(left, by) for by in range(-near, near + 1) if by)
+        moments = [by_joint(x, rows.joint, rows.n_joints) for x in each]
         others = Table.stacked([state.known.base, rest])
-        return float(gains(columns, others, state.known.beside(rest), moved).max())
+        most = gains(columns, others, state.known.beside(rest), moments).max()
+        chance = chi2_bound(self.config.alpha / len(moments), last.count)
+        return bool(most > max(chance, self.config.relevance * explained))
 
     def acting(self, state: State) -> Array:
         """Return the share of each joint (joints,) in the torque of all effects.

@@ -38,6 +38,7 @@ class Candidate:
     gain: float  # of screening
     state: State
     possible: bool  # its numbers are such as it can have
+    noisy: bool = False  # the answer of the loop to noise looks like it
 
     @property
     def numbers(self) -> int:
@@ -75,6 +76,7 @@ class Round:
     stopped: str = ""  # why a significant cause was not selected
     follows: str = ""  # what the rest follows
     moment: str = ""  # an anomaly at one moment that no event explains
+    doubt: str = ""  # a cause that the answer of the loop to noise looks like
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,13 +167,17 @@ class _Step:
         Where none is selected, the round says why, and there is no state.
         """
         later = self.later
-        touch, moment = push_of(
-            later.rows, later.dictionary, later.dataset.arm, self.state.residual, later.config
-        )
-        tried = [one for one in self._refitted(responses, touch) if self._relevant(one)]
+        rows, arm = later.rows, later.dataset.arm
+        touch, moment = push_of(rows, later.dictionary, arm, self.state.residual, later.config)
+        every = [one for one in self._refitted(responses, touch) if self._relevant(one)]
+        noisy = [one for one in every if one.noisy]
+        most = max((one.gain for one in noisy), default=0.0)
+        tried = [one for one in every if not (one.noisy or (one.event and one.gain < most))]
+        said = [f"{in_words(one.key)} may be the answer of the loop to noise" for one in noisy]
         others = self._unnamed(not responses)
         fits = {one.key: one.state.fit for one in tried}
-        seen = Round(self.state.fit, tuple(self.significant.values()), fits, moment=moment)
+        significant, doubt = tuple(self.significant.values()), "; ".join(said)
+        seen = Round(self.state.fit, significant, fits, moment=moment, doubt=doubt)
         if not tried:
             return replace(seen, follows=in_words(next(iter(others))) if others else ""), None
         apart = {shape: self._apart(other) for shape, other in others.items()}
@@ -244,9 +250,9 @@ class _Step:
         """Return whether a cause, refitted, saves more than the laws found before it are inexact.
 
         What it saves beyond that has to be above the threshold of chance. A cause within what
-        healthy machines have is rejected, and a lag that follows the noise. A joint where it saves
-        less counts for nothing, and one that it makes worse counts against it. What the standing
-        numbers have taken of it is a part of what it saves.
+        healthy machines have is rejected. A joint where it saves less counts for nothing, and one
+        that it makes worse counts against it. What the standing numbers have taken of it is a part
+        of what it saves.
         """
         later, state, new = self.later, self.state, one.state
         if one.event:
@@ -255,8 +261,7 @@ class _Step:
             return True
         models = (new.model, new.model.without(len(new.model.effects) - 1))
         both = [later.rows.torque(model) for model in models]
-        slight = later.slight([a - b for a, b in zip(*both, strict=True)])
-        if slight or later.answers(new, state.cost - new.cost):
+        if later.slight([a - b for a, b in zip(*both, strict=True)]):
             return False
         group = self.significant[one.key].group
         shares = later.shares[later.dictionary.groups.index(group)]
@@ -424,12 +429,13 @@ def _candidate(
     try:
         others = _plainer(model) if later.dataset.reference is None else ()
         fits = [later.fit(one, state.theta, belief) for one in (model, *others)]
+        fitted = min(fits, key=lambda one: one.cost)
+        explained = state.cost - fitted.cost
+        possible = later.possible(fitted, explained) and bool(np.isfinite(fitted.losses).all())
+        noisy = possible and later.follows_noise(fitted, explained)
     except np.linalg.LinAlgError:
         return None
-    fitted = min(fits, key=lambda one: one.cost)
-    possible = later.possible(fitted, state.cost - fitted.cost)
-    possible = possible and bool(np.isfinite(fitted.losses).all())
-    return Candidate((effect.name, effect.joint), gain, fitted, possible)
+    return Candidate((effect.name, effect.joint), gain, fitted, possible, noisy)
 
 
 def _plainer(model: Exact) -> tuple[Exact, ...]:
@@ -453,7 +459,7 @@ def best_law(later: Later, state: State, chosen: Candidate) -> Candidate:
     if one.log is None:
         for form in one.effect.forms()[1:]:
             other = _candidate(later, state, form, np.array(one.amplitudes), chosen.gain)
-            if other is not None and other.possible:
+            if other is not None and other.possible and not other.noisy:
                 every.append(other)
     return min(every, key=lambda one: float(one.scores(later).sum())) if every[1:] else chosen
 

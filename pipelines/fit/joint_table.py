@@ -23,7 +23,7 @@ import numpy.typing as npt
 __all__ = ["Array", "Arrow", "Indices", "Parts", "Structure", "Table", "by_joint", "gains", "in_rows"]
 
 _ROUNDING = 1e-13  # numerics: of each number's information: more than sums of 1e5 rows round off
-_DEPENDENT = 1e-6  # numerics: of what columns have beside others, below which a direction is dependent
+_DEPENDENT = 1e-6  # numerics: squared length, of columns of unit length, that others leave
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -279,10 +279,12 @@ def gains(columns: Table, others: Table, known: Arrow, signals: Sequence[Sequenc
     g = C r - C Bᵀ P⁻¹ B r and H = C Cᵀ - C Bᵀ P⁻¹ B Cᵀ (Frisch & Waugh 1933, with a prior).
 
     Args:
+        columns: of unit length; directions that others explain gain nothing.
         known: P, the information of the numbers of B.
     """
     cross = others.gram(columns)
     into = known.solve(cross)
-    inverse = np.linalg.pinv(columns.gram(columns) - cross.T @ into, _DEPENDENT, hermitian=True)
+    values, vectors = np.linalg.eigh(columns.gram(columns) - cross.T @ into)
+    seen = values > _DEPENDENT
     moments = np.array([columns.moments(r) - others.moments(r) @ into for r in signals])
-    return np.asarray(np.einsum("si,ij,sj->s", moments, inverse, moments))
+    return np.asarray(((moments @ vectors[:, seen]) ** 2 / values[seen]).sum(axis=1))

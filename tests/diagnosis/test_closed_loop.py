@@ -79,6 +79,15 @@ def test_lags_of_a_noisy_loop_are_no_causes_beside_a_drag() -> None:
 
 
 @pytest.mark.slow
+def test_a_lag_that_the_noise_of_a_loop_makes_too_is_neither_named_nor_denied() -> None:
+    """The drive is 4.4 ms late; fits made 5 ms of it with a second lag beside it."""
+    case = next(one for one in drawn(60, 1) if one.name == "table-torque_lag-1007")
+    found = diagnosed(*replace(case, noise=10.0 * case.noise).logs())
+    assert found.decision.verdict == "cannot-judge"
+    assert "torque_lag:1 may be the answer of the loop to noise" in found.decision.reason
+
+
+@pytest.mark.slow
 def test_friction_beside_a_payload_is_found_at_a_joint_that_the_payload_moves_far_more() -> None:
     """A payload acts as the rigid body does, exactly: 0.4 % of what it explains at joint 4 is more than the error of its law."""
     found = diagnosed(*pairs(4, 61)[-1].logs())

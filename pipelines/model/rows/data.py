@@ -348,7 +348,7 @@ class Data:
         """Return `x` (rows,) of the row that is `by` rows earlier in the same log and joint, 0 where there is none."""
         place = self.log_of * self.n_joints + self.joint
         before = np.roll(np.arange(len(x)), by)
-        return np.where((place == place[before]) & (np.abs(before - np.arange(len(x))) == abs(by)), x[before], 0.0)
+        return np.where((place == place[before]) & (np.arange(len(x)) - before == by), x[before], 0.0)
 
     def split(self, x: Array) -> Iterator[Array]:
         """(rows,) -> (joints, rows) of each log."""
