@@ -325,25 +325,27 @@ def _array(value: Any) -> Array | None:
         return None
 
 
-def _cells(frame: Any, root: str = "", depth: int = _DEEPEST) -> Iterator[tuple[str, str, Any]]:
+def _cells(frame: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
     """Yield (path, group, value) of every number and text of a frame.
 
-    The only numbers of an object in a list go by the texts beside them, as many and all different:
-    values[effort] of ROS 2's DynamicJointState.
+    Lists within an object of a list are left out, unless a list of texts, as long and without
+    duplicates, names their numbers: values[effort] of ROS 2's DynamicJointState.
     """
-    for path, value in _named(frame, root, depth):
+    for path, value in _named(frame, "", _DEEPEST):
         if not isinstance(value, list):
             yield path, path, value
             continue
         for k, item in enumerate(value):
-            if isinstance(item, dict) and depth > 0:
-                yield from _cells(_by_names(item), f"{path}[{k}]", depth - 1)
-            elif not isinstance(item, dict | list):
+            if isinstance(item, dict):
+                for inner, cell in _named(_by_names(item), f"{path}[{k}]", _DEEPEST):
+                    if not isinstance(cell, list):
+                        yield inner, inner, cell
+            elif not isinstance(item, list):
                 yield f"{path}[{k}]", path, item
 
 
 def _by_names(item: dict[str, Any]) -> dict[str, Any]:
-    """Return an object with a key for each number that a text beside it names; else as it is."""
+    """Return an object with a key for each number that its list of texts names; else as it is."""
     lists = {key: value for key, value in item.items() if isinstance(value, list)}
     texts = [v for v in lists.values() if v and all(isinstance(x, str) for x in v)]
     if len(lists) != 2 or len(texts) != 1 or len(set(texts[0])) != len(texts[0]):

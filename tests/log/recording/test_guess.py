@@ -655,3 +655,14 @@ def test_another_file_that_may_hold_the_torques_is_named(tmp_path: Path) -> None
     write(tmp_path, text({"t": moved.t} | _block("force_#", moved.tau)), "forces.csv")
     draft = drafted(tmp_path, text({"t": moved.t} | _block("q#", moved.q)), "angles_1.csv")
     assert 'if the torques are in another file: file = "forces.csv"' in draft
+
+
+def test_lists_within_objects_of_a_list_are_no_columns(tmp_path: Path) -> None:
+    """A laser scan of 2400 ranges in every frame does not hide the joints."""
+    scan = [{"ranges": [1.0] * 60} for _ in range(40)]
+    moved = simulate(THREE, seed=3)
+    rows = zip(moved.t[:300].tolist(), moved.q[:300].tolist(), moved.tau[:300].tolist(), strict=True)
+    frames = [{"t": t, "q": q, "tau": tau, "points": scan} for t, q, tau in rows]
+    draft = drafted(tmp_path, json.dumps(frames), "run.json")
+    assert 'columns = ["q[0]", "q[1]", "q[2]"]' in draft
+    assert "ranges" not in draft
