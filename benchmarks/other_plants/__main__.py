@@ -12,6 +12,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import shutil
 import tempfile
 import time
@@ -39,6 +40,8 @@ _USUAL = 48
 def main() -> None:
     parser = _parser()
     arguments = parser.parse_args()
+    if arguments.pairs and arguments.drawn is None:
+        parser.error("--pairs needs --drawn")
     draw = pairs if arguments.pairs else drawn
     cases = CASES if arguments.drawn is None else draw(arguments.count or _USUAL, arguments.drawn)
     cases = tuple(replace(case, noise=arguments.noise * case.noise) for case in cases)
@@ -51,6 +54,8 @@ def main() -> None:
     chosen = chosen[which - 1::parts]
     with tempfile.TemporaryDirectory() as place:
         home = arguments.keep or Path(place)
+        if arguments.noise != 1.0:
+            home /= f"noise-{arguments.noise!r}"
         outcomes = [_one(case, home / case.name) for case in chosen]
     print("; ".join(f"{outcomes.count(one)} {one}" for one in sorted(set(outcomes))))
     if "crashed" in outcomes:
@@ -64,7 +69,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--drawn", type=_seed, metavar="SEED",
                         help=f"cases drawn at random, {_USUAL} where no --count says how many")
     parser.add_argument("--pairs", action="store_true", help="those that are drawn have two faults each")
-    parser.add_argument("--noise", type=float, default=1.0, help="times the noise of the drives")
+    parser.add_argument("--noise", type=_factor, default=1.0, help="times the noise of the drives")
     parser.add_argument("--part", default="1/1", help="1/2, 2/2, …: every second of them")
     parser.add_argument("--keep", type=Path, help="where logs stay")
     return parser
@@ -75,6 +80,12 @@ def _seed(text: str) -> int:
     if (number := int(text)) < 1:
         raise argparse.ArgumentTypeError("seeds begin at 1")
     return number
+
+
+def _factor(text: str) -> float:
+    if not (math.isfinite(factor := float(text)) and factor > 0.0):
+        raise argparse.ArgumentTypeError("not a finite number above 0")
+    return factor
 
 
 def _one(case: Case, folder: Path) -> str:
