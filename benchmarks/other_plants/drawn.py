@@ -40,7 +40,7 @@ def drawn(count: int, seed: int) -> tuple[Case, ...]:
 
 
 def pairs(count: int, seed: int) -> tuple[Case, ...]:
-    """`count` cases with two faults, neither of which may be told by the other's name at its joint."""
+    """`count` cases with two faults that share no right answer."""
     rng = np.random.default_rng([20040602, seed])
     return tuple(replace(_pair(rng), number_in_name=1000 * seed + k) for k in range(1, count + 1))
 

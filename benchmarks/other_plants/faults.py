@@ -1,4 +1,4 @@
-"""What a fault does to the arm it is in: to the loads, to what the drives make of a command, to what encoders and log say.
+"""Apply a fault to an arm: to its loads, its drives, its encoders and its log.
 
     acting = Acting(Fault("cogging", 1, 0.4, 14.3), law, sample_time, rng)
     made = acting.driven(command)               once a sample
@@ -30,7 +30,7 @@ _PHASE = 0.7  # [rad] of whatever goes with an angle
 
 @dataclass(frozen=True)
 class Fault:
-    """What is wrong, at one joint (from 0) or none; `size` in the unit of its kind."""
+    """A fault at one joint (from 0) or none; `size` in the unit of its kind."""
 
     kind: str
     joint: int = 0
@@ -53,11 +53,10 @@ class Now:
 
 
 class Acting:
-    """A fault during one run, with what it remembers. Without one, nothing."""
+    """A fault during one run, with its state."""
 
-    def __init__(self, fault: Fault | None, law: Friction, sample_time: float, rng: np.random.Generator) -> None:
-        self.kind, self.j, self.size, self.number = ("", 0, 0.0, 0.0) if fault is None else (
-            fault.kind, fault.joint, fault.size, fault.number)
+    def __init__(self, fault: Fault, law: Friction, sample_time: float, rng: np.random.Generator) -> None:
+        self.kind, self.j, self.size, self.number = fault.kind, fault.joint, fault.size, fault.number
         self._law, self._lasting, self._rng = law, sample_time, rng
         self._heat, self._hop = 0.0, 1.0
         late = round(self.size / sample_time) if self.kind in ("torque_delay", "time_delay") else 0
@@ -65,7 +64,7 @@ class Acting:
         self._made: Array | None = None
 
     def driven(self, command: Array) -> Array:
-        """What the drives make of the command."""
+        """Return the torques of the drives under the command."""
         made, j = command.copy(), self.j
         if self.kind == "torque_delay":
             self._late.append(made)
@@ -83,7 +82,7 @@ class Acting:
         return made
 
     def load(self, now: Now) -> Array:
-        """(joints,) [N m] that acts beside friction, in the direction of motion."""
+        """Return the load (joints,) [N m] in addition to friction, in the direction of motion."""
         out, j = np.zeros_like(now.q), self.j
         q, v, size = now.q[j], now.v[j], self.size
         if self.kind == "asymmetric_friction":
@@ -113,7 +112,7 @@ class Acting:
         return out
 
     def after(self, applied: Array, v: Array) -> None:
-        """A sample has gone by."""
+        """Update the state at the end of a sample."""
         if self.kind == "heat from another joint":
             other = int(self.number)
             self._heat += self._lasting / _HEATING * (abs(applied[other] * v[other]) / self.size - self._heat)
@@ -121,7 +120,7 @@ class Acting:
             self._hop = -self._hop
 
     def seen(self, q: Array) -> Array:
-        """What the encoders see of q, before they count it."""
+        """Return the positions at the encoders, before quantisation."""
         out, j = q.copy(), self.j
         if self.kind == "encoder_eccentricity":
             out[j] += self.size * np.sin(q[j] + self.number)
@@ -133,7 +132,7 @@ class Acting:
         return out
 
     def logged(self, commands: Array) -> Array:
-        """What the log holds of the commands (samples, joints)."""
+        """Return the commands (samples, joints) as logged."""
         if self.kind != "torque_lag":
             return commands
         out, kept = commands.copy(), np.exp(-self._lasting / self.size)
@@ -143,36 +142,36 @@ class Acting:
 
 
 class Several:
-    """All faults of an arm during one run, each after the one before it."""
+    """All faults of an arm during one run, applied in order."""
 
     def __init__(self, faults: tuple[Fault, ...], law: Friction, sample_time: float, rng: np.random.Generator) -> None:
         self._all = [Acting(fault, law, sample_time, rng) for fault in faults]
 
     def driven(self, command: Array) -> Array:
-        """What the drives make of the command."""
+        """Return the torques of the drives under the command."""
         made = command
         for one in self._all:
             made = one.driven(made)
         return made
 
     def load(self, now: Now) -> Array:
-        """(joints,) [N m] that acts beside friction, in the direction of motion."""
+        """Return the load (joints,) [N m] in addition to friction, in the direction of motion."""
         return sum((one.load(now) for one in self._all), np.zeros_like(now.q))
 
     def after(self, applied: Array, v: Array) -> None:
-        """A sample has gone by."""
+        """Update the state at the end of a sample."""
         for one in self._all:
             one.after(applied, v)
 
     def seen(self, q: Array) -> Array:
-        """What the encoders see of q, before they count it."""
+        """Return the positions at the encoders, before quantisation."""
         out = q
         for one in self._all:
             out = one.seen(out)
         return out
 
     def logged(self, commands: Array) -> Array:
-        """What the log holds of the commands (samples, joints)."""
+        """Return the commands (samples, joints) as logged."""
         out = commands
         for one in self._all:
             out = one.logged(out)

@@ -1,4 +1,4 @@
-"""What moves: MuJoCo's bodies under a held torque, with friction, drive, encoder and faults in plain numpy.
+"""Simulate MuJoCo's bodies under a held torque, with friction, drive, encoder and faults in plain numpy.
 
     plant = Plant(arm, Friction("lugre", …), (Fault("cogging", 1, 0.4),), noise, …)
     q, tau = plant.run(loop, motion, sample_time, rng)     (samples, joints) what a log holds
