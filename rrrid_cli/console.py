@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pipelines.report.report import Report, Table
     from pipelines.stage import Outcome
 
-__all__ = ["Teller", "say_checks", "say_error", "say_outcome", "say_table", "say_verdict"]
+__all__ = ["Teller", "say_checks", "say_error", "say_error_object", "say_outcome", "say_table", "say_verdict"]
 
 _SIGNS = {"ok": "·", "warn": "!", "repair": "~", "reject": "x"}
 _MOST = 12  # remarks
@@ -200,15 +200,18 @@ def _likewise(group: Sequence[Check]) -> str:
     return f"alike {len(group)} times in all{where}" + (f"; joints {', '.join(map(str, joints))}" if len(joints) > 1 else "")
 
 
-def say_error(problem: RrridError, *, as_json: bool) -> None:
-    """One line on standard error for each error; with --json the same as an object on standard output."""
+def say_error(problem: RrridError) -> None:
+    """Print one line on standard error for each error."""
     print(f"rrrid: {problem}", file=sys.stderr)
     for other in problem.others[:_OTHERS]:
         print(f"rrrid: {other}", file=sys.stderr)
     if (more := len(problem.others) - _OTHERS) > 0:
         print(f"rrrid: and {more} more", file=sys.stderr)
-    if as_json:
-        from pipelines.log.results import json_text
 
-        others = {"others": [other.as_dict() for other in problem.others]} if problem.others else {}
-        sys.stdout.write(json_text({"error": problem.as_dict(), "exit": problem.exit_code, **others}))
+
+def say_error_object(problem: RrridError) -> None:
+    """Print the error as a JSON object on standard output."""
+    from pipelines.log.results import json_text
+
+    others = {"others": [other.as_dict() for other in problem.others]} if problem.others else {}
+    sys.stdout.write(json_text({"error": problem.as_dict(), "exit": problem.exit_code, **others}))

@@ -10,7 +10,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO
 
 import typer
 
@@ -18,7 +18,7 @@ from pipelines.batch.process import economise
 from pipelines.errors import EnvironmentFault, Interrupted, RrridError
 from pipelines.log.atomic import fault_of
 from rrrid_cli.commands import app
-from rrrid_cli.console import say_error
+from rrrid_cli.console import say_error, say_error_object
 from rrrid_cli.streams import prepare_streams
 from rrrid_cli.usage import WrongUsage, as_error, as_given
 
@@ -82,11 +82,17 @@ def _ended(words: list[str]) -> int:
 
 
 def _say(error: RrridError, as_json: bool) -> None:
-    """Print the error where that can be written; its exit code tells it in any case."""
+    """Print the error on each stream that takes it; the exit code reports it in any case."""
     try:
-        say_error(error, as_json=as_json)
+        say_error(error)
     except OSError:
-        _mute()
+        _mute(sys.stderr)
+    try:
+        if as_json:
+            say_error_object(error)
+        sys.stdout.flush()
+    except OSError:
+        _mute(sys.stdout)
 
 
 def _no_folder(problem: RrridError) -> RrridError:
@@ -100,9 +106,9 @@ def _no_folder(problem: RrridError) -> RrridError:
     return problem
 
 
-def _mute() -> None:
-    """Discard what is still to be printed: the reader of the pipe has left, or the disk is full."""
-    for stream in (sys.stdout, sys.stderr):
+def _mute(*streams: TextIO) -> None:
+    """Discard further output on these streams, or both: the reader of the pipe has left, or the disk is full."""
+    for stream in streams or (sys.stdout, sys.stderr):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 

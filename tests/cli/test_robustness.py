@@ -177,6 +177,14 @@ def test_an_error_that_cannot_be_printed_keeps_its_code(streams: str, tmp_path: 
     assert _shell(f"RRRID inspect nowhere {streams}", tmp_path).returncode == 2
 
 
+def test_a_full_standard_error_leaves_the_error_object(tmp_path: Path) -> None:
+    done = _shell("RRRID inspect nowhere --json 2>/dev/full", tmp_path)
+    assert done.returncode == json.loads(done.stdout)["exit"] == 2
+    done = _shell("RRRID inspect nowhere --json >/dev/full", tmp_path)
+    assert done.returncode == 2
+    assert b"nowhere" in done.stderr
+
+
 def test_json_nested_without_end_beside_a_log_is_no_provenance(logs: Path) -> None:
     """A provenance.json of 200,000 brackets, in a folder of logs and in one that is given for a result: no exit 70."""
     (logs / "logs" / "provenance.json").write_text("[" * 200_000)
