@@ -339,7 +339,7 @@ def tables_beside(path: Path, table: RawTable, by_name: bool) -> Iterator[RawTab
     kind, stem = of_torques(path), re.sub(r"\d+", "#", path.stem)
     found = [
         other
-        for other in sorted(path.parent.iterdir())[:200]
+        for other in sorted(path.parent.glob("*"))[:200]
         if other.suffix.lower() == path.suffix.lower()
         and re.sub(r"\d+", "#", other.stem) != stem
         and other.is_file()

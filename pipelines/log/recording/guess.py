@@ -7,6 +7,7 @@ names nor numbers decide is marked FILL IN, with the candidates; what is likely 
 
 from __future__ import annotations
 
+import glob
 import json
 import math
 import re
@@ -374,10 +375,11 @@ class _Drafting:
         return f", file = {_quoted(table.source)}" if table is not self.reading.table else ""
 
     def _other_files(self) -> list[str]:
-        """Return a comment with the files beside this one that no number alone tells apart."""
+        """Return a comment with files of this folder whose names differ in more than numbers."""
         path = self.reading.path
         alike = re.sub(r"\d+", "#", path.name)
-        names = sorted(p.name for p in path.parent.iterdir() if p.suffix == path.suffix)
+        near = sorted(path.parent.glob(f"*{glob.escape(path.suffix)}"))[:200]
+        names = [p.name for p in near if p.suffix == path.suffix and p.name[0] != "." and p.is_file()]
         others = [_quoted(name) for name in names if re.sub(r"\d+", "#", name) != alike]
         files = " or ".join(others[:4])
         return [f"    # if the torques are in another file: file = {files}"] if others else []

@@ -348,7 +348,7 @@ def _by_key(table: RawTable, key: str, words: tuple[str, ...]) -> RawTable:
     for name in (name for name in groups if read_name(name).quantity == "time"):
         times = np.column_stack([columns[member] for member in groups[name]])
         apart = np.median(np.nan_to_num(abs(times - times[:, :1])), axis=0).max()
-        message += f"; '{clean(name, 40)}' differs by {apart:.3g} among them, the log has one time"
+        message += f"; '{clean(name, 40)}' differs by {apart:.3g} in its own unit among them, the log has one time"
     remedy = "export one row a sample"
     check = Check.of("S11", "warn", message, where=table.source, remedy=remedy)
     units = {name: unit for name, unit in table.units.items() if name in columns}

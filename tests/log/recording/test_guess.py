@@ -641,7 +641,7 @@ def test_times_that_differ_within_a_sample_are_reported(tmp_path: Path) -> None:
     times = (moved.t[:, None] + [0.0, 0.0004, 0.0008]).ravel()
     motor = np.tile([1, 2, 3], moved.t.size)
     columns = {"time": times, "motor_id": motor, "pos": moved.q.ravel(), "torque": moved.tau.ravel()}
-    assert "'time' differs by 0.0008 among them" in drafted(tmp_path, text(columns))
+    assert "'time' differs by 0.0008 in its own unit among them" in drafted(tmp_path, text(columns))
 
 
 def test_a_stated_torque_constant_is_quoted(tmp_path: Path) -> None:
@@ -652,9 +652,11 @@ def test_a_stated_torque_constant_is_quoted(tmp_path: Path) -> None:
 
 def test_another_file_that_may_hold_the_torques_is_named(tmp_path: Path) -> None:
     moved = simulate(THREE, seed=3)
-    write(tmp_path, text({"t": moved.t} | _block("force_#", moved.tau)), "forces.csv")
+    for name in (".hidden.csv", "forces.csv"):
+        write(tmp_path, text({"t": moved.t} | _block("force_#", moved.tau)), name)
+    (tmp_path / "folder.csv").mkdir()
     draft = drafted(tmp_path, text({"t": moved.t} | _block("q#", moved.q)), "angles_1.csv")
-    assert 'if the torques are in another file: file = "forces.csv"' in draft
+    assert 'if the torques are in another file: file = "forces.csv"\n' in draft
 
 
 def test_lists_within_objects_of_a_list_are_no_columns(tmp_path: Path) -> None:
