@@ -13,6 +13,7 @@ import glob
 import hashlib
 import json
 import os
+import shlex
 import stat
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -268,22 +269,23 @@ def nothing_there(where: object, checks: Sequence[Check], folders: Sequence[Path
     """
     passed, remedy = "", "logs end in .h5 or .parquet"
     links = [str(check.where) for check in checks if check.code == "RRID-X11"]
-    results = [str(path.parent) for path in _within(folders, f"*/{PROVENANCE}") if (path.parent / "logs").is_dir()]
+    own = [path.parent for path in _within(folders, PROVENANCE) if path.parent not in folders]
+    results = [str(folder) for folder in own if (folder / "logs").is_dir()]
     if over := list(dict.fromkeys([*links, *results])):
         passed = f"; links and results of rrrid are passed over, here {len(over)}"
         there = [path for path in over if os.path.isdir(path)]
-        remedy = f"give what is meant by its own path: {' '.join(there[:3])}{' …' * (len(there) > 3)}" if there else remedy
+        remedy = f"give what is meant by its own path: {shlex.join(there[:3])}{' …' * (len(there) > 3)}" if there else remedy
     elif recorded := next((path for path in _within(folders, "*") if path.suffix.lower() in RECORDINGS), None):
         passed = f", but recordings such as {recorded.name}"
-        remedy = f"make logs of them: 'rrrid import --guess {recorded}' drafts the recipe that does"
+        remedy = f"make logs of them; this drafts the recipe: rrrid import --guess {shlex.quote(str(recorded))}"
     return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
 
 
 def _within(folders: Sequence[Path], pattern: str) -> list[Path]:
-    """The files that match `pattern` in `folders`, and in the folders of the two levels below."""
+    """Return the files that match `pattern` in `folders` and two levels below, without hidden ones."""
     with contextlib.suppress(OSError):
         return [path for folder in folders for above in ("", "*/", "*/*/") for path in sorted(folder.glob(f"{above}{pattern}"))
-                if path.is_file()]
+                if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)]
     return []
 
 

@@ -209,7 +209,7 @@ def test_nothing_there_is_said(tmp_path: Path) -> None:
 
 
 def test_where_nothing_is_but_links_and_results_they_are_named(tmp_path: Path) -> None:
-    """X11: folders of logs, gathered by links, and results are no empty folder: what was passed over is told, and what to give."""
+    """X11: a folder of links to logs, or of results, is not empty: the error names what was passed over, and what to give."""
     (tmp_path / "two").mkdir()
     for name in "ab":
         (tmp_path / "logs" / name).mkdir(parents=True)
@@ -222,6 +222,23 @@ def test_where_nothing_is_but_links_and_results_they_are_named(tmp_path: Path) -
     with pytest.raises(NothingMatched, match=r"here 2\. .*: \S*two/a \S*two/c\."):
         find_items(tmp_path / "two")
     assert find_logs([tmp_path / "two/c"])[0]
+
+
+def test_recordings_and_results_are_sought_two_levels_below(tmp_path: Path) -> None:
+    """Not farther, nor in hidden folders; a path with a blank is quoted."""
+    for place in ("x/y/z/r", ".hidden/r"):
+        (tmp_path / place / "logs").mkdir(parents=True)
+        (tmp_path / place / "provenance.json").write_text('{"tool": "rrrid"}')
+        (tmp_path / place / "run.csv").write_text("t,q")
+    with pytest.raises(NothingMatched, match=r"no log there\. Logs end"):
+        find_logs([tmp_path])
+    (tmp_path / "x/run 1.csv").write_text("t,q")
+    with pytest.raises(NothingMatched, match=r"import --guess '\S*x/run 1\.csv'"):
+        find_logs([tmp_path])
+    (tmp_path / "a result/logs").mkdir(parents=True)
+    (tmp_path / "a result/provenance.json").write_text('{"tool": "rrrid"}')
+    with pytest.raises(NothingMatched, match=r"here 1\. .*: '\S*a result'"):
+        find_logs([tmp_path])
 
 
 def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
