@@ -122,7 +122,7 @@ def test_the_remedy_for_a_branching_arm_works_where_it_is_given(shared: Path, tm
 
 
 def test_a_recipe_given_as_robot_is_recognised(shared: Path) -> None:
-    """A recipe is named as one, and the robot in it is the remedy: it is read as it is written there."""
+    """The error says that the file is a recipe, and its remedy is the robot in it, in a form that can be read."""
     with pytest.raises(UsageError, match=r"recipe of rrrid import.*: \S*arm\.urdf:panda_hand\.") as refused:
         load_robot(shared / "cases" / "46-panda-tip-link-remedy" / "r2.toml")
     assert load_robot(refused.value.remedy.rpartition(" ")[2]).n_joints == 7
