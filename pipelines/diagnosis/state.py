@@ -37,9 +37,7 @@ class State:
     known: Belief  # the same, with the slopes by nominal numbers as drives and drift make them
     residual: tuple[Array, ...]  # of each joint, in units of the noise
     effects: Table  # slopes by the numbers of the effects, of unit length
-    lasting: (
-        Indices  # of these, numbers that hold for all time; those of an event hold for its moment
-    )
+    lasting: Indices  # of these, numbers that hold for all time, not for the moment of an event
     read_off: float = 0.0  # price of rows that effects take from the log itself
 
     @property
