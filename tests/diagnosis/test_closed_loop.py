@@ -115,7 +115,7 @@ def test_both_of_two_causes_are_found_where_a_soft_base_would_predict_one_of_the
     """Without frequency responses a base has no name; it explained the lag of joint 2, and the gain of joint 3 stayed unnamed."""
     found = diagnosed(*pair(41, "65a9417a5b", tmp_path))
     assert sorted(causes(found)) == [("torque_gain", 3), ("torque_lag", 2)]
-    gain, lag = effects(found)
+    gain, lag = sorted(effects(found), key=lambda one: one.effect.name)
     assert gain.values["gain_error"] == pytest.approx(-0.03, abs=0.003)
     assert lag.values["time_constant"] == pytest.approx(1.5e-3, rel=0.1)
 
