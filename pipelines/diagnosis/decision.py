@@ -70,7 +70,8 @@ def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
     fits = max(float(left.max()), end.cost / later.rows.count) < bound
     doubt = selection.rounds[-1].doubt
     if fits and not rest:
-        return Decision("cannot-judge" if doubt else "no-fault-found", doubt, ())
+        reason = f"{doubt}; record quicker motion" if doubt else ""
+        return Decision("cannot-judge" if doubt else "no-fault-found", reason, ())
     told = (rest or _too_large(left, bound), selection.rounds[-1].stopped)
     return Decision("unknown", "; ".join(one for one in told if one), ())
 
