@@ -91,7 +91,7 @@ class Dictionary:
                     _lay(rows, family, standing, dataset.arm, groups, parts)
             for key, make in plain.items():
                 _lay_unnamed(rows, key, make, groups, parts)
-            tables.append(Table.stacked(parts))
+            tables.append(Table.stacked(parts).compact())
         assert tables[0] is not None
         return cls(tuple(groups), found, tables[0], tables[1])
 

@@ -119,12 +119,7 @@ class Rows:
         if rows is None:
             return Table.of(columns * weight, self.joint, self.n_joints)
         table = Table.of(columns * weight[rows], self.joint[rows], self.n_joints)
-        count = np.bincount(self.joint, minlength=self.n_joints)
-        values = (
-            v if len(v) else np.zeros((0, n), v.dtype)
-            for v, n in zip(table.values, count, strict=True)
-        )
-        return Table(table.width, table.index, tuple(values))
+        return table.over(np.bincount(self.joint, minlength=self.n_joints))
 
     def torque(self, model: Exact) -> tuple[Array, ...]:
         """Return the torque of an exact model, joint by joint, in units of the noise."""
@@ -177,11 +172,7 @@ class Rows:
         before, after = (by_joint(w, self.joint, self.n_joints) for w in (self.weight, weight))
 
         def through(table: Table) -> Table:
-            values = tuple(
-                self._through(whitening, v / before[j], j) * after[j]
-                for j, v in enumerate(table.values)
-            )
-            return Table(table.width, table.index, values)
+            return table.mapped(lambda x, j: self._through(whitening, x / before[j], j) * after[j])
 
         there = self.data.whitened(whitening)
         return Rows(there, self.columns, weight, through(self.nominal), level), through

@@ -408,10 +408,7 @@ class Later:
     @cached_property
     def shares(self) -> Array:
         """(groups, joints) share of each joint in the columns of a group."""
-        power = np.zeros((self.candidates.width, self.rows.n_joints))
-        each = zip(self.candidates.index, self.candidates.values, strict=True)
-        for j, (index, values) in enumerate(each):
-            power[index, j] = np.einsum("ij,ij->i", values, values, dtype=np.float64)
+        power = self.candidates.power
         own = np.array([power[g.columns].sum(axis=0) for g in self.dictionary.groups])
         return np.asarray(own / np.maximum(own.sum(axis=1, keepdims=True), 1e-300))
 

@@ -266,10 +266,9 @@ def covariance(later: Later, state: State) -> Array:
     white = state.factor.solve(np.eye(columns.width))
     count = len(later.block_rows)
     scores = np.zeros((columns.width, count))
-    for j, (index, values) in enumerate(zip(columns.index, columns.values, strict=True)):
-        weighted = values * state.residual[j]
-        own = [np.bincount(later.block[j], row, count) for row in weighted]
-        scores[index] += np.array(own).reshape(len(index), count)
+    for j, residual in enumerate(state.residual):
+        weighted = columns.dense(j) * residual
+        scores += np.array([np.bincount(later.block[j], row, count) for row in weighted])
     moved = white @ scores
     robust = np.sqrt(np.sum(moved**2, axis=1))
     wider = np.maximum(robust / np.sqrt(np.diag(white)), 1.0)

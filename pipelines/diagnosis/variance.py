@@ -129,11 +129,11 @@ def settle(
         for _ in range(_ROUNDS if alone else 1):
             groups = _best_shapes(white, columns, dictionary.groups) if alone else first
             numbers = _imitated(white, columns, groups, config)
-            both = Table.stacked([rows.nominal, table])
-            left = [y - t for y, t in zip(rows.y, both.times(numbers), strict=True)]
+            torque = Table.stacked([rows.nominal, table]).times(numbers)
+            left = [y - t for y, t in zip(rows.y, torque, strict=True)]
             left = _less_events(rows, dictionary, dataset.arm, left) if alone else left
             white, through = rows.whitened(left, config.noise_bins)
-            columns = through(table).compact()
+            columns = through(table)
         return left, columns
 
     noise, table = settled(dataset.later.less(fit), dictionary.later)

@@ -12,7 +12,7 @@ Liu 1981). The cost grows with the number of joints, not with its cube.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,11 +23,14 @@ import numpy.typing as npt
 __all__ = ["Array", "Arrow", "Indices", "Parts", "Structure", "Table", "by_joint", "gains", "in_rows"]
 
 _ROUNDING = 1e-13  # numerics: of each number's information: more than sums of 1e5 rows round off
+_RUN, _AT_ONCE = 4096, 64  # numerics: rows, columns
 _DEPENDENT = 1e-6  # numerics: squared length, of columns of unit length, that others leave
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 Parts = Sequence[npt.NDArray[np.bool_]]
+Piece = tuple[Indices, npt.NDArray[Any]]  # columns (k,), and their values (k, rows)
+Pieces = tuple[tuple[Piece, ...], ...]
 
 
 def by_joint(x: npt.NDArray[Any], joint: Indices, n_joints: int) -> tuple[npt.NDArray[Any], ...]:
@@ -45,89 +48,148 @@ def in_rows(each: Sequence[Array], joint: Indices) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Table:
-    """Columns over rows."""
+    """Columns over rows; tables behind one another are not copied."""
 
     width: int  # number of columns
-    index: tuple[Indices, ...]  # of each joint, which columns act on it
-    values: tuple[npt.NDArray[np.floating], ...]  # of each joint (columns there, rows there)
+    pieces: tuple[tuple[Piece, ...], ...]  # of each joint; every column acts there in one at most
 
     @classmethod
     def of(cls, columns: npt.NDArray[Any], joint: Indices, n_joints: int) -> Table:
         """Return the table of dense columns (k, rows); `joint` (rows,) counts from 0."""
-        index, values = [], []
+        pieces = []
         for part in by_joint(columns, joint, n_joints):
             acting = np.flatnonzero(part.any(axis=1))
-            index.append(acting)
-            values.append(part[acting])
-        return cls(len(columns), tuple(index), tuple(values))
+            pieces.append(((acting, part[acting]),))
+        return cls(len(columns), tuple(pieces))
 
     @classmethod
     def stacked(cls, tables: Sequence[Table]) -> Table:
         """Return the columns of several tables over the same rows, one behind the other."""
         first = np.cumsum([0, *(table.width for table in tables)])
-        joints = range(len(tables[0].index))
-        return cls(
-            int(first[-1]),
-            tuple(
-                np.concatenate([t.index[j] + f for t, f in zip(tables, first, strict=False)])
-                for j in joints
-            ),
-            tuple(np.concatenate([t.values[j] for t in tables]) for j in joints),
-        )
+        pieces = [
+            tuple((i + f, v) for t, f in zip(tables, first, strict=False) for i, v in t.pieces[j])
+            for j in range(len(tables[0].pieces))
+        ]
+        return cls(int(first[-1]), tuple(pieces))
+
+    @property
+    def index(self) -> tuple[Indices, ...]:
+        """Of each joint, which columns act on it."""
+        return tuple(np.concatenate([i for i, _ in own]) for own in self.pieces)
 
     def take(self, columns: Indices) -> Table:
-        """Return some of the columns, in the order given."""
+        """Return some of the columns, in the order given; neighbours are not copied."""
         place = np.full(self.width, -1, dtype=np.intp)
         place[columns] = np.arange(len(columns))
-        kept = [np.flatnonzero(place[index] >= 0) for index in self.index]
-        order = [k[np.argsort(place[index[k]])] for k, index in zip(kept, self.index, strict=True)]
-        return Table(
-            len(columns),
-            tuple(place[i[k]] for i, k in zip(self.index, order, strict=True)),
-            tuple(v[k] for v, k in zip(self.values, order, strict=True)),
-        )
+
+        def taken(index: Indices, values: npt.NDArray[Any]) -> Piece:
+            kept = np.flatnonzero(place[index] >= 0)
+            run = len(kept) and kept[-1] - kept[0] == len(kept) - 1
+            own = values[kept[0] : kept[-1] + 1] if run else values[kept]
+            return place[index[kept]], own
+
+        return Table(len(columns), self._each(taken))
 
     def scaled(self, scale: Array) -> Table:
         """Return every column multiplied by its `scale` (k,)."""
-        return Table(
-            self.width,
-            self.index,
-            tuple(v * scale[i, None] for v, i in zip(self.values, self.index, strict=True)),
-        )
+        return Table(self.width, self._each(lambda i, v: (i, v * scale[i, None])))
+
+    def over(self, rows: Indices) -> Table:
+        """Return the same over so many rows of each joint, of joints without any column too."""
+        none = [(np.zeros(0, dtype=np.intp), np.zeros((0, n))) for n in rows]
+        pairs = zip(none, self.pieces, strict=True)
+        return Table(self.width, tuple((n, *(p for p in own if len(p[0]))) for n, own in pairs))
+
+    def mapped(self, change: Callable[[npt.NDArray[Any], int], npt.NDArray[Any]]) -> Table:
+        """Return the table whose columns (…, rows of a joint) are `change` of them and the joint."""
+        pieces = []
+        for j, own in enumerate(self.pieces):
+            new = tuple((i, np.empty_like(v)) for i, v in own)
+            for (_, before), (_, after) in zip(own, new, strict=True):
+                for at in range(0, len(before), _AT_ONCE):
+                    after[at : at + _AT_ONCE] = change(before[at : at + _AT_ONCE], j)
+            pieces.append(new)
+        return Table(self.width, tuple(pieces))
 
     def compact(self) -> Table:
-        """Return the columns in single precision: of candidates there are many."""
-        return Table(self.width, self.index, tuple(v.astype(np.float32) for v in self.values))
+        """Return the columns as one piece in single precision: of candidates there are many."""
+        return Table(self.width, tuple((_joined(own),) for own in self.pieces))
+
+    def _each(self, change: Callable[[Indices, npt.NDArray[Any]], Piece]) -> Pieces:
+        return tuple(tuple(change(i, v) for i, v in own) for own in self.pieces)
+
+    @property
+    def power(self) -> Array:
+        """(k, joints) sum of squares of each column over the rows of each joint."""
+        out = np.zeros((self.width, len(self.pieces)))
+        for j, own in enumerate(self.pieces):
+            for index, values in own:
+                out[index, j] = np.einsum("ij,ij->i", values, values, dtype=np.float64)
+        return out
 
     @cached_property
     def norms(self) -> Array:
         """(k,) Euclidean length of each column."""
-        total = np.zeros(self.width)
-        for index, values in zip(self.index, self.values, strict=True):
-            total[index] += np.einsum("ij,ij->i", values, values, dtype=np.float64)
-        return np.asarray(np.sqrt(total))
+        return np.asarray(np.sqrt(self.power.sum(axis=1)))
 
     def gram(self, other: Table, part: Parts | None = None) -> Array:
         """Return A Bᵀ (k, l), over the rows of `part` (a mask for each joint) where it is given."""
         out = np.zeros((self.width, other.width))
-        for j, (a, b) in enumerate(zip(self.values, other.values, strict=True)):
-            if len(self.index[j]) and len(other.index[j]):
-                mine, theirs = (a, b) if part is None else (a[:, part[j]], b[:, part[j]])
-                mine = mine.astype(np.float64, copy=False)
-                out[np.ix_(self.index[j], other.index[j])] += mine @ theirs.T
+        for j, (mine, theirs) in enumerate(zip(self.pieces, other.pieces, strict=True)):
+            for rows in _runs(len(part[j]) if part else _rows(mine)):
+                chosen = rows if part is None else rows.start + np.flatnonzero(part[j][rows])
+                right = [(k, np.asarray(b[:, chosen].T, dtype=np.float64)) for k, b in theirs]
+                for i, a in mine:
+                    left = np.asarray(a[:, chosen], dtype=np.float64)
+                    for k, b in right:
+                        out[np.ix_(i, k)] += left @ b
         return out
 
     def moments(self, y: Sequence[Array], part: Parts | None = None) -> Array:
         """Return A y (k,)."""
         out = np.zeros(self.width)
-        for j, (index, values) in enumerate(zip(self.index, self.values, strict=True)):
-            own = slice(None) if part is None else part[j]
-            out[index] += values[:, own] @ y[j][own]
+        for j, own in enumerate(self.pieces):
+            masked = y[j] if part is None else np.where(part[j], y[j], 0.0)
+            for index, values in own:
+                for rows in _runs(len(masked)):
+                    out[index] += values[:, rows] @ masked[rows]
         return out
 
     def times(self, coefficients: Array) -> tuple[Array, ...]:
         """Return cᵀ A of coefficients (k,) or (k, m), an array (…, rows) for each joint."""
-        return tuple(coefficients[i].T @ v for i, v in zip(self.index, self.values, strict=True))
+        out = []
+        for own in self.pieces:
+            total = np.zeros((*coefficients.shape[1:], _rows(own)))
+            for index, values in own:
+                for rows in _runs(values.shape[1]):
+                    total[..., rows] += coefficients[index].T @ values[:, rows]
+            out.append(total)
+        return tuple(out)
+
+    def dense(self, joint: int) -> Array:
+        """Return all columns (k, rows) over the rows of a joint."""
+        out = np.zeros((self.width, _rows(self.pieces[joint])))
+        for index, values in self.pieces[joint]:
+            out[index] = values
+        return out
+
+
+def _rows(pieces: Sequence[Piece]) -> int:
+    return int(pieces[0][1].shape[1])
+
+
+def _runs(rows: int) -> list[slice]:
+    """Return the rows in runs, whose products in double precision stay near the processor."""
+    return [slice(k, min(k + _RUN, rows)) for k in range(0, rows, _RUN)]
+
+
+def _joined(pieces: Sequence[Piece]) -> Piece:
+    values = np.empty((sum(len(i) for i, _ in pieces), _rows(pieces)), np.float32)
+    first = 0
+    for index, own in pieces:
+        values[first : first + len(index)] = own
+        first += len(index)
+    return np.concatenate([i for i, _ in pieces]), values
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,15 +306,9 @@ class Arrow:
         Args:
             table: columns, in the order of the matrix.
         """
-        structure, block, w = self.structure, self.blocks[joint], self.across[joint]
-        place = np.full(table.width, -1, dtype=np.intp)
-        place[table.index[joint]] = np.arange(len(table.index[joint]))
-        values = np.asarray(table.values[joint], dtype=np.float64)
-        own = _forward(block, values[place[structure.own[joint]]])
-        there = place[structure.shared] >= 0
-        shared = np.zeros((len(structure.shared), values.shape[1]))
-        shared[there] = values[place[structure.shared[there]]]
-        return own, _forward(self.corner, shared - w.T @ own)
+        block, w, dense = self.blocks[joint], self.across[joint], table.dense(joint)
+        own = _forward(block, dense[self.structure.own[joint]])
+        return own, _forward(self.corner, dense[self.structure.shared] - w.T @ own)
 
 
 def _root(matrix: Array) -> Array:

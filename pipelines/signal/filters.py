@@ -7,6 +7,7 @@ other, and the parameters between them do not feel it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ __all__ = [
     "centre_hold",
     "centre_samples",
     "choose_decimation",
+    "choose_step",
     "design_low_pass",
     "fast_length",
     "passed_both_ways",
@@ -37,6 +39,7 @@ Complex = npt.NDArray[np.complex128]
 _BLOCK = 48
 AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed: what it lets through shows no difference
 COARSE = 12.0  # at which those of a search are: a change of sign within a sample then shows in a few hundredths of the noise
+_PARTS = 4  # numerics: of a step between rows of fewer samples
 KEEP = 4.0  # samples left per period of the cut-off: the filter is down by 2 × 6 dB per octave and order at the new Nyquist
 
 
@@ -88,13 +91,13 @@ def zero_phase(x: Array, low_pass: LowPass) -> Array:
     return np.ascontiguousarray(back[pad:-pad]).reshape(x.shape)
 
 
-def thinned(x: npt.NDArray[Any], response: Array, every: int) -> npt.NDArray[Any]:
-    """Return every so-manieth sample of signals (channels, samples), times `response` at their first frequencies."""
+def thinned(x: npt.NDArray[Any], response: Array, count: int) -> npt.NDArray[Any]:
+    """Return `count` samples of signals (channels, samples) over the same time, times `response` at their first frequencies."""
     from scipy.fft import irfft, rfft  # several channels at once, and in single precision
 
     spectrum = rfft(x, axis=1)[:, :len(response)]
-    spectrum *= (response / every).astype(x.dtype)
-    return np.asarray(irfft(spectrum, n=x.shape[1] // every, axis=1, overwrite_x=True))
+    spectrum *= (response * (count / x.shape[1])).astype(x.dtype)
+    return np.asarray(irfft(spectrum, n=count, axis=1, overwrite_x=True))
 
 
 def _one_pass(u: Array, low_pass: LowPass) -> Array:
@@ -137,6 +140,14 @@ def choose_decimation(cutoff_hz: float, rate: float, keep: float = KEEP) -> int:
     """
     most, step = max(1, int(rate / (keep * cutoff_hz) + 1e-9)), ample(cutoff_hz, rate)
     return most - most % step
+
+
+def choose_step(cutoff_hz: float, rate: float, keep: float) -> Fraction:
+    """Return how many samples lie between rows: `choose_decimation`, or of few samples a fraction that comes nearer to `keep`."""
+    most = rate / (keep * cutoff_hz) + 1e-9
+    if most >= _PARTS:
+        return Fraction(choose_decimation(cutoff_hz, rate, keep))
+    return max(Fraction(1), *(Fraction(int(most * part), part) for part in range(1, 1 + _PARTS)))
 
 
 def ample(cutoff_hz: float, rate: float, per_period: float = AMPLE) -> int:

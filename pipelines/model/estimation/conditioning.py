@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 
 from pipelines.log.limits import GAP_TICKS
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.signal.filters import KEEP, LowPass, choose_decimation, design_low_pass
+from pipelines.signal.filters import KEEP, LowPass, choose_decimation, choose_step, design_low_pass
 
 __all__ = ["HIGHEST", "Conditioning", "condition", "cutoff_at", "wanted_cutoff"]
 
@@ -23,6 +24,7 @@ class Conditioning:
     low_pass: LowPass | None
     cutoff_hz: float | None
     decimation: int
+    step: Fraction  # samples between rows that are thinned out in the frequency domain, where a part of a sample can be left out
     min_speed: tuple[float, ...]  # [rad/s] slower samples of a joint are left out of its own equations
 
 
@@ -36,9 +38,10 @@ def condition(motion: Motion, rate: float, cutoff_hz: float | None, decimation: 
     cutoff = cutoff_at(wanted_cutoff(motion, rate) if cutoff_hz is None else cutoff_hz, rate)
     speeds = tuple(map(float, min_speed))
     if cutoff is None:
-        return Conditioning(None, None, decimation or 1, speeds)
+        return Conditioning(None, None, decimation or 1, Fraction(decimation or 1), speeds)
     every = decimation or choose_decimation(cutoff, rate, keep)
-    return Conditioning(design_low_pass(cutoff, rate), cutoff, every, speeds)
+    step = Fraction(decimation) if decimation else choose_step(cutoff, rate, keep)
+    return Conditioning(design_low_pass(cutoff, rate), cutoff, every, step, speeds)
 
 
 def cutoff_at(cutoff_hz: float | None, rate: float) -> float | None:

@@ -21,8 +21,10 @@ from __future__ import annotations
 from collections import OrderedDict
 from collections.abc import Callable, Hashable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -114,9 +116,23 @@ class Run:
     response: Array  # (bins,) low-pass, at the frequencies of the padded stretch, as far as the thinned rows go
     average: Array  # (bins,) of the average over two samples of a smooth signal
     size: int  # of the padded stretch
-    pad: int  # a multiple of `every`
-    every: int
+    pad: int  # of samples, a whole number of steps
+    every: Fraction  # samples between thinned rows
     chosen: Indices  # places in the thinned stretch that become rows
+
+    @cached_property
+    def samples(self) -> Indices:
+        """(rows,) the sample nearest to each."""
+        return np.asarray(np.rint(self.chosen * float(self.every)), dtype=np.intp)
+
+    def between(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """(samples, …) -> (rows, …) unfiltered."""
+        if self.every.denominator == 1:
+            return np.asarray(x[self.samples])
+        at = self.chosen * float(self.every)
+        before = at.astype(np.intp)
+        after, share = np.minimum(before + 1, len(x) - 1), (at - before).reshape(-1, *[1] * (x.ndim - 1))
+        return np.asarray((1.0 - share) * x[before] + share * x[after])
 
     def lay(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
         """A smooth signal (channels, samples) -> (channels, rows)."""
@@ -130,32 +146,31 @@ class Run:
 
     def _through(self, x: npt.NDArray[Any], response: Array) -> npt.NDArray[Any]:
         pad, end, out = self.pad, x.shape[1] + self.pad, np.empty((len(x), len(self.chosen)), x.dtype)
-        wide, places = np.zeros((min(len(x), _AT_ONCE), self.size), x.dtype), self.chosen + pad // self.every
+        wide, places = np.zeros((min(len(x), _AT_ONCE), self.size), x.dtype), self.chosen + int(pad / self.every)
         for first in range(0, len(x), _AT_ONCE):
             some = x[first:first + _AT_ONCE]
             table = wide[:len(some)]
             table[:, pad:end] = some
             np.subtract(2.0 * some[:, :1], some[:, pad:0:-1], out=table[:, :pad])
             np.subtract(2.0 * some[:, -1:], some[:, -2:-pad - 2:-1], out=table[:, end:end + pad])
-            out[first:first + _AT_ONCE] = thinned(table, response, self.every)[:, places]
+            out[first:first + _AT_ONCE] = thinned(table, response, int(self.size / self.every))[:, places]
         return out
 
 
 def run_of(equations: LogEquations, part: slice, skip: int = 1) -> Run:
     how, held = equations.conditioning, equations.held
-    rate, every = 1.0 / equations.found.good.log.sample_time, how.decimation
-    n = part.stop - part.start
+    rate, step = 1.0 / equations.found.good.log.sample_time, how.step
+    n, whole = part.stop - part.start, step.numerator
     cutoff = how.cutoff_hz
-    reach = 2 if cutoff is None else int(np.ceil(_END * rate / cutoff))
-    chosen = np.arange(-(-min(reach, n // 4) // every), (n - min(reach, n // 4)) // every)
-    chosen = chosen[~equations.rows.out[part][chosen * every]]
-    pad = every * (min(n - 2, 16 if cutoff is None else int(np.ceil(PAD * rate / cutoff))) // every)
-    size = 2 * every * fast_length(-(-(n + 2 * pad) // (2 * every)))
-    bins = np.arange(size // 2 // every + 1)
+    reach = min(2 if cutoff is None else int(np.ceil(_END * rate / cutoff)), n // 4)
+    pad = whole * (min(n - 2, 16 if cutoff is None else int(np.ceil(PAD * rate / cutoff))) // whole)
+    size = 2 * whole * fast_length(-(-(n + 2 * pad) // (2 * whole)))
+    bins = np.arange(int(size / step) // 2 + 1)
     turn = 2.0 * np.pi * bins / size
     response = np.ones(len(bins)) if cutoff is None else passed_both_ways(bins * rate / size, cutoff, rate)
     average = (114.0 + 68.0 * np.cos(turn) - 2.0 * np.cos(2.0 * turn)) / 180.0
-    return Run(held, response, average, size // skip, pad // skip, every // skip, chosen)
+    run = Run(held, response, average, size // skip, pad // skip, step / skip, np.arange(ceil(reach / step), (n - reach) // step))
+    return replace(run, chosen=run.chosen[~equations.rows.out[part][run.samples * skip]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,8 +240,8 @@ class LogData:
         return replace(self, motion=motion, pieces=pieces, runs=runs, kept=kept)
 
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """What `x` (samples, …) is at the moments of the rows, unfiltered."""
-        return np.concatenate([x[piece][run.chosen * run.every] for piece, run in self._parts])
+        """What `x` (samples, …) is at the moments of the rows, unfiltered; between samples on a straight line."""
+        return np.concatenate([run.between(x[piece]) for piece, run in self._parts])
 
     def lay(self, table: Array) -> Array:
         """Columns over the motion, (samples, joints) or (samples, joints, k), as (joints, rows) or (k, joints, rows)."""
@@ -401,7 +416,7 @@ def _of_log(log: ExperimentLog, equations: LogEquations, kept: Kept, place: int)
     ends = np.cumsum([0, *(len(tau) for _, tau in some)]).tolist()
     pieces = tuple(slice(a, b) for a, b in pairwise(ends))
     runs = tuple(run_of(equations, run, skip) for run in equations.runs)
-    slow = np.concatenate([equations.rows.slow[run][one.chosen * one.every] for run, one in zip(equations.runs, fine, strict=True)])
+    slow = np.concatenate([equations.rows.slow[run][one.samples] for run, one in zip(equations.runs, fine, strict=True)])
     asked = tau if equations.held else None  # a measured torque was there: nothing of it can have been kept back
     since = _first_known(runs[0], pieces[0])
     logged = None if equations.held else tau[since]
@@ -413,7 +428,7 @@ def _first_known(run: Run, piece: slice) -> int:
     """The sample from which on the motion is good, by a period of the low-pass before the first row."""
     if not len(run.chosen):
         return 0
-    first = int(run.chosen[0]) * run.every
+    first = int(run.samples[0])
     return int(max(0, min(first - run.pad // int(PAD), piece.stop - 1)))
 
 
@@ -423,5 +438,5 @@ def _skipped(equations: LogEquations, per_period: float = AMPLE) -> int:
     if how.cutoff_hz is None:
         return 1
     step = equations.found.good.log.sample_time
-    highest = min(how.cutoff_hz, 0.5 / (step * how.decimation))  # rows further apart than the low-pass asks for show less
-    return max(k for k in range(1, ample(highest, 1.0 / step, per_period) + 1) if how.decimation % k == 0)
+    highest = min(how.cutoff_hz, 0.5 / (step * how.step))  # rows further apart than the low-pass asks for show less
+    return max(k for k in range(1, ample(highest, 1.0 / step, per_period) + 1) if how.step.numerator % k == 0)
