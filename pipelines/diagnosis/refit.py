@@ -176,9 +176,7 @@ class Later:
         new = Table.stacked([t for one in families for _, t in laid(self.rows, one, model.arm)])
         own = [group for key in keys for group in self.dictionary.groups if group.key == key]
         at = np.concatenate([group.columns for group in own])
-        rest = np.setdiff1d(np.arange(self.candidates.width), at)
-        candidates = Table.stacked([self.candidates.take(rest), new])
-        candidates, cross = candidates.take(np.argsort(np.r_[rest, at])), self.cross.copy()
+        candidates, cross = self.candidates.replaced(at, new), self.cross.copy()
         cross[:, at] = self.base.gram(new)
         squares = dict(zip(self.dictionary.groups, self.squares, strict=True))
         squares |= zip(own, squares_of(candidates, own), strict=True)

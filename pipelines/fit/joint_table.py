@@ -23,7 +23,7 @@ import numpy.typing as npt
 __all__ = ["Array", "Arrow", "Indices", "Parts", "Structure", "Table", "by_joint", "gains", "in_rows"]
 
 _ROUNDING = 1e-13  # numerics: of each number's information: more than sums of 1e5 rows round off
-_RUN, _AT_ONCE = 4096, 64  # numerics: rows, columns
+_ROOM, _AT_ONCE = 4_000_000, 64  # numerics: values in double precision, columns
 _DEPENDENT = 1e-6  # numerics: squared length, of columns of unit length, that others leave
 
 Array = npt.NDArray[np.float64]
@@ -90,6 +90,25 @@ class Table:
 
         return Table(len(columns), self._each(taken))
 
+    def replaced(self, columns: Indices, by: Table) -> Table:
+        """Return the table with some columns in the place of others, joint by joint in one piece."""
+        kept = np.ones(self.width, bool)
+        kept[columns] = False
+        pieces = []
+        for old, new in zip(self.pieces, by.pieces, strict=True):
+            ((index, values),) = old
+            at, rest = columns[np.concatenate([i for i, _ in new])], kept[index]
+            if not len(at) and rest.all():
+                pieces.append(old)
+                continue
+            every = np.union1d(index[rest], at)
+            out = np.empty((len(every), values.shape[1]), values.dtype)
+            out[np.searchsorted(every, index[rest])] = values[rest]
+            for i, v in new:
+                out[np.searchsorted(every, columns[i])] = v
+            pieces.append(((every, out),))
+        return Table(self.width, tuple(pieces))
+
     def scaled(self, scale: Array) -> Table:
         """Return every column multiplied by its `scale` (k,)."""
         return Table(self.width, self._each(lambda i, v: (i, v * scale[i, None])))
@@ -112,7 +131,7 @@ class Table:
         return Table(self.width, tuple(pieces))
 
     def compact(self) -> Table:
-        """Return the columns as one piece in single precision: of candidates there are many."""
+        """Return the columns in order and single precision, in one piece: of candidates there are many."""
         return Table(self.width, tuple((_joined(own),) for own in self.pieces))
 
     def _each(self, change: Callable[[Indices, npt.NDArray[Any]], Piece]) -> Pieces:
@@ -136,7 +155,8 @@ class Table:
         """Return A Bᵀ (k, l), over the rows of `part` (a mask for each joint) where it is given."""
         out = np.zeros((self.width, other.width))
         for j, (mine, theirs) in enumerate(zip(self.pieces, other.pieces, strict=True)):
-            for rows in _runs(len(part[j]) if part else _rows(mine)):
+            count = len(part[j]) if part else _rows(mine)
+            for rows in _runs(count, self.width + other.width):
                 chosen = rows if part is None else rows.start + np.flatnonzero(part[j][rows])
                 right = [(k, np.asarray(b[:, chosen].T, dtype=np.float64)) for k, b in theirs]
                 for i, a in mine:
@@ -145,13 +165,25 @@ class Table:
                         out[np.ix_(i, k)] += left @ b
         return out
 
+    def squares(self, groups: Sequence[slice], part: Parts | None = None) -> tuple[Array, ...]:
+        """Return the product A Aᵀ of each group of neighbouring columns, as `gram`."""
+        out = tuple(np.zeros((g.stop - g.start, g.stop - g.start)) for g in groups)
+        for j, ((index, values),) in enumerate(self.compact().pieces):
+            rows = slice(None) if part is None else part[j]
+            for g, total in zip(groups, out, strict=True):
+                first, last = np.searchsorted(index, [g.start, g.stop])
+                if first < last:
+                    own, at = values[first:last, rows].astype(np.float64), index[first:last] - g.start
+                    total[np.ix_(at, at)] += own @ own.T
+        return out
+
     def moments(self, y: Sequence[Array], part: Parts | None = None) -> Array:
         """Return A y (k,)."""
         out = np.zeros(self.width)
         for j, own in enumerate(self.pieces):
             masked = y[j] if part is None else np.where(part[j], y[j], 0.0)
             for index, values in own:
-                for rows in _runs(len(masked)):
+                for rows in _runs(len(masked), len(index)):
                     out[index] += values[:, rows] @ masked[rows]
         return out
 
@@ -161,7 +193,7 @@ class Table:
         for own in self.pieces:
             total = np.zeros((*coefficients.shape[1:], _rows(own)))
             for index, values in own:
-                for rows in _runs(values.shape[1]):
+                for rows in _runs(values.shape[1], len(index)):
                     total[..., rows] += coefficients[index].T @ values[:, rows]
             out.append(total)
         return tuple(out)
@@ -178,18 +210,22 @@ def _rows(pieces: Sequence[Piece]) -> int:
     return int(pieces[0][1].shape[1])
 
 
-def _runs(rows: int) -> list[slice]:
-    """Return the rows in runs, whose products in double precision stay near the processor."""
-    return [slice(k, min(k + _RUN, rows)) for k in range(0, rows, _RUN)]
+def _runs(rows: int, columns: int) -> list[slice]:
+    """Return the rows in runs, which take little memory in double precision."""
+    run = max(1, _ROOM // max(columns, 1))
+    return [slice(k, min(k + run, rows)) for k in range(0, rows, run)]
 
 
 def _joined(pieces: Sequence[Piece]) -> Piece:
-    values = np.empty((sum(len(i) for i, _ in pieces), _rows(pieces)), np.float32)
-    first = 0
+    every = np.concatenate([i for i, _ in pieces])
+    order, first = np.argsort(every), 0
+    if len(pieces) == 1 and pieces[0][1].dtype == np.float32 and np.all(np.diff(every) > 0):
+        return pieces[0]
+    values, place = np.empty((len(every), _rows(pieces)), np.float32), np.argsort(order)
     for index, own in pieces:
-        values[first : first + len(index)] = own
+        values[place[first : first + len(index)]] = own
         first += len(index)
-    return np.concatenate([i for i, _ in pieces]), values
+    return every[order], values
 
 
 @dataclass(frozen=True, eq=False)
