@@ -131,7 +131,7 @@ class Later:
             here.model,
             here.theta,
             belief,
-            self._exact(belief, here.model),
+            lambda: self._exact(belief, here.model),
             here.residual,
             effects,
             np.flatnonzero(lasting),

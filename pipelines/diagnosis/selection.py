@@ -435,7 +435,8 @@ def _candidate(
         noisy = possible and later.follows_noise(fitted, explained)
     except np.linalg.LinAlgError:
         return None
-    return Candidate((effect.name, effect.joint), gain, fitted, possible, noisy)
+    light = replace(fitted)  # without the columns that were computed for it: they take most memory
+    return Candidate((effect.name, effect.joint), gain, light, possible, noisy)
 
 
 def _plainer(model: Exact) -> tuple[Exact, ...]:

@@ -6,6 +6,7 @@ state.fit                                   the same without the columns of all 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,7 +35,7 @@ class State:
     model: Exact
     theta: Array  # nominal and standing numbers, scaled
     belief: Belief  # before the rows
-    known: Belief  # the same, with the slopes by nominal numbers as drives and drift make them
+    exact: Callable[[], Belief]  # the same with the slopes of this model
     residual: tuple[Array, ...]  # of each joint, in units of the noise
     effects: Table  # slopes by the numbers of the effects, of unit length
     lasting: Indices  # of these, numbers that hold for all time, not for the moment of an event
@@ -44,6 +45,11 @@ class State:
     def fit(self) -> Fit:
         """The fit without the columns of all numbers, which take the most memory."""
         return Fit(self.model, self.cost, self.residual)
+
+    @cached_property
+    def known(self) -> Belief:
+        """The belief with the slopes by nominal numbers as drives and drift make them."""
+        return self.exact()
 
     @property
     def squares(self) -> Array:
