@@ -7,18 +7,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pipelines import diagnose
+from pipelines import diagnose, import_log
 from pipelines.diagnosis import engine
 from pipelines.diagnosis.result import Diagnosis
 from pipelines.log.experiment import Array, ExperimentLog
 from pipelines.log.results import encode
 from pipelines.model.rows.prepare import Logs
 from pipelines.report.sections import CARD
-from pipelines.stage import Request
+from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written
 from tests.diagnosis.asking import answered
 from tests.healthy import fourier, make_log, with_signal
@@ -105,3 +106,14 @@ def test_logs_that_do_not_determine_the_model_cannot_be_judged() -> None:
     assert "the logs do not determine the model" in found.reason
     assert "move the joints concerned further and faster" in found.reason
     assert found.checks == ()  # nor the sign of viscous friction
+
+
+def test_a_joint_that_moves_one_way_alone_cannot_be_judged(shared: Path, tmp_path: Path) -> None:
+    """Case 46: Coulomb friction of joints 2 and 6 is confounded with a torque offset there, which may be any fault."""
+    case = shared / "cases" / "46-panda-tip-link-remedy"
+    settings = import_log.Settings(recipe=str(case / "r2.toml"), source=case)
+    run_stage(import_log.STAGE, Request((), tmp_path / "imported", no_report=True), settings)
+    chosen = diagnose.Settings()
+    found = diagnose.compute(diagnose.read(Request((tmp_path / "imported" / "logs",)), chosen), chosen, whole=False)
+    assert encode(found)[0]["verdict"] == "cannot-judge"
+    assert "Coulomb friction at joint 2 and torque offset at joint 2 cannot be separated" in encode(found)[0]["reason"]

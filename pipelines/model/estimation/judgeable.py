@@ -20,12 +20,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.fit import identifiability
 from pipelines.fit.equations import Array, Block, Flags
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
 
-__all__ = ["Facts", "JudgeableConfig", "cannot_judge", "predicted_std", "unresolved"]
+__all__ = ["Facts", "JudgeableConfig", "cannot_judge", "dependent", "predicted_std", "unresolved"]
 
 _RECORD = "record reference logs while the arm is known to be healthy, or a motion that repeats itself"
 
@@ -57,6 +58,12 @@ class Facts:
 def unresolved(found: Estimate) -> str:
     """Return which parameters the fitted logs do not separate, in words; empty where they do."""
     return found.unresolved.told(columns_in_words(one.name for one in found.columns.names))
+
+
+def dependent(found: Estimate) -> str:
+    """Return which parameters' columns are linearly dependent, however small the noise; empty where none are."""
+    names = columns_in_words(one.name for one in found.columns.names)
+    return identifiability.unresolved(found.solution, [one.name for one in found.columns.names], 0.0).told(names)
 
 
 def predicted_std(found: Estimate, equations: Iterable[Block]) -> Array:

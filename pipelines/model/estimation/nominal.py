@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from pipelines.model.parameter import Parameter, Uncertainty
 from pipelines.model.rigid.body import Motion, RigidBody
 from pipelines.model.rigid.choose import rigid_body
 
-__all__ = ["fitted_arm", "geared", "nominal_columns"]
+__all__ = ["fitted_arm", "geared", "nominal_columns", "with_offsets"]
 
 _SEED = 20040509
 _STATES = 400
@@ -102,3 +103,8 @@ def fitted_arm(found: Estimate, name: str, friction: Sequence[Acting] = ()) -> A
     together = Uncertainty(tuple(column.name for column in columns.names), found.robust.covariance)
     return Arm(name, body, tuple(base), tuple(laws), tuple(effects), together)
 
+
+def with_offsets(columns: Columns) -> Columns:
+    """Return the columns with a torque offset at every joint, as `nominal_columns` has them."""
+    laws = {(law.name, law.joint): law for law in (*nominal_columns(columns.body.robot).laws, *columns.laws)}
+    return replace(columns, laws=tuple(laws.values()))

@@ -39,7 +39,7 @@ from pipelines.model.estimation.logs import (
     refuse_too_few,
     with_cutoff,
 )
-from pipelines.model.estimation.nominal import nominal_columns
+from pipelines.model.estimation.nominal import nominal_columns, with_offsets
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.estimation.rests import RestConfig
 from pipelines.model.motion import Reconstructed, reconstruct
@@ -102,8 +102,7 @@ def sticking(every: Sequence[Data], moving: Sequence[Data], columns: Columns) ->
     Args:
         every: rows of the fitted logs, and of others; `moving`: the same rows, of which those at rest do not count.
     """
-    laws = {(law.name, law.joint): law for law in (*nominal_columns(columns.body.robot).laws, *columns.laws)}
-    model = Exact.start(*fit_nominal(moving[0], replace(columns, laws=tuple(laws.values()))))
+    model = Exact.start(*fit_nominal(moving[0], with_offsets(columns)))
     power, count = np.zeros((2, every[0].n_joints)), np.zeros((2, every[0].n_joints))
     for whole, part in zip(every, moving, strict=True):
         left = np.square(whole.y - model.torque(whole))

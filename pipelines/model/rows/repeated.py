@@ -22,7 +22,8 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.estimation.estimate import Estimate, estimate
-from pipelines.model.estimation.judgeable import Facts, predicted_std, unresolved
+from pipelines.model.estimation.judgeable import Facts, dependent, predicted_std, unresolved
+from pipelines.model.estimation.nominal import with_offsets
 from pipelines.model.estimation.regression import Columns, LogEquations
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import fit_nominal
@@ -87,7 +88,11 @@ class Repeated:
 
 def nominal_estimate(prepared: Prepared) -> Estimate:
     """Return the nominal model as `estimate-bps` fits it, on prepared rows."""
-    return estimate(_equations(prepared.data, prepared.columns), prepared.columns)
+    return _estimated(prepared, prepared.columns)
+
+
+def _estimated(prepared: Prepared, columns: Columns) -> Estimate:
+    return estimate(_equations(prepared.data, columns), columns)
 
 
 def facts(left: Array, known: bool, prepared: Prepared, estimated: Estimate) -> Facts:
@@ -102,7 +107,8 @@ def facts(left: Array, known: bool, prepared: Prepared, estimated: Estimate) -> 
     told = np.full(len(left), known)
     if not known:  # what is predicted is off by the noise and by the deviations of the model
         told = left <= _ABOVE * np.hypot(_noise(prepared), spread)
-    return Facts(left, judge.rms(judge.y), spread, unresolved(estimated), told)
+    confused = unresolved(estimated) or dependent(_estimated(prepared, with_offsets(prepared.columns)))
+    return Facts(left, judge.rms(judge.y), spread, confused, told)
 
 
 def _noise(prepared: Prepared) -> Array:
