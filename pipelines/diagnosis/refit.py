@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import ceil
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from pipelines.fit.joint_table import Array, Arrow, Indices, Table, by_joint, ga
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.orders import NEARLY
+from pipelines.model.rows.data import END
 from pipelines.model.rows.exact import Exact, Named
 
 __all__ = ["Later"]
@@ -35,7 +37,6 @@ _FRESH = 3  # numerics: of these, that see anew how effects change what the nomi
 _DAMPING = (RIDGE, 1e-3, 1e-2, 0.1, 1.0, 10.0)  # numerics: of unit columns, that is tried in turn
 _TRIED = np.geomspace(1e-4, 1.0, 40)  # numerics: of its reach, to where an amplitude is moved
 _HALF = 0.5  # numerics: of the rows
-_PERIODS = 2.3  # numerics: of the low-pass, within which a loop answers
 _PASS_ON = ("drive", "record")  # they act on the torque of all other effects
 _SETTLED = 1e-4  # numerics: relative gain of a step, below which the fit has settled
 
@@ -294,15 +295,16 @@ class Later:
         """Return whether the last effect is one of drive or encoder whose slopes follow the noise.
 
         In closed loop motion and torque answer the noise a moment later, and a lag is not
-        distinguished from that (Ljung 1999, 16.6). What slopes gain on the noise of another moment
-        has a χ² distribution where they are independent, as far as laws are exact.
+        distinguished from that (Ljung 1999, 16.6). What slopes gain on the noise of another moment,
+        as far away as the low-pass carries it, has a χ² distribution where they are independent, as
+        far as laws are exact.
         """
         last, rows = state.model.effects[-1], self.rows
         if last.effect.acts_on == "load":
             return False
         own = np.arange(state.effects.width) >= state.effects.width - last.count
         columns, rest = (state.effects.take(np.flatnonzero(x)) for x in (own, ~own))
-        left, near = in_rows(state.residual, rows.joint), round(_PERIODS * self.config.keep)
+        left, near = in_rows(state.residual, rows.joint), ceil(END * self.config.keep)
         each = (rows.data.moved(left, by) for by in range(-near, near + 1) if by)
         moments = [by_joint(x, rows.joint, rows.n_joints) for x in each]
         others = Table.stacked([state.known.base, rest])

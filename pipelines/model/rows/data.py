@@ -37,13 +37,13 @@ from pipelines.model.rigid.body import Motion
 from pipelines.signal.filters import AMPLE, COARSE, ample, fast_length, passed_both_ways, thinned
 from pipelines.signal.prediction import prediction_errors, prediction_weights
 
-__all__ = ["PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "run_of"]
+__all__ = ["END", "PAD", "Data", "Kept", "LogData", "Run", "Whitening", "gather", "run_of"]
 
 Indices = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 
 PAD = 4.0  # periods of the cut-off by which a stretch is continued
-_END = 2.0  # periods of the cut-off left out at either end of a stretch: so far the low-pass carries what was before it
+END = 2.0  # periods of the cut-off left out at either end of a stretch: so far the low-pass carries what was before it
 _AT_ONCE = 8  # numerics: channels, which stay near the processor
 _ORDER = 20  # rows: as far as the noise of the low-pass reaches, and a fifth of a second
 _RIDGE = 1e-4  # of the noise's power: what the low-pass keeps back is not brought back by more
@@ -162,7 +162,7 @@ def run_of(equations: LogEquations, part: slice, skip: int = 1) -> Run:
     rate, step = 1.0 / equations.found.good.log.sample_time, how.step
     n, whole = part.stop - part.start, step.numerator
     cutoff = how.cutoff_hz
-    reach = min(2 if cutoff is None else int(np.ceil(_END * rate / cutoff)), n // 4)
+    reach = min(2 if cutoff is None else int(np.ceil(END * rate / cutoff)), n // 4)
     pad = whole * (min(n - 2, 16 if cutoff is None else int(np.ceil(PAD * rate / cutoff))) // whole)
     size = 2 * whole * fast_length(-(-(n + 2 * pad) // (2 * whole)))
     bins = np.arange(int(size / step) // 2 + 1)
