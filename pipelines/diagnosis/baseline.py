@@ -15,8 +15,8 @@ from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.prior import Prior
-from pipelines.diagnosis.score import chi2_bound, upper_point
-from pipelines.diagnosis.screening import Screened, best_of, screen, squares_of
+from pipelines.diagnosis.screening import Screened, best_of, screen
+from pipelines.fit.bootstrap import chi2_bound, upper_point
 from pipelines.fit.joint_table import Array, Arrow, Structure, Table
 
 __all__ = ["Baseline", "baseline"]
@@ -123,13 +123,13 @@ class _Parts:
     def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior) -> _Parts:
         rows, y, parts = dataset.known, dataset.known.y, prior.parts
         candidates = dictionary.known
-        base = prior.table(rows.nominal, candidates)
+        base, spans = prior.table(rows.nominal, candidates), [g.span for g in dictionary.groups]
         return cls(
             prior,
             dictionary.groups,
             np.array([base.gram(candidates, part) for part in parts]),
             np.array([candidates.moments(y, part) for part in parts]),
-            [squares_of(candidates, dictionary.groups, part) for part in parts],
+            [candidates.squares(spans, part) for part in parts],
             np.array(
                 [sum(float(v[m] @ v[m]) for v, m in zip(y, part, strict=True)) for part in parts]
             ),

@@ -56,6 +56,10 @@ class Group:
     def columns(self) -> Indices:
         return np.arange(self.first, self.first + self.width)
 
+    @property
+    def span(self) -> slice:
+        return slice(self.first, self.first + self.width)
+
 
 @dataclass(frozen=True, eq=False)
 class Dictionary:

@@ -15,10 +15,10 @@ from pipelines.diagnosis.baseline import Baseline
 from pipelines.diagnosis.events import DIRECTIONS
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Diagnosis, Verdict
-from pipelines.diagnosis.score import chi2_bound
 from pipelines.diagnosis.selection import Cause, Round, Selection
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import in_words
+from pipelines.fit.bootstrap import chi2_bound
 from pipelines.fit.joint_table import Array, in_rows
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.judgeable import cannot_judge

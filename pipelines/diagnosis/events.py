@@ -13,7 +13,7 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
-from pipelines.diagnosis.score import chi2_bound, upper_point
+from pipelines.fit.bootstrap import chi2_bound, upper_point
 from pipelines.fit.joint_table import Array, Indices, by_joint
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect

@@ -23,13 +23,15 @@ from pipelines.diagnosis.result import (
     Gain,
     ResidualRms,
     TipError,
+    Value,
 )
 from pipelines.diagnosis.result import Standing as Told
-from pipelines.diagnosis.selection import Round
+from pipelines.diagnosis.selection import Round, laws_of
 from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters, told
 from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Acting
+from pipelines.model.rows.exact import Named
 from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.rows.residual_analysis import Proof, proof
@@ -134,7 +136,7 @@ def findings_of(
                 effect.name,
                 effect.joint,
                 effect.words.title,
-                parameters(every, place),
+                _among(parameters(every, place), laws_of(later, end, place)),
                 _explained(worth, place),
                 _visibility(later, end, place),
                 others,
@@ -150,6 +152,18 @@ def findings_of(
             )
         )
     return tuple(sorted(out, key=lambda one: -one.explained))
+
+
+def _among(own: dict[str, Value], laws: Sequence[tuple[Named, float]]) -> dict[str, Value]:
+    """Return numbers with the variance between laws, Σ w (v - v_own)², in theirs (Draper 1995)."""
+    values = [one.effect.reported(one.values) for one, _ in laws]
+    discrete, out = {q.name for q in laws[0][0].effect.parameters if q.discrete}, dict(own)
+    for name, number in own.items():
+        away = [np.subtract(v[name], values[0][name]) for v in values]
+        square = sum(w * x**2 for (_, w), x in zip(laws, away, strict=True))
+        if np.ndim(square) == 0 and square > 0.0 and (number.std is not None or name in discrete):
+            out[name] = replace(number, std=float(np.hypot(number.std or 0.0, np.sqrt(square))))
+    return out
 
 
 Origin = Literal["residual", "base parameters", "frequency responses", "reversals"]

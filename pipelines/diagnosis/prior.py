@@ -168,7 +168,7 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
     rows = dataset.known
     groups = [group for group in dictionary.groups if group.standing]
     of = [group for group in groups for _ in range(group.width)]
-    scale = np.where(rows.nominal.norms > 0.0, rows.nominal.norms, 1.0)
+    scale = rows.nominal.lengths
     columns, first = dictionary.standing(), len(scale)
     table = Table.stacked([rows.nominal.scaled(1.0 / scale), dictionary.known.take(columns)])
     parts = _parts(dataset)

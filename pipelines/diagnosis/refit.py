@@ -19,10 +19,10 @@ from pipelines.diagnosis.candidates import Dictionary, Group, laid
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
-from pipelines.diagnosis.score import chi2_bound
-from pipelines.diagnosis.screening import Screened, price, screen, squares_of
+from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
+from pipelines.fit.bootstrap import chi2_bound
 from pipelines.fit.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
@@ -84,7 +84,7 @@ class Later:
             table,
             base.gram(base),
             base.gram(table),
-            squares_of(table, dictionary.groups),
+            table.squares([g.span for g in dictionary.groups]),
             rows.blocks(config.block),
         )
 
@@ -125,7 +125,7 @@ class Later:
             if k and gained < 2.0 + _SETTLED * here.cost:
                 break
         slopes, names = self.slopes(here.model)
-        effects = slopes.scaled(1.0 / _unit(slopes.norms))
+        effects = slopes.scaled(1.0 / slopes.lengths)
         logs = [one.log for one in here.model.effects]
         lasting = [not of_effect or logs[place] is None for of_effect, place, _ in names]
         return State(
@@ -148,7 +148,7 @@ class Later:
     def _better(self, here: _Point, known: Belief, linear: bool) -> _Point:
         """Return where a step of Levenberg and Marquardt leads; `here` where none leads lower."""
         slopes, names = self.slopes(replace(here.model, effects=()) if linear else here.model)
-        size = _unit(slopes.norms)
+        size = slopes.lengths
         unit = slopes.scaled(1.0 / size)
         gradient = np.r_[known.slope(here.theta, here.residual), unit.moments(here.residual)]
         for damping in _DAMPING if names else _DAMPING[:1]:
@@ -180,7 +180,7 @@ class Later:
         candidates, cross = self.candidates.replaced(at, new), self.cross.copy()
         cross[:, at] = self.base.gram(new)
         squares = dict(zip(self.dictionary.groups, self.squares, strict=True))
-        squares |= zip(own, squares_of(candidates, own), strict=True)
+        squares |= zip(own, candidates.squares([g.span for g in own]), strict=True)
         return replace(self, candidates=candidates, cross=cross, squares=tuple(squares.values()))
 
     def screened(self, state: State) -> list[Screened]:
@@ -207,7 +207,7 @@ class Later:
         if state.belief is not self.belief:
             belief = self.freed(state.belief, self._effect(one.group))
         columns = self.candidates.take(one.group.columns)
-        size = _unit(columns.norms)
+        size = columns.lengths
         belief = self._exact(belief, state.model)
         more = Table.stacked([state.effects, columns.scaled(1.0 / size)])
         slope = np.r_[belief.slope(state.theta, state.residual), more.moments(state.residual)]
@@ -260,8 +260,8 @@ class Later:
         """
         slopes, names = self.slopes(state.model)
         factor, first = state.factor, self.base.width
-        std = np.sqrt(factor.inverse_diagonal[first:]) / _unit(slopes.norms)
-        step = factor.solve(state.slope)[first:] / _unit(slopes.norms)
+        std = np.sqrt(factor.inverse_diagonal[first:]) / slopes.lengths
+        step = factor.solve(state.slope)[first:] / slopes.lengths
         deviations = np.sqrt(max(self.config.deviations**2, self.config.relevance * explained))
         last, place = state.model.effects[-1], len(state.model.effects) - 1
         within, timing = last.possible, self.rows.data.logs[0].motion.sample_time
@@ -414,7 +414,7 @@ class Later:
 
     def with_columns(self, state: State, columns: Table) -> State:
         """Return the state with further columns, fitted linearly."""
-        more = Table.stacked([state.effects, columns.scaled(1.0 / _unit(columns.norms))])
+        more = Table.stacked([state.effects, columns.scaled(1.0 / columns.lengths)])
         slope = state.known.slope(state.theta, state.residual)
         step = state.known.beside(more).solve(np.r_[slope, more.moments(state.residual)])
         torque = Table.stacked([state.known.base, more]).times(step)
@@ -490,7 +490,3 @@ def _passes_on(shapes: Sequence[Effect], acting: Collection[int]) -> bool:
         return False
     others = (getattr(shape, q.name) for shape in shapes for q in one.parameters if q.joint)
     return one.joint in acting or any(int(joint) in acting for joint in others)
-
-
-def _unit(lengths: Array) -> Array:
-    return np.where(lengths > 0.0, lengths, 1.0)

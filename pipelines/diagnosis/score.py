@@ -4,7 +4,6 @@
     log_scores(losses, rows)            of each block, its noise level unknown
     confidence_set({key: scores})       the models that the data do not tell from the best
     probabilities({key: scores})        how probable each is
-    chi2_bound, upper_point             what chance exceeds rarely, by its law or by values seen
 
 A block predicted from all others leaves e_b = (I - J_bᵀ P⁻¹ J_b)⁻¹ r_b, exact for a linear model:
 J are the slopes by all numbers, P their information with the prior, r the residual of the fit to
@@ -25,7 +24,7 @@ import numpy.typing as npt
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.fit.joint_table import Array, Arrow, Indices, Table
 
-__all__ = ["Blocks", "chi2_bound", "confidence_set", "log_scores", "probabilities", "upper_point"]
+__all__ = ["Blocks", "confidence_set", "log_scores", "probabilities"]
 
 K = TypeVar("K", bound=Hashable)
 
@@ -146,17 +145,3 @@ def confidence_set(scores: Mapping[K, Array], config: DiagnosisConfig) -> list[K
             break
         alive.pop(int(np.argmax(t)))
     return [keys[k] for k in alive]
-
-
-def chi2_bound(alpha: float, freedom: int) -> float:
-    """Return the value that χ² of as many degrees of freedom exceeds with probability `alpha`."""
-    from scipy.special import chdtri
-
-    return float(chdtri(max(freedom, 1), alpha))
-
-
-def upper_point(values: Sequence[float], alpha: float) -> float:
-    """Return the upper `alpha` point of a Gumbel law fitted to maxima by its moments."""
-    x = np.asarray(values)
-    scale = max(float(x.std(ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12) if len(x) > 1 else 1e-12
-    return float(x.mean() - np.euler_gamma * scale - scale * np.log(-np.log1p(-alpha)))

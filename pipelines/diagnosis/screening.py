@@ -15,9 +15,9 @@ import numpy as np
 
 from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.unnamed import Key
-from pipelines.fit.joint_table import Array, Arrow, Parts, Table
+from pipelines.fit.joint_table import Array, Arrow
 
-__all__ = ["Screened", "best_of", "price", "screen", "squares_of"]
+__all__ = ["Screened", "best_of", "price", "screen"]
 
 _VISIBLE = 1e-6  # numerics: eigenvalue of H in unit columns, below which a direction is absorbed
 
@@ -46,7 +46,7 @@ def screen(
     half = info.half(cross)
     out = []
     for group, square in zip(groups, own, strict=True):
-        part = slice(group.first, group.first + group.width)
+        part = group.span
         left = square - half[:, part].T @ half[:, part]
         unit = np.sqrt(np.maximum(np.diag(square), 1e-300))
         values, vectors = np.linalg.eigh(left / unit / unit[:, None])
@@ -67,13 +67,6 @@ def _at_length(one: Screened, length: float) -> Screened:
     best = float(one.amplitudes[0])
     share = 1.0 - (1.0 - length / best) ** 2 if best > 0.0 else 0.0
     return replace(one, gain=max(one.gain * share, 0.0), amplitudes=np.array([length]))
-
-
-def squares_of(
-    columns: Table, groups: Sequence[Group], part: Parts | None = None
-) -> tuple[Array, ...]:
-    """Return C Cᵀ of each group, over the rows of `part` where it is given."""
-    return columns.squares([slice(g.first, g.first + g.width) for g in groups], part)
 
 
 def price(x: Array) -> float:

@@ -24,10 +24,10 @@ from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.rows.exact import Exact
+from pipelines.model.rows.exact import Exact, Named
 from pipelines.model.rows.families import first_samples
 
-__all__ = ["Candidate", "Cause", "Round", "SearchStart", "Selection", "best_law", "refit", "select"]
+__all__ = ["Cause", "Round", "SearchStart", "Selection", "best_law", "laws_of", "refit", "select"]
 
 
 @dataclass(frozen=True)
@@ -463,6 +463,23 @@ def best_law(later: Later, state: State, chosen: Candidate) -> Candidate:
             if other is not None and other.possible and not other.noisy:
                 every.append(other)
     return min(every, key=lambda one: float(one.scores(later).sum())) if every[1:] else chosen
+
+
+def laws_of(later: Later, end: State, place: int) -> list[tuple[Named, float]]:
+    """Return a cause by each law and link that it may have, and how probable; its own first."""
+    one, rest = end.model.effects[place], end.model.without(place)
+    elsewhere = any(q.link or q.joint for q in one.effect.parameters)
+    shapes = later.dictionary.families[(one.effect.name, one.effect.joint)].shapes
+    laws = dict.fromkeys((one.effect, *one.effect.forms(), *(shapes if elsewhere else ())))
+    if len(laws) == 1 or one.log is not None:
+        return [(one, 1.0)]
+    before = later.fit(rest, end.theta, later.belief_of(rest))
+    tried = [_candidate(later, before, law, np.array(one.amplitudes)) for law in laws]
+    if tried[0] is None:
+        return [(one, 1.0)]
+    known = {k: c for k, c in enumerate(tried) if c is not None and (c.possible or not k)}
+    weight = probabilities({k: c.scores(later) for k, c in known.items()}, later.config)
+    return [(c.state.model.effects[-1], weight[k]) for k, c in known.items()]
 
 
 def _reformed(later: Later, state: State) -> State:

@@ -157,8 +157,7 @@ class Trained:
     def _sizes(self, state: State) -> Array:
         """(numbers,) by which each number is scaled."""
         slopes, _ = self.later.slopes(state.model)
-        size: Array = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
-        return np.concatenate([self.later.prior.scale, size])
+        return np.concatenate([self.later.prior.scale, slopes.lengths])
 
 
 def train(
@@ -261,7 +260,6 @@ def covariance(later: Later, state: State) -> Array:
     Numbers that the rows do not tell have the variance 0.
     """
     slopes, _ = later.slopes(state.model)
-    size = np.where(slopes.norms > 0.0, slopes.norms, 1.0)
     columns = Table.stacked([state.known.base, state.effects])
     white = state.factor.solve(np.eye(columns.width))
     count = len(later.block_rows)
@@ -273,7 +271,7 @@ def covariance(later: Later, state: State) -> Array:
     robust = np.sqrt(np.sum(moved**2, axis=1))
     wider = np.maximum(robust / np.sqrt(np.diag(white)), 1.0)
     numbers = np.r_[np.arange(later.prior.n_nominal), np.arange(later.base.width, len(white))]
-    scale = np.r_[later.prior.scale, size]
+    scale = np.r_[later.prior.scale, slopes.lengths]
     wider = wider[numbers] / scale
     out = white[np.ix_(numbers, numbers)] * wider * wider[:, None]
     told = np.diag(white)[numbers] < _UNSEEN

@@ -20,7 +20,7 @@ from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.events import windows_of
-from pipelines.diagnosis.screening import best_of, screen, squares_of
+from pipelines.diagnosis.screening import best_of, screen
 from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
 from pipelines.model.arm import Arm
 
@@ -150,11 +150,13 @@ def settle(
 
 def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tuple[Group, ...]:
     """Return each cause's shape at each joint that explains most beside the nominal columns."""
-    nominal = rows.nominal.scaled(_unit(rows.nominal))
+    nominal = rows.nominal.scaled(1.0 / rows.nominal.lengths)
     known = Arrow.of(nominal.gram(nominal) + _FLAT * np.eye(nominal.width), Structure.of(nominal))
     cross = nominal.gram(candidates)
     moments = candidates.moments(rows.y) - cross.T @ known.solve(nominal.moments(rows.y))
-    best = best_of(screen(groups, known, cross, squares_of(candidates, groups), moments))
+    best = best_of(
+        screen(groups, known, cross, candidates.squares([g.span for g in groups]), moments)
+    )
     return tuple(one.group for one in best.values())
 
 
@@ -177,7 +179,7 @@ def _imitated(
     rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
 ) -> Array:
     """Return the numbers (nominal + candidates,) that fit the rows best; 0 of all but `groups`."""
-    unit = _unit(rows.nominal)
+    unit = 1.0 / rows.nominal.lengths
     nominal = rows.nominal.scaled(unit)
     of = [g for g in groups for _ in range(g.width)]
     columns = np.concatenate([g.columns for g in groups])
@@ -189,8 +191,3 @@ def _imitated(
     out[: nominal.width] = found.mean[: nominal.width] * unit
     out[nominal.width + columns] = found.mean[nominal.width :]
     return out
-
-
-def _unit(table: Table) -> Array:
-    """(k,) one over the length of each column."""
-    return np.asarray(1.0 / np.where(table.norms > 0.0, table.norms, 1.0))

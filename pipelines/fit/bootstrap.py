@@ -1,6 +1,7 @@
 """How sure a difference between two held-out errors is: the same blocks of time drawn again and again, with replacement.
 
     low, high = apart(ours, theirs, power, rng)       95 % of  error of theirs - error of ours
+    chi2_bound, upper_point                           what chance exceeds rarely, by its law or by values seen
 
 Efron 1979; blocks of consecutive samples, whose residuals depend on one another, stay whole (Künsch 1989). Both errors are
 of the same blocks in every draw, so that what is hard for both falls out.
@@ -8,11 +9,13 @@ of the same blocks in every draw, so that what is hard for both falls out.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipelines.fit.equations import Array
 
-__all__ = ["apart", "apart_in", "drawn"]
+__all__ = ["apart", "apart_in", "chi2_bound", "drawn", "upper_point"]
 
 _DRAWS = 4000
 _NORMAL = 1.96  # standard deviations of 95 %
@@ -55,3 +58,17 @@ def _student(freedom: int) -> float:
     """t of 97.5 %: z + (z³ + z)/4n + (5z⁵ + 16z³ + 3z)/96n², Abramowitz & Stegun 1964, 26.7.5."""
     z, n = _NORMAL, float(freedom)
     return z + (z**3 + z) / (4.0 * n) + (5.0 * z**5 + 16.0 * z**3 + 3.0 * z) / (96.0 * n**2)
+
+
+def chi2_bound(alpha: float, freedom: int) -> float:
+    """Return the value that χ² of as many degrees of freedom exceeds with probability `alpha`."""
+    from scipy.special import chdtri
+
+    return float(chdtri(max(freedom, 1), alpha))
+
+
+def upper_point(values: Sequence[float], alpha: float) -> float:
+    """Return the upper `alpha` point of a Gumbel law fitted to maxima by its moments."""
+    x = np.asarray(values)
+    scale = max(float(x.std(ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12) if len(x) > 1 else 1e-12
+    return float(x.mean() - np.euler_gamma * scale - scale * np.log(-np.log1p(-alpha)))

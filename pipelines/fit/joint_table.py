@@ -151,6 +151,11 @@ class Table:
         """(k,) Euclidean length of each column."""
         return np.asarray(np.sqrt(self.power.sum(axis=1)))
 
+    @property
+    def lengths(self) -> Array:
+        """(k,) `norms` to divide by: 1 of columns of zeros."""
+        return np.where(self.norms > 0.0, self.norms, 1.0)
+
     def gram(self, other: Table, part: Parts | None = None) -> Array:
         """Return A Bᵀ (k, l), over the rows of `part` (a mask for each joint) where it is given."""
         out = np.zeros((self.width, other.width))
