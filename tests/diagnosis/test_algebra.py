@@ -131,6 +131,26 @@ def test_columns_stay_what_they_were_when_chosen_stacked_and_scaled(
     assert some.norms == pytest.approx(np.linalg.norm(dense[chosen], axis=1) * np.abs(factor))
 
 
+def test_columns_in_one_piece_are_those_of_several(rng: np.random.Generator) -> None:
+    """Candidates are kept in single precision, those of drives are replaced, groups have products."""
+    base, more, _, _, joint = _problem(rng)
+    table = Table.stacked([Table.of(base, joint, _JOINTS), Table.of(more, joint, _JOINTS)])
+    dense, at = np.concatenate([base, more]), np.array([1, 6])
+    new = rng.normal(size=(2, _ROWS)) * (joint == 0)
+    one = table.compact().replaced(at, Table.of(new, joint, _JOINTS))
+    dense[at] = new
+    mask = by_joint(rng.random(_ROWS) < 0.5, joint, _JOINTS)
+    every = np.concatenate(mask)
+    for group, square in zip((spans := [slice(0, 3), slice(3, 7)]), one.squares(spans), strict=True):
+        assert square == pytest.approx(dense[group] @ dense[group].T, abs=1e-5)
+    for group, square in zip(spans, one.squares(spans, mask), strict=True):
+        own = dense[group][:, every]
+        assert square == pytest.approx(own @ own.T, abs=1e-5)
+    twice = one.mapped(lambda x, _: 2.0 * x)
+    assert twice.gram(one, mask) == pytest.approx(2.0 * dense[:, every] @ dense[:, every].T, abs=1e-4)
+    assert np.concatenate([one.dense(j) for j in range(_JOINTS)], 1) == pytest.approx(dense, abs=1e-6)
+
+
 def test_models_are_dropped_where_they_predict_worse_and_kept_where_chance_decides(
     rng: np.random.Generator,
 ) -> None:

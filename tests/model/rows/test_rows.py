@@ -19,9 +19,12 @@ def prepared() -> Prepared:
     return prepare(Logs((hidden(1), hidden(2))), Recipe())
 
 
-def test_rows_are_those_of_a_zero_phase_butterworth(prepared: Prepared) -> None:
-    """A column through the rows is the same column through scipy's sosfiltfilt, averaged as a held command is."""
-    one = prepared.data.logs[0]
+@pytest.mark.parametrize(("chosen", "step"), [(None, 10.0), (100.0, 2.5)])
+def test_rows_are_those_of_a_zero_phase_butterworth(prepared: Prepared, chosen: float | None, step: float) -> None:
+    """A column through the rows is the same column through scipy's sosfiltfilt, averaged as a held command is; rows may lie
+    between samples."""
+    one = (prepared if chosen is None else prepare(Logs((hidden(1),)), Recipe(cutoff_hz=chosen))).data.logs[0]
+    assert np.diff(one.t) == pytest.approx(step * 1e-3)
     cutoff = one.equations.conditioning.cutoff_hz
     assert cutoff is not None
     x = one.motion.dq[:, 0] * one.motion.q[:, 1]
