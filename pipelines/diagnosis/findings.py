@@ -155,14 +155,16 @@ def findings_of(
 
 
 def _among(own: dict[str, Value], laws: Sequence[tuple[Named, float]]) -> dict[str, Value]:
-    """Return numbers with the variance between laws, Σ w (v - v_own)², in theirs (Draper 1995)."""
-    values = [one.effect.reported(one.values) for one, _ in laws]
-    discrete, out = {q.name for q in laws[0][0].effect.parameters if q.discrete}, dict(own)
-    for name, number in own.items():
-        away = [np.subtract(v[name], values[0][name]) for v in values]
-        square = sum(w * x**2 for (_, w), x in zip(laws, away, strict=True))
-        if np.ndim(square) == 0 and square > 0.0 and (number.std is not None or name in discrete):
-            out[name] = replace(number, std=float(np.hypot(number.std or 0.0, np.sqrt(square))))
+    """Add the variance between laws, Σ w (v - v_own)², to that of each number (Draper 1995)."""
+    every = [one.effect.reported(one.values) for one, _ in laws]
+    quantities, out = {q.name: q for q in laws[0][0].effect.parameters}, dict(own)
+    for name in quantities.keys() & own.keys():
+        values = [x for x in (one.get(name) for one in every) if isinstance(x, int | float)]
+        if len(values) == len(every) and (own[name].std is not None or quantities[name].discrete):
+            away, period = np.subtract(values, values[0]), quantities[name].period or 1e300
+            square = (away - period * np.round(away / period)) ** 2 @ [w for _, w in laws]
+            std = float(np.hypot(own[name].std or 0.0, square**0.5))
+            out[name] = replace(own[name], std=std) if square else own[name]
     return out
 
 

@@ -8,7 +8,7 @@ selection.rounds              the last of them says why the search ended
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -468,18 +468,19 @@ def best_law(later: Later, state: State, chosen: Candidate) -> Candidate:
 def laws_of(later: Later, end: State, place: int) -> list[tuple[Named, float]]:
     """Return a cause by each law and link that it may have, and how probable; its own first."""
     one, rest = end.model.effects[place], end.model.without(place)
-    elsewhere = any(q.link or q.joint for q in one.effect.parameters)
-    shapes = later.dictionary.families[(one.effect.name, one.effect.joint)].shapes
-    laws = dict.fromkeys((one.effect, *one.effect.forms(), *(shapes if elsewhere else ())))
-    if len(laws) == 1 or one.log is not None:
-        return [(one, 1.0)]
-    before = later.fit(rest, end.theta, later.belief_of(rest))
-    tried = [_candidate(later, before, law, np.array(one.amplitudes)) for law in laws]
-    if tried[0] is None:
-        return [(one, 1.0)]
-    known = {k: c for k, c in enumerate(tried) if c is not None and (c.possible or not k)}
-    weight = probabilities({k: c.scores(later) for k, c in known.items()}, later.config)
-    return [(c.state.model.effects[-1], weight[k]) for k, c in known.items()]
+    every, laws = [one.effect, *one.effect.forms()], dict[object, Effect]()
+    if any(q.link or q.joint for q in one.effect.parameters):
+        every += later.dictionary.families[one.effect.name, one.effect.joint].shapes
+    for x in every:  # laws that differ in fitted numbers are the same law
+        laws.setdefault(tuple(getattr(x, f.name) for f in fields(x) if f.name not in x.free), x)
+    if len(laws) > 1 and one.log is None:
+        before = later.fit(rest, end.theta, later.belief_of(rest))
+        tried = [_candidate(later, before, x, np.array(one.amplitudes)) for x in laws.values()]
+        good = [c for c in tried if c is not None and c.possible and not c.noisy]
+        if tried[0] in good:
+            weight = probabilities({k: c.scores(later) for k, c in enumerate(good)}, later.config)
+            return [(c.state.model.effects[-1], weight[k]) for k, c in enumerate(good)]
+    return [(one, 1.0)]
 
 
 def _reformed(later: Later, state: State) -> State:

@@ -91,7 +91,7 @@ class Table:
         return Table(len(columns), self._each(taken))
 
     def replaced(self, columns: Indices, by: Table) -> Table:
-        """Return the table with some columns in the place of others, joint by joint in one piece."""
+        """Return a table of one piece a joint with some of its columns replaced."""
         kept = np.ones(self.width, bool)
         kept[columns] = False
         pieces = []
@@ -114,13 +114,13 @@ class Table:
         return Table(self.width, self._each(lambda i, v: (i, v * scale[i, None])))
 
     def over(self, rows: Indices) -> Table:
-        """Return the same over so many rows of each joint, of joints without any column too."""
+        """Return the table with `rows` rows at each joint, also where no column acts."""
         none = [(np.zeros(0, dtype=np.intp), np.zeros((0, n))) for n in rows]
         pairs = zip(none, self.pieces, strict=True)
         return Table(self.width, tuple((n, *(p for p in own if len(p[0]))) for n, own in pairs))
 
     def mapped(self, change: Callable[[npt.NDArray[Any], int], npt.NDArray[Any]]) -> Table:
-        """Return the table whose columns (…, rows of a joint) are `change` of them and the joint."""
+        """Apply `change(columns, joint)` to the columns of each joint, some at a time."""
         pieces = []
         for j, own in enumerate(self.pieces):
             new = tuple((i, np.empty_like(v)) for i, v in own)
@@ -163,15 +163,15 @@ class Table:
             count = len(part[j]) if part else _rows(mine)
             for rows in _runs(count, self.width + other.width):
                 chosen = rows if part is None else rows.start + np.flatnonzero(part[j][rows])
-                right = [(k, np.asarray(b[:, chosen].T, dtype=np.float64)) for k, b in theirs]
-                for i, a in mine:
+                right = [(k, np.asarray(b[:, chosen].T, dtype=np.float64)) for k, b in theirs if len(k)]
+                for i, a in (own for own in mine if len(own[0])):
                     left = np.asarray(a[:, chosen], dtype=np.float64)
                     for k, b in right:
                         out[np.ix_(i, k)] += left @ b
         return out
 
     def squares(self, groups: Sequence[slice], part: Parts | None = None) -> tuple[Array, ...]:
-        """Return the product A Aᵀ of each group of neighbouring columns, as `gram`."""
+        """Return A Aᵀ of each group of neighbouring columns, in single precision; `part` as in `gram`."""
         out = tuple(np.zeros((g.stop - g.start, g.stop - g.start)) for g in groups)
         for j, ((index, values),) in enumerate(self.compact().pieces):
             rows = slice(None) if part is None else part[j]

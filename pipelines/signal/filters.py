@@ -39,7 +39,7 @@ Complex = npt.NDArray[np.complex128]
 _BLOCK = 48
 AMPLE = 24.0  # samples a period of the cut-off, at which columns are computed: what it lets through shows no difference
 COARSE = 12.0  # at which those of a search are: a change of sign within a sample then shows in a few hundredths of the noise
-_PARTS = 4  # numerics: of a step between rows of fewer samples
+_PARTS = 4  # numerics: steps shorter than so many samples may be fractions, with denominators up to it
 KEEP = 4.0  # samples left per period of the cut-off: the filter is down by 2 × 6 dB per octave and order at the new Nyquist
 
 
@@ -143,7 +143,7 @@ def choose_decimation(cutoff_hz: float, rate: float, keep: float = KEEP) -> int:
 
 
 def choose_step(cutoff_hz: float, rate: float, keep: float) -> Fraction:
-    """Return how many samples lie between rows: `choose_decimation`, or of few samples a fraction that comes nearer to `keep`."""
+    """Return the samples between rows: `choose_decimation`, or below four samples the largest fraction that leaves `keep`."""
     most = rate / (keep * cutoff_hz) + 1e-9
     if most >= _PARTS:
         return Fraction(choose_decimation(cutoff_hz, rate, keep))

@@ -174,8 +174,8 @@ def test_a_lag_is_no_lag_of_another_length() -> None:
 
 
 @pytest.mark.slow
-def test_a_link_that_is_too_short_is_not_told_from_the_next_that_is_too_long(tmp_path: Path) -> None:
-    """A SCARA shows the ratio of its links alone: link 1 by -23.3 mm was told as link 2 by 17.7 mm, with 0.1 mm of deviation."""
+def test_a_short_link_is_not_distinguished_from_a_long_next_one(tmp_path: Path) -> None:
+    """A SCARA shows the ratio of its links alone: link 1 by -23.3 mm was reported as link 2 by 17.7 mm, ± 0.1 mm."""
     case = next(case for case in drawn(10, 67) if case.number_in_name == 67010)
     for log in case.logs():
         write_log(tmp_path / f"{log.name}.h5", log)

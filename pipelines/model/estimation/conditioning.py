@@ -24,7 +24,7 @@ class Conditioning:
     low_pass: LowPass | None
     cutoff_hz: float | None
     decimation: int
-    step: Fraction  # samples between rows that are thinned out in the frequency domain, where a part of a sample can be left out
+    step: Fraction  # samples between rows that are thinned out in the frequency domain; may be fractional
     min_speed: tuple[float, ...]  # [rad/s] slower samples of a joint are left out of its own equations
 
 

@@ -105,6 +105,7 @@ def fitted_arm(found: Estimate, name: str, friction: Sequence[Acting] = ()) -> A
 
 
 def with_offsets(columns: Columns) -> Columns:
-    """Return the columns with a torque offset at every joint, as `nominal_columns` has them."""
-    laws = {(law.name, law.joint): law for law in (*nominal_columns(columns.body.robot).laws, *columns.laws)}
+    """Return the columns with a torque offset at every joint."""
+    offsets = everywhere(find_effect("torque_offset"), columns.body.robot.revolute)
+    laws = {(law.name, law.joint): law for law in (*columns.laws, *offsets)}
     return replace(columns, laws=tuple(laws.values()))

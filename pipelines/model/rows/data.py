@@ -240,7 +240,7 @@ class LogData:
         return replace(self, motion=motion, pieces=pieces, runs=runs, kept=kept)
 
     def at_rows(self, x: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """What `x` (samples, …) is at the moments of the rows, unfiltered; between samples on a straight line."""
+        """Return `x` (samples, …) at the times of the rows, unfiltered and interpolated linearly."""
         return np.concatenate([run.between(x[piece]) for piece, run in self._parts])
 
     def lay(self, table: Array) -> Array:
@@ -435,7 +435,7 @@ def _first_known(run: Run, piece: slice) -> int:
 def _skipped(equations: LogEquations, per_period: float = AMPLE) -> int:
     """Return every how many samples columns are computed, at least so many times in a period of the low-pass."""
     how = equations.conditioning
-    if how.cutoff_hz is None:
+    if how.cutoff_hz is None or how.step.denominator > 1:
         return 1
     step = equations.found.good.log.sample_time
     highest = min(how.cutoff_hz, 0.5 / (step * how.step))  # rows further apart than the low-pass asks for show less

@@ -107,7 +107,7 @@ def facts(left: Array, known: bool, prepared: Prepared, estimated: Estimate) -> 
     told = np.full(len(left), known)
     if not known:  # what is predicted is off by the noise and by the deviations of the model
         told = left <= _ABOVE * np.hypot(_noise(prepared), spread)
-    confused = unresolved(estimated) or dependent(_estimated(prepared, with_offsets(prepared.columns)))
+    confused = unresolved(estimated) or ("" if known else dependent(_estimated(prepared, with_offsets(prepared.columns))))
     return Facts(left, judge.rms(judge.y), spread, confused, told)
 
 
