@@ -46,12 +46,11 @@ def screen(
     half = info.half(cross)
     out = []
     for group, square in zip(groups, own, strict=True):
-        part = group.span
-        left = square - half[:, part].T @ half[:, part]
+        left = square - half[:, group.span].T @ half[:, group.span]
         unit = np.sqrt(np.maximum(np.diag(square), 1e-300))
         values, vectors = np.linalg.eigh(left / unit / unit[:, None])
         seen = values > _VISIBLE
-        z = vectors[:, seen].T @ (moments[part] / unit)
+        z = vectors[:, seen].T @ (moments[group.span] / unit)
         amplitudes = (vectors[:, seen] @ (z / values[seen])) / unit
         gain = float(np.sum(z**2 / values[seen]))
         found = Screened(group, gain, int(seen.sum()), amplitudes)

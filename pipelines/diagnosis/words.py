@@ -25,7 +25,7 @@ __all__ = ["how_much", "of_any_size", "other_joint", "summary_of", "taken_in", "
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 _DEGREE = np.pi / 180.0
 _TORQUES = ("N m", "N")
-_TOLD = 2  # further findings that a sentence names
+_TOLD, _VAGUE = 2, 5.0  # further findings in a sentence; deviations, within which it shows them
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
 
@@ -74,13 +74,14 @@ def how_much(one: Finding) -> str:
         return ""
     if told.unit == "kg" and one.joint is None:
         return f" of {plain_number(told.value, 3)} kg"
-    times, unit = _USUAL.get(told.unit, (1.0, told.unit))
-    if effect.words.size == "angle":
-        times, unit = 1.0 / _DEGREE, "°"
+    degrees, usual = (1.0 / _DEGREE, "°"), _USUAL.get(told.unit, (1.0, told.unit))
+    times, unit = degrees if effect.words.size == "angle" else usual
     signed = any(q.name == effect.words.size and q.low < 0.0 for q in effect.parameters)
     sign = "+" if signed and told.value > 0.0 else ""
     space = "" if unit == "°" else " "
-    return f" ({sign}{plain_number(told.value * times, 3)}{space}{unit.replace('^2', '²')})"
+    std = told.std if isinstance(told.std, float) and np.isfinite(told.std) else 0.0
+    off = f" ± {plain_number(std * times, 2)}" if abs(told.value) < _VAGUE * std else ""
+    return f" ({sign}{plain_number(told.value * times, 3)}{off}{space}{unit.replace('^2', '²')})"
 
 
 def other_joint(parameters: Mapping[str, Value]) -> str:
