@@ -16,7 +16,7 @@ and standard deviation are both a share of the joint's torque, so that one numbe
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
 
-__all__ = ["Facts", "JudgeableConfig", "cannot_judge", "dependent", "predicted_std", "unresolved"]
+__all__ = ["Facts", "JudgeableConfig", "cannot_judge", "one_way", "predicted_std", "unresolved"]
 
 _RECORD = "record reference logs while the arm is known to be healthy, or a motion that repeats itself"
 
@@ -60,10 +60,15 @@ def unresolved(found: Estimate) -> str:
     return found.unresolved.told(columns_in_words(one.name for one in found.columns.names))
 
 
-def dependent(found: Estimate) -> str:
-    """Return which parameters' columns are linearly dependent, however small the noise; empty where none are."""
-    names = columns_in_words(one.name for one in found.columns.names)
-    return identifiability.unresolved(found.solution, [one.name for one in found.columns.names], 0.0).told(names)
+def one_way(found: Estimate) -> str:
+    """Return which friction is linearly dependent on an offset, for its joint moves one way; empty where none is.
+
+    The constant gravity of a vertical slide is an offset too, and no reason to doubt a model.
+    """
+    names = [one.name for one in found.columns.names]
+    lost = identifiability.unresolved(found.solution, names, 0.0)
+    friction = tuple(group for group in lost.confused if all(":" in name for name in group))  # no base parameters
+    return replace(lost, never_moved=(), confused=friction).told(columns_in_words(names))
 
 
 def predicted_std(found: Estimate, equations: Iterable[Block]) -> Array:

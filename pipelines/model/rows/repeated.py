@@ -22,7 +22,7 @@ import numpy.typing as npt
 
 from pipelines.log.experiment import Array
 from pipelines.model.estimation.estimate import Estimate, estimate
-from pipelines.model.estimation.judgeable import Facts, dependent, predicted_std, unresolved
+from pipelines.model.estimation.judgeable import Facts, one_way, predicted_std, unresolved
 from pipelines.model.estimation.nominal import with_offsets
 from pipelines.model.estimation.regression import Columns, LogEquations
 from pipelines.model.rows.data import Data
@@ -107,7 +107,7 @@ def facts(left: Array, known: bool, prepared: Prepared, estimated: Estimate) -> 
     told = np.full(len(left), known)
     if not known:  # what is predicted is off by the noise and by the deviations of the model
         told = left <= _ABOVE * np.hypot(_noise(prepared), spread)
-    confused = unresolved(estimated) or ("" if known else dependent(_estimated(prepared, with_offsets(prepared.columns))))
+    confused = unresolved(estimated) or ("" if known else one_way(_estimated(prepared, with_offsets(prepared.columns))))
     return Facts(left, judge.rms(judge.y), spread, confused, told)
 
 
