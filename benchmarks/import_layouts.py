@@ -35,7 +35,7 @@ from pipelines.stage import Request, run_stage
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
 SETS = ("robots", "programs", "stranger", "stranger_2", "fresh", "fresh_2", "stranger_3", "stranger_4", "stranger_5", "stranger_6")
-SETS += ("stranger_7", "stranger_8")
+SETS += ("stranger_7", "stranger_8", "stranger_9")
 
 
 @dataclass(frozen=True)
