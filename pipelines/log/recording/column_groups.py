@@ -53,6 +53,7 @@ class Group:
     order: Order  # text: as columns of text name them, and no robot has these names
     words: str  # the group in words, for comments
     unknown: frozenset[str] = frozenset()  # words of all its names that no vocabulary has
+    gripper: tuple[str, ...] = ()  # columns left out: the file's list of names calls them so
 
     @property
     def side(self) -> Literal["joint", "motor", "scaled", ""]:

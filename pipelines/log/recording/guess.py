@@ -461,12 +461,15 @@ class _Drafting:
 
 
 def _order(group: Group) -> list[str]:
+    gripper = ", ".join(clean(column, 40) for column in group.gripper)
+    left_out = f"    # left out, a gripper's by the file's names: {gripper}"
+    lines = [left_out] if gripper else []
     if group.order == "robot":
-        return ["    # in the order of the robot's joints, by their names"]
-    if group.order == "file" and len(group.columns) > 1:
+        lines.append("    # in the order of the robot's joints, by their names")
+    elif group.order == "file" and len(group.columns) > 1:
         taken = "the joints are taken in the order of the file, from the base to the tip"
-        return [f"    # check: {taken}"]
-    return []
+        lines.append(f"    # check: {taken}")
+    return lines
 
 
 def _also(choice: Choice, table: RawTable) -> list[str]:

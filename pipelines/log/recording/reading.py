@@ -28,7 +28,7 @@ from pipelines.log.recording.column_groups import (
     tables_beside,
     texts_of,
 )
-from pipelines.log.recording.column_names import WORDS, words_of
+from pipelines.log.recording.column_names import WORDS, read_name, words_of
 from pipelines.log.recording.evidence import Slope, crossed, slope_of
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.robot import RobotDescription
@@ -191,6 +191,9 @@ def _groups_and_clock(path: Path, table: RawTable, arm: Arm) -> tuple[list[Group
     rest = [tuple(c for c in g.columns if c not in used) for g in groups]
     groups = [replace(g, columns=c) for g, c in zip(groups, rest, strict=True) if c]
     groups = [_without_rest(table, g, arm.n) for g in groups if not _is_orientation(table, g)]
+    notes = table.notes if arm.n is None else ()
+    listed = [re.findall(r"[\w./:-]+", note.partition(" = ")[2]) for note in notes]
+    groups = [_without_gripper(group, listed) for group in groups]
     groups = [g for g in groups if g.quantity != "position" or _moves(table, g)]
     return _derivatives(table, _parts_and_plans(groups, path, used), clock), clock
 
@@ -262,6 +265,15 @@ def _without_rest(table: RawTable, group: Group, n: int | None) -> Group:
     rest_moves = any(np.ptp(table.columns[c]) > 0.0 for c in rest)
     first_moves = all(np.ptp(table.columns[c]) != 0.0 for c in first)
     return replace(group, columns=first) if rest and not rest_moves and first_moves else group
+
+
+def _without_gripper(group: Group, listed: Sequence[Sequence[str]]) -> Group:
+    """Leave out the columns that as many names, listed in the file, call a gripper's."""
+    names = next((words for words in listed if len(words) == len(group.columns)), ())
+    pairs = zip(group.columns, names, strict=False)
+    gripper = tuple(c for c, name in pairs if read_name(name).quantity == "other")
+    kept = tuple(column for column in group.columns if column not in gripper)
+    return replace(group, columns=kept, gripper=gripper) if kept else group
 
 
 def _parts_and_plans(groups: list[Group], path: Path, clock: Sequence[str]) -> list[Group]:

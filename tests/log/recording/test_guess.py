@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.recorded_arm import LIFT, THREE, Arm, Run, simulate
+from benchmarks.recorded_arm import LIFT, PANDA, THREE, Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
 from pipelines.log.files import open_log
@@ -326,6 +326,19 @@ def test_joints_named_in_a_list_of_a_parquet_file_give_the_order(tmp_path: Path)
     draft = draft_recipe(tmp_path / "run.parquet").text
     assert 'column = "stamp_ns"\nunit = "ns"' in draft
     assert 'columns = ["position_3", "position_2", "position_1"], unit = "rad"' in draft
+
+
+def test_a_gripper_in_a_list_of_names_is_no_joint_of_an_arm_whose_end_is_open(tmp_path: Path) -> None:
+    run = simulate(PANDA, seed=3, seconds=2.0)
+    (tmp_path / "arm.urdf").write_text(PANDA.urdf())
+    fingers = np.full((len(run.t), 2), 0.02)
+    data = {"t": run.t, "name": [sorted((*PANDA.joints, *PANDA.fingers))] * len(run.t)}
+    data |= {"position": np.hstack([fingers, run.q]).tolist(), "effort": np.hstack([fingers, run.tau]).tolist()}
+    pd.DataFrame(data).to_parquet(tmp_path / "run.parquet")
+    draft = draft_recipe(tmp_path / "run.parquet").text
+    for name in ("position", "effort"):
+        assert f"columns = {json.dumps([f'{name}_{j}' for j in range(3, 10)])}" in draft
+        assert f"# left out, a gripper's by the file's names: {name}_1, {name}_2" in draft
 
 
 def test_a_position_that_never_moves_is_no_joint(tmp_path: Path) -> None:
