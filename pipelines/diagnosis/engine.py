@@ -18,8 +18,8 @@ from pipelines.diagnosis.prior import Prior, prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.selection import SearchStart, Selection, select
 from pipelines.diagnosis.state import State
-from pipelines.diagnosis.variance import settle
-from pipelines.fit.joint_table import Array, Table, in_rows
+from pipelines.diagnosis.variance import Explained, settle
+from pipelines.fit.joint_table import Table, in_rows
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
@@ -82,13 +82,14 @@ class Look:
         return None if rows is None or columns is None else (rows, columns)
 
 
-def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:
-    """Return the torque (rows,) [N m] of the causes, and of all that was fitted with them."""
+def _explained(rough: Dataset, every: Dictionary, look: Look) -> Explained:
+    """Return the torque of the causes of a look, and of all that was fitted with them."""
     rows, end, prior = rough.later, look.reported, look.later.prior
     whole = end.model.torque(rows.data)
     small = every.later.take(prior.standing).times(end.theta[prior.n_nominal :])
     cause = whole - replace(end.model, effects=()).torque(rows.data)
-    return cause, whole + in_rows(small, rows.joint) / rows.weight
+    fit = whole + in_rows(small, rows.joint) / rows.weight
+    return Explained(cause, fit, look.reference)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +122,8 @@ def diagnose(
 def pose(prepared: Prepared, config: DiagnosisConfig) -> Later:
     """Return the rows of later logs beside their prior, with all candidates."""
     rough = load(prepared, prepared.logs.frf)
-    dataset, dictionary = settle(rough, Dictionary.of(rough, config), config)
+    dataset, columns = settle(rough, Dictionary.of(rough, config), config)
+    dictionary = columns()
     return Later.of(dataset, dictionary, prior_of(dataset, dictionary, config), config)
 
 
@@ -133,18 +135,18 @@ def diagnose_prepared(
     every = Dictionary.of(rough, config, exclude)
     responses = compliance(rough.frf, rough.model.nominal, exclude)
     named = _new(responses, rough, prepared, exclude)
-    last, known = Look.of(*settle(rough, every, config), named, config), 0
+    dataset, columns = settle(rough, every, config)
+    last, known = Look.of(dataset, columns(), named, config), 0
     for _ in range(_LOOKS):  # what the causes leave tells the noise, and what is typical
         power, found, usual = last.later.dataset.noise_power, last.selection.found, last.usual
         if not found.causes:
             break
-        torques = _torques(rough, every, last)
-        dataset, dictionary = settle(rough, every, config, *torques, last.reference)
+        dataset, columns = settle(rough, every, config, _explained(rough, every, last))
         change = np.abs(np.log(dataset.noise_power / power)).max()
         if change < _SETTLED and (usual is not None or len(found.causes) == known):
             break
         del last  # its columns take the memory that the next ones need
-        last, known = Look.of(dataset, dictionary, named, config, found, usual), len(found.causes)
+        last, known = Look.of(dataset, columns(), named, config, found, usual), len(found.causes)
     last = replace(last, selection=last.selection.without_selected_alternatives)
     decision = decide(last.later, last.selection, last.baseline)
     return Diagnosis(decision, last, responses)

@@ -1,7 +1,7 @@
 """Estimate variance components of standing numbers, and the noise of each session.
 
     found = components(table, y, groups, n_nominal, config)
-    dataset, dictionary = settle(dataset, dictionary, config)
+    dataset, columns = settle(dataset, dictionary, config)
 
 Standing numbers s_g ~ N(0, τ_g), with τ_g by empirical Bayes: expectation maximisation, each group
 shrunk to its family (Dempster, Laird & Rubin 1977; Efron & Morris 1973). The noise Σ of each
@@ -11,7 +11,7 @@ together leave, fitted by generalised least squares (Cochrane & Orcutt 1949).
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,10 +24,9 @@ from pipelines.diagnosis.screening import best_of, screen
 from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
 from pipelines.model.arm import Arm
 
-__all__ = ["Components", "components", "settle"]
+__all__ = ["Components", "Explained", "components", "settle"]
 
 _FLAT = 1e-10  # numerics: of a column's information
-_ROUNDS = 2  # numerics: of generalised least squares; a third changes the noise by a fiftieth
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
 _EM_ROUNDS = 8  # numerics: rounds of it; more change the variances by less than a tenth
 
@@ -101,51 +100,55 @@ def _family(group: Group) -> tuple[str, int | None]:
     return (group.family, group.key[1])
 
 
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What an earlier look has explained, and the reference rows and columns that it whitened."""
+
+    cause: Array  # (rows,) [N m] torque of the causes found, which is no noise of the later rows
+    fit: Array  # (rows,) [N m] of the whole fitted model: the residual of the rows is the noise
+    reference: tuple[Rows, Table] | None
+
+
 def settle(
     dataset: Dataset,
     dictionary: Dictionary,
     config: DiagnosisConfig,
-    cause: Array | None = None,
-    fit: Array | None = None,
-    reference: tuple[Rows, Table] | None = None,
-) -> tuple[Dataset, Dictionary]:
+    known: Explained | None = None,
+) -> tuple[Dataset, Callable[[], Dictionary]]:
     """Return the rows of each session whitened, in units of its own noise, and their columns.
 
     Sessions that are compared use the same columns, the first shapes, so that their residuals are
     comparable. Rows alone use the best shape of each cause, and the best window of each log, or a
-    fault of another shape would be noise.
-
-    Args:
-        cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
-        fit: (rows,) [N m] torque of the whole fitted model; the residual of the rows is the noise.
-        reference: rows and columns of the reference that were settled before.
+    fault of another shape would be noise. The columns, which take most memory, are made when they
+    are asked for.
     """
-
     alone = dataset.reference is None
     first = tuple(group for group in dictionary.groups if group.shape == 0)
 
-    def settled(rows: Rows, table: Table) -> tuple[list[Array], Table]:
-        white, columns, left = rows, table, list(rows.y)
-        for _ in range(_ROUNDS if alone else 1):
-            groups = _best_shapes(white, columns, dictionary.groups) if alone else first
-            numbers = _imitated(white, columns, groups, config)
-            torque = Table.stacked([rows.nominal, table]).times(numbers)
-            left = [y - t for y, t in zip(rows.y, torque, strict=True)]
-            left = _less_events(rows, dictionary, dataset.arm, left) if alone else left
-            white, through = rows.whitened(left, config.noise_bins)
-            columns = through(table)
-        return left, columns
+    def left(rows: Rows, table: Table, white: Rows, columns: Table) -> list[Array]:
+        groups = _best_shapes(white, columns, dictionary.groups) if alone else first
+        numbers = _imitated(white, columns, groups, config)
+        torque = Table.stacked([rows.nominal, table]).times(numbers)
+        noise = [y - t for y, t in zip(rows.y, torque, strict=True)]
+        return _less_events(rows, dictionary, dataset.arm, noise) if alone else noise
 
-    noise, table = settled(dataset.later.less(fit), dictionary.later)
-    cleared, _ = dataset.later.less(cause).whitened(noise, config.noise_bins)
-    dataset = replace(dataset, later=cleared.less(None), cleared=cleared)
-    if dataset.reference is None or dictionary.reference is None:
-        return dataset, replace(dictionary, later=table)
-    if reference is None:
-        noise, known = settled(dataset.reference, dictionary.reference)
-        reference = dataset.reference.whitened(noise, config.noise_bins)[0], known
-    before, known = reference
-    return (replace(dataset, reference=before), replace(dictionary, later=table, reference=known))
+    cause, fit = (None, None) if known is None else (known.cause, known.fit)
+    rows, table, bins = dataset.later.less(fit), dictionary.later, config.noise_bins
+    noise = left(rows, table, rows, table)
+    if alone and known is None:  # what fits best depends on the noise
+        white, through = rows.whitened(noise, bins)
+        noise = left(rows, table, white, through(table))
+    cleared, to_later = dataset.later.less(cause).whitened(noise, bins)
+    now = replace(dataset, later=cleared.less(None), cleared=cleared)
+    if now.reference is not None and dictionary.reference is not None:
+        if known is None or known.reference is None:
+            before, own = now.reference, dictionary.reference
+            white, through = before.whitened(left(before, own, before, own), bins)
+            columns = through(own)
+        else:
+            white, columns = known.reference
+        now, dictionary = replace(now, reference=white), replace(dictionary, reference=columns)
+    return now, lambda: replace(dictionary, later=to_later(table))
 
 
 def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tuple[Group, ...]:
