@@ -250,9 +250,10 @@ class LogData:
         out = np.zeros((len(flat), self.rows))
         if len(active):
             out[active] = self.lay_signals(flat[active], active // (1 if table.ndim == 2 else table.shape[2]))
-        if table.ndim == 2:
-            return out
-        return out.reshape(table.shape[1], table.shape[2], self.rows).transpose(1, 0, 2)
+        laid: Array = out if table.ndim == 2 else out.reshape(*table.shape[1:], self.rows).transpose(1, 0, 2)
+        if not self.weighed.all():
+            laid[..., ~self.weighed] = 0.0
+        return laid
 
     def lay_signals(self, x: npt.NDArray[Any], joints: Sequence[int] | Indices) -> npt.NDArray[Any]:
         """(channels, samples) of torques of the `joints` (channels,), from 0 -> (channels, rows)."""
@@ -339,15 +340,20 @@ class Data:
     def lay_each(self, torque: Callable[[int, Motion], Array]) -> Array:
         """The same of a torque that may differ from log to log: of each log's number and motion."""
         laid = [one.lay(torque(self.first + k, one.motion)) for k, one in enumerate(self.logs)]
-        return self.clear(np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1))
+        return np.concatenate([x.reshape(*x.shape[:-2], -1) for x in laid], axis=-1)
 
-    def lay_kept(self, key: Hashable, torque: Callable[[Motion], Array]) -> Array:
-        """As `lay` of columns (samples, joints, k) that follow from the motion alone; `key` says which they are."""
+    def lay_kept(self, key: Hashable, torque: Callable[[Motion], Array], times: Array | None = None) -> Array:
+        """As `lay` of columns (samples, joints, k) that follow from the motion alone; `key` says which they are.
+
+        Args:
+            times: (k,) numbers of the columns, for the torque (rows,) that they give; None: the columns themselves.
+        """
         def lay(one: LogData) -> Callable[[], Array]:
             return lambda: one.lay(torque(one.motion))
 
-        laid = [one.kept.of((one.place, key), lay(one)) for one in self.logs]
-        return self.clear(np.concatenate([x.reshape(len(x), -1) for x in laid], axis=-1))
+        each = (one.kept.of((one.place, key), lay(one)) for one in self.logs)
+        laid = [x.reshape(len(x), -1) for x in each]
+        return np.concatenate(laid if times is None else [times @ x for x in laid], axis=-1)
 
     def blocks(self, count: int) -> Indices:
         """(rows,) to which of about `count` stretches of time a row belongs, each within one log, all joints alike."""

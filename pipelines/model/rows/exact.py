@@ -187,10 +187,10 @@ class Exact:
         if not all(from_motion(law) for law in self.columns.laws):
             return data.lay(self.nominal.torque)
         kept = len(self.columns.kept)
-        torque, first = self.beta[:kept] @ rigid_rows(data, self.columns), kept
+        torque, first = rigid_rows(data, self.columns, self.beta[:kept]), kept
         for law in self.columns.laws:
             count = sum(not q.shape for q in law.parameters)
-            torque = torque + self.beta[first:first + count] @ law_rows(data, law, self.columns)
+            torque = torque + effect_rows(data, law, self.columns.arm, self.beta[first:first + count])
             first += count
         return np.asarray(torque)
 

@@ -126,10 +126,11 @@ def rows_of(data: Data, columns: Columns) -> Array:
     return np.concatenate([rigid_rows(data, columns), *(law_rows(data, law, columns) for law in columns.laws)])
 
 
-def rigid_rows(data: Data, columns: Columns) -> Array:
+def rigid_rows(data: Data, columns: Columns, times: Array | None = None) -> Array:
+    """(k, rows), or (rows,) [N m] with the numbers `times`."""
     kept = list(columns.kept)
     return data.lay_kept((columns.body, columns.kept),
-                         lambda motion: columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept])
+                         lambda motion: columns.body.regressor(motion.q, motion.dq, motion.ddq)[:, :, kept], times)
 
 
 def law_rows(data: Data, law: Effect, columns: Columns) -> Array:
@@ -137,11 +138,12 @@ def law_rows(data: Data, law: Effect, columns: Columns) -> Array:
     return effect_rows(data, law, columns.arm)
 
 
-def effect_rows(data: Data, effect: Effect, arm: ArmModel) -> Array:
-    """(k, rows) columns of an effect in one shape."""
+def effect_rows(data: Data, effect: Effect, arm: ArmModel, times: Array | None = None) -> Array:
+    """(k, rows) columns of an effect in one shape, or (rows,) [N m] with the amplitudes `times`."""
     if from_motion(effect):
-        return data.lay_kept(effect, lambda motion: effect.columns(motion, arm))
-    return data.lay(lambda motion: effect.columns(motion, arm))
+        return data.lay_kept(effect, lambda motion: effect.columns(motion, arm), times)
+    columns = data.lay(lambda motion: effect.columns(motion, arm))
+    return columns if times is None else np.asarray(times @ columns)
 
 
 def several_rows(data: Data, shapes: Sequence[Effect], arm: ArmModel) -> list[Array]:
