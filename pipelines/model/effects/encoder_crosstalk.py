@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import perturbed_torque, shifted
+from pipelines.model.rigid.perturbation import arm_slopes, perturbed_by, shifted
 
 __all__ = ["EncoderCrosstalk"]
 
@@ -33,7 +33,7 @@ class EncoderCrosstalk(Effect):
     acts_on = "encoder"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
-        return perturbed_torque(arm.torque, motion, self._index, *self._error(motion))[..., None]
+        return perturbed_by(arm_slopes(arm, motion, self._index), *self._error(motion))[..., None]
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         true = self._corrected(motion, values) if values["coefficient"] else motion

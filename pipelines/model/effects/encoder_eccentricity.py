@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import perturbed_torque, shifted
+from pipelines.model.rigid.perturbation import arm_slopes, perturbed_by, shifted
 
 __all__ = ["EncoderEccentricity"]
 
@@ -39,7 +39,8 @@ class EncoderEccentricity(Effect):
         q, v, u = (self.own(x) for x in (motion.q, motion.dq, motion.ddq))
         s, c = np.sin(q), np.cos(q)
         errors = ((-s, -c * v, s * v * v - c * u), (-c, s * v, c * v * v + s * u))
-        return np.stack([perturbed_torque(arm.torque, motion, self._index, *error) for error in errors], axis=-1)
+        slopes = arm_slopes(arm, motion, self._index)
+        return np.stack([perturbed_by(slopes, *error) for error in errors], axis=-1)
 
     def amplitudes(self, values: Values) -> Array:
         return values["amplitude"] * np.array([np.cos(values["phase"]), np.sin(values["phase"])])

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import perturbed_torque, rate_of, shifted
+from pipelines.model.rigid.perturbation import arm_slopes, perturbed_by, rate_of, shifted
 
 __all__ = ["TimeDelay"]
 
@@ -39,7 +39,7 @@ class TimeDelay(Effect):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         dq, ddq = self.own(motion.dq), self.own(motion.ddq)
-        return perturbed_torque(arm.torque, motion, self._index, dq, ddq, rate_of(ddq, motion.t))[..., None]
+        return perturbed_by(arm_slopes(arm, motion, self._index), dq, ddq, rate_of(ddq, motion.t))[..., None]
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         true = self._moved(motion, values["delay"]) if values["delay"] else motion

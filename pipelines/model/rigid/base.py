@@ -21,7 +21,6 @@ from pipelines.log.robot import RobotDescription
 from pipelines.model.rigid import chain as serial
 from pipelines.model.rigid.body import BaseParameter, TorqueParts, refuse_other_length, refuse_other_shapes
 from pipelines.model.rigid.geometry import SerialChain, serial_chain
-from pipelines.model.rigid.kept_torque import kept
 from pipelines.model.rigid.kinematics import tip_position
 
 __all__ = ["BaseArm", "BaseSet", "base_set"]
@@ -163,8 +162,7 @@ class BaseArm:
     def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
         """τ = Y p (samples, joints) [N m], by the recursion, without forming Y."""
         self._check(p, q=q, dq=dq, ddq=ddq)
-        phi = self.standard(p)
-        return kept(self.chain, (q, phi, dq, ddq), lambda: serial.inverse_dynamics(self.chain, q, dq, ddq, phi))
+        return serial.inverse_dynamics(self.chain, q, dq, ddq, self.standard(p))
 
     def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
         """Inertial, Coriolis and gravity torque."""

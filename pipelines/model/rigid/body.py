@@ -15,7 +15,7 @@ __all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "refu
 
 Array = npt.NDArray[np.float64]
 
-_KEPT = 6  # torques of a motion
+_KEPT = 24  # numerics: torques of a motion: slopes of seven joints, of the arm and of the body, and more
 
 
 @dataclass(frozen=True)

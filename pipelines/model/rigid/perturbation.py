@@ -10,14 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["deflection", "oscillation", "perturbed_by", "perturbed_torque", "rate_of", "rigid_slopes", "shifted"]
+__all__ = ["arm_slopes", "deflection", "oscillation", "perturbed_by", "perturbed_torque", "rate_of", "rigid_slopes", "shifted"]
 
 Torque = Callable[[Motion], Array]
+
+
+class Moving(Protocol):
+    """An arm: what torque it needs for a motion."""
+
+    def torque(self, motion: Motion) -> Array: ...
+
 
 _STEP = 1e-6  # [rad], [rad/s] and, thousandfold, [rad/s^2]: far below what friction's sharpness resolves, far above rounding
 _ROUNDS = 3  # each leaves what is of higher order in the deflection
@@ -49,21 +57,30 @@ def perturbed_torque(torque: Torque, motion: Motion, index: int, d: Array, rate:
     return np.asarray((ahead - behind) / (2.0 * e))
 
 
-def perturbed_by(slopes: tuple[Array, Array, Array], d: Array, rate: Array, second: Array) -> Array:
+def perturbed_by(slopes: Array, d: Array, rate: Array, second: Array) -> Array:
     """P_j(d) (samples, joints) by the slopes K_j, C_j, M_j."""
     spring, drag, mass = slopes
     return np.asarray(spring * d[:, None] + drag * rate[:, None] + mass * second[:, None])
 
 
-def rigid_slopes(body: RigidBody, p: Array, motion: Motion, index: int) -> tuple[Array, Array, Array]:
-    """Columns K_j, C_j, M_j (samples, joints) of the rigid arm, for whoever asks P_j of several directions."""
+def torque_slopes(torque: Torque, motion: Motion, index: int) -> Array:
+    """K_j, C_j, M_j (3, samples, joints), for whoever asks P_j of several directions."""
     zero, one = np.zeros(len(motion.t)), np.ones(len(motion.t))
+    units = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
+    return np.stack([perturbed_torque(torque, motion, index, *unit) for unit in units])
 
+
+def arm_slopes(arm: Moving, motion: Motion, index: int) -> Array:
+    """The same of an arm with its friction, kept with the motion."""
+    return motion.kept(("slopes of the arm", arm, index), lambda: torque_slopes(arm.torque, motion, index))
+
+
+def rigid_slopes(body: RigidBody, p: Array, motion: Motion, index: int) -> Array:
+    """The same of the rigid arm alone, kept with the motion."""
     def torque(there: Motion) -> Array:
         return body.torque(there.q, there.dq, there.ddq, p)
 
-    spring, drag = (perturbed_torque(torque, motion, index, *unit) for unit in ((one, zero, zero), (zero, one, zero)))
-    return spring, drag, body.mass_matrix(motion.q, p)[:, :, index]
+    return motion.kept(("slopes of the body", body, p, index), lambda: torque_slopes(torque, motion, index))
 
 
 def deflection(torque: Torque, motion: Motion, index: int, stiffness: float, damping: float,
@@ -77,9 +94,8 @@ def deflection(torque: Torque, motion: Motion, index: int, stiffness: float, dam
     solved from sample to sample.
     """
     base, own = inertia > 0.0, motion.ddq[:, index]
-    zero, one = np.zeros(len(motion.t)), np.ones(len(motion.t))
-    mass, drag, spring = (perturbed_torque(torque, motion, index, *unit)[:, index]
-                          for unit in ((zero, zero, one), (zero, one, zero), (one, zero, zero)))
+    zero = np.zeros(len(motion.t))
+    spring, drag, mass = torque_slopes(torque, motion, index)[..., index]
     mass = np.maximum(mass + inertia, _LEAST * mass)
     drag, spring = drag + damping, np.maximum(spring + stiffness, 0.5 * stiffness)
     x = rate = second = zero

@@ -1,0 +1,29 @@
+"""A motion keeps what was made of it for the very objects that asked."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipelines.model.rigid.body import Motion
+
+
+def test_a_motion_keeps_the_last_torques_of_the_very_objects() -> None:
+    """Equal objects are others: what they compare by may be arrays."""
+    x = np.zeros((4, 2))
+    motion, asked = Motion(np.zeros(4), x, x, x), list[int]()
+
+    def work() -> np.ndarray:
+        asked.append(len(asked))
+        return np.full(3, float(len(asked)))
+
+    one, other = (x.copy(),), (x.copy(),)
+    first = motion.kept(("torque", one), work)
+    assert motion.kept(("torque", one), work) is first
+    assert not first.flags.writeable
+    motion.kept(("torque", other), work)
+    motion.kept(("friction", one), work)
+    assert motion.kept(("torque", one), work) is first
+    assert len(asked) == 3
+    for k in range(40):
+        motion.kept(("torque", np.full(1, k)), work)
+    assert motion.kept(("torque", one), work)[0] == 44.0
