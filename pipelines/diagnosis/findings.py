@@ -121,7 +121,7 @@ def findings_of(
         np.zeros(0),
         np.zeros((len(end.model.beta) + len(names), 0)),
         tuple(names),
-        covariance(later, end),
+        covariance(later, later.uncertain(end)),
     )
     out = []
     for place, (probability, others) in enumerate(causes):
