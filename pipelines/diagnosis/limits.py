@@ -169,14 +169,8 @@ def _told(
 
 def _main(effect: Effect, values: dict[str, float]) -> Quantity | None:
     """Return the parameter that is the size of an effect; None where no value is finite."""
-    return next(
-        (
-            q
-            for q in effect.parameters
-            if not q.shape and not q.derived and values.get(q.name) and np.isfinite(values[q.name])
-        ),
-        None,
-    )
+    sizes = (q for q in effect.parameters if not (q.shape or q.derived) and values.get(q.name))
+    return next((q for q in sizes if np.isfinite(values[q.name])), None)
 
 
 def _hiding(later: Later, one: _Shape) -> str:
@@ -228,13 +222,8 @@ def without_limit(
 
 def _stand_ins() -> set[str]:
     """Laws that are the plainer form of another, and on no rung of the ladder of fit-friction."""
-    plainer = {
-        name
-        for kind in all_effects()
-        if issubclass(kind, FrictionLaw)
-        for names in kind.plainer
-        for name in names
-    }
+    laws = [kind for kind in all_effects() if issubclass(kind, FrictionLaw)]
+    plainer = {name for kind in laws for names in kind.plainer for name in names}
     return plainer - {name for law in LADDER for name in law.members}
 
 

@@ -140,14 +140,13 @@ def settle(
         noise = left(rows, table, white, through(table))
     cleared, to_later = dataset.later.less(cause).whitened(noise, bins)
     now = replace(dataset, later=cleared.less(None), cleared=cleared)
-    if now.reference is not None and dictionary.reference is not None:
-        if known is None or known.reference is None:
-            before, own = now.reference, dictionary.reference
-            white, through = before.whitened(left(before, own, before, own), bins)
-            columns = through(own)
-        else:
-            white, columns = known.reference
-        now, dictionary = replace(now, reference=white), replace(dictionary, reference=columns)
+    before, own = dataset.reference, dictionary.reference
+    done = None if known is None else known.reference
+    if done is None and before is not None and own is not None:
+        white, through = before.whitened(left(before, own, before, own), bins)
+        done = white, through(own)
+    if done is not None:
+        now, dictionary = replace(now, reference=done[0]), replace(dictionary, reference=done[1])
     return now, lambda: replace(dictionary, later=to_later(table))
 
 
