@@ -134,27 +134,19 @@ def _lay(
     groups: list[Group],
     parts: list[Table],
 ) -> None:
-    seen = sum(part.width for part in parts)
-    compliant = family.shapes[0].evidence == "frequency responses"
-    kind: Kind = "compliance" if compliant else "named"
+    seen, key, first = (
+        sum(part.width for part in parts),
+        (family.cause, family.joint),
+        family.shapes[0],
+    )
+    kind: Kind = "compliance" if first.evidence == "frequency responses" else "named"
+    reads = first.parameters.reads_torque and rows.data.logs[0].motion.tau is not None
     for one, table in laid(rows, family, arm):
         parts.append(table)
         shapes, width, _ = one.table.shape
-        for k in range(shapes):
-            number = one.first + k
-            groups.append(
-                Group(
-                    (family.cause, family.joint),
-                    number,
-                    seen,
-                    width,
-                    number in standing[family.cause, family.joint],
-                    kind,
-                    family.shapes[0].parameters.reads_torque
-                    and rows.data.logs[0].motion.tau is not None,
-                    _length(family.shapes[number]),
-                )
-            )
+        for number in range(one.first, one.first + shapes):
+            stands, length = number in standing[key], _length(family.shapes[number])
+            groups.append(Group(key, number, seen, width, stands, kind, reads, length))
             seen += width
 
 

@@ -57,12 +57,8 @@ def compliance(
         found = frf.frf_findings(logs, arm)
     except InputRejected as refused:
         return Compliance((), f"the frequency responses are of no use: {refused.message}")
-    giving = [
-        one
-        for one in found.classification
-        if one.cause is not None and find_effect(one.cause).evidence == "frequency responses"
-    ]
-    wanted = [one for one in giving if one.cause not in without]
+    kinds = {kind.name for kind in all_effects() if kind.evidence == "frequency responses"}
+    wanted = [one for one in found.classification if one.cause in kinds.difference(without)]
     named = tuple(_acting(one, arm) for one in wanted)
     left = "; ".join(one.evidence for one in found.undecided)
     shown = {acting.place: one.seen_at for acting, one in zip(named, wanted, strict=True)}
@@ -96,15 +92,12 @@ def untold(told: Compliance | None, without: Sequence[str] = ()) -> tuple[NotIde
         open_by["reversals"] = _NO_RESPONSES if told is None else _GIVES_WAY
     first = "Measure frequency responses, which tell a spring. " if told is None else ""
     named = () if told is None else tuple(one.effect.name for one in told.named)
+    asked = [k for k in all_effects() if k.name not in (*named, *without)]
+    ask = {k: (first if k.evidence == "reversals" else "") + k.words.experiment for k in asked}
     return tuple(
-        NotIdentifiable(
-            kind.name,
-            None,
-            open_by[kind.evidence],
-            (first if kind.evidence == "reversals" else "") + kind.words.experiment,
-        )
-        for kind in all_effects()
-        if open_by.get(kind.evidence) and kind.name not in (*named, *without)
+        NotIdentifiable(k.name, None, open_by[k.evidence], ask[k])
+        for k in asked
+        if open_by.get(k.evidence)
     )
 
 
@@ -112,13 +105,10 @@ def _acting(one: frf.Finding, arm: Arm) -> Acting:
     """Return the cause with the numbers that the responses give."""
     kind = find_effect(one.cause or "")
     joint = one.joint if kind.scope == "joint" else None
-    known = one.parameters
-    return Acting.of(
-        kind(joint=joint),
-        {name: x.value for name, x in known.items()},
-        {name: x.std for name, x in known.items()},
-        revolute=joint is None or arm.robot.revolute[joint - 1],
-    )
+    values = {name: x.value for name, x in one.parameters.items()}
+    stds = {name: x.std for name, x in one.parameters.items()}
+    turning = joint is None or arm.robot.revolute[joint - 1]
+    return Acting.of(kind(joint=joint), values, stds, revolute=turning)
 
 
 def _answer(one: frf.Seen) -> Answer:

@@ -148,7 +148,7 @@ def diagnose_prepared(
         del last  # its columns take the memory that the next ones need
         last, known = Look.of(dataset, columns(), named, config, found, usual), len(found.causes)
     last = replace(last, selection=last.selection.without_selected_alternatives)
-    decision = decide(last.later, last.selection, last.baseline)
+    decision = decide(last.later, last.selection, last.baseline, last.reported)
     return Diagnosis(decision, last, responses)
 
 

@@ -139,9 +139,8 @@ def _told(
     later: Later, one: _Shape, amplitudes: Array, visible: float
 ) -> DetectionLimit | NotIdentifiable:
     """Return the parameter that goes with the amplitudes, where an arm can have as much of it."""
-    effect = one.effect
+    effect, joint = one.effect, one.effect.joint
     values = effect.values(amplitudes)
-    joint = effect.joint
     turning = joint is None or later.dataset.arm.robot.revolute[joint - 1]
     beyond = NotIdentifiable(effect.name, joint, _TOO_MUCH, effect.words.experiment)
     if effect.parameters.fixed is not None:
