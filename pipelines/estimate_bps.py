@@ -63,7 +63,7 @@ class Settings:
     jerk_std: tuple[float, ...] | None = None  # [rad/s^order]
     bandwidth: tuple[float, ...] | None = None  # [Hz]
     average: bool = True  # periods of periodic logs, where they differ by noise alone
-    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: five times the motion's highest frequency
+    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: the band of motion and dry friction
     decimate: int | None = None  # every Nth sample; None: four a period of the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
     symmetric: bool = False  # p4 = p15 = 0
