@@ -34,7 +34,7 @@ _NEEDS = "it needs a reference log, or links described within 5 %"
 
 @dataclass(frozen=True)
 class CompensatedPayload:
-    """A body at the last link whose torque the controller subtracts."""
+    """A body at the last link whose torque the controller subtracts, or that was taken off."""
 
     mass: float | None = None  # [kg] of the body; null: not identifiable
     std: float | None = None  # [kg] standard deviation of `mass`
