@@ -1,4 +1,4 @@
-"""Judge the compensated payload on random machines: how often it is told, and how often invented.
+"""Judge the compensated payload on random machines: how often it is given, and how often invented.
 
     python -m benchmarks.compensated_payload --healthy 100 --loaded 30 --first 9000
 
@@ -30,7 +30,7 @@ from pipelines.estimation.checks.payload import CompensatedPayload
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.robot import RobotDescription
 
-__all__ = ["described", "main", "session", "told"]
+__all__ = ["described", "main", "session", "subtracted"]
 
 
 def _machine(seed: int) -> Machine:
@@ -114,8 +114,8 @@ def described(seed: int) -> str:
     return "right" if machine.told.joints == machine.robot.joints else "wrong"
 
 
-def told(seed: int, loaded: bool, reference: bool) -> tuple[CompensatedPayload | None, float]:
-    """Return the payload that is told of machine `seed`, and the mass that is subtracted."""
+def subtracted(seed: int, loaded: bool, reference: bool) -> tuple[CompensatedPayload | None, float]:
+    """Return the payload that is found of machine `seed`, and the mass that is subtracted."""
     log, before, mass = session(seed, loaded)
     found = torque_boundary([log, before] if reference else [log])
     return None if found is None else found.payload, mass
@@ -133,7 +133,7 @@ def main() -> None:
         for reference in (True, False):
             rows = []
             for seed in range(wanted.first, wanted.first + count):
-                payload, mass = told(seed, loaded, reference)
+                payload, mass = subtracted(seed, loaded, reference)
                 rows.append((seed, described(seed), payload, mass))
                 if wanted.verbose and payload is not None:
                     print(*rows[-1][:2], f"true {mass:.3g}", payload, flush=True)
@@ -151,7 +151,7 @@ def _line(name: str, rows: list[tuple[int, str, CompensatedPayload | None, float
     known = [(p.mass, p.std, mass) for p, mass in found if p.mass is not None and p.std is not None]
     inside = sum(abs(value - mass) < 2.0 * std for value, std, mass in known)
     print(
-        f"{name:42s} told {len(claimed):3d} of {len(rows):3d} [{low:.3f}, {high:.3f}], "
+        f"{name:42s} given {len(claimed):3d} of {len(rows):3d} [{low:.3f}, {high:.3f}], "
         f"absent {denied:3d}, not identifiable {len(rows) - len(claimed) - denied:3d}; "
         f"mass within two deviations {inside} of {len(known)}",
         flush=True,

@@ -1,4 +1,4 @@
-"""A payload set in the controller is told from reference logs or good links, and from no others."""
+"""A payload set in the controller shows in reference logs and good links, and nowhere else."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.compensated_payload import described, session, told
+from benchmarks.compensated_payload import described, session, subtracted
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.report.sections import boundary_card
 from tests.seeds import usually
@@ -21,7 +21,7 @@ def boundary(seed: int, loaded: bool) -> Boundary:
 
 @pytest.mark.parametrize("seed", usually((9001, 9002, 9003, 9020), 9003))
 def test_reference_logs_tell_the_mass_that_is_subtracted(seed: int) -> None:
-    payload, mass = told(seed, loaded=True, reference=True)
+    payload, mass = subtracted(seed, loaded=True, reference=True)
     assert payload is not None
     assert (payload.present, payload.by) == (True, "reference logs")
     assert payload.mass is not None
@@ -32,7 +32,7 @@ def test_reference_logs_tell_the_mass_that_is_subtracted(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", usually((9001, 9002, 9003, 9020), 9003))
 def test_a_machine_whose_friction_changed_since_the_reference_has_no_payload(seed: int) -> None:
-    payload, _ = told(seed, loaded=False, reference=True)
+    payload, _ = subtracted(seed, loaded=False, reference=True)
     assert payload is not None
     assert payload.present is False
 
@@ -41,7 +41,7 @@ def test_a_machine_whose_friction_changed_since_the_reference_has_no_payload(see
 def test_links_that_agree_with_the_logs_tell_the_mass_to_a_twentieth_of_the_last(seed: int) -> None:
     """Described exactly, or wrong by up to 5 %: the last link may be wrong by that too."""
     assert described(seed) in ("right", "near")
-    payload, mass = told(seed, loaded=True, reference=False)
+    payload, mass = subtracted(seed, loaded=True, reference=False)
     assert payload is not None
     assert (payload.present, payload.by) == (True, "described links")
     assert payload.mass is not None
