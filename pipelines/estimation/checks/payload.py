@@ -190,6 +190,8 @@ def _judged(
             naive[np.ix_(at, at)] += design.T @ design * power
         right.append(sums)
     theta, covariance = jackknife(gram, np.concatenate(right), known, naive)
+    if _misfit(parts, theta, shared) > config.described:
+        return replace(NOT_TOLD, reason=f"no payload makes the torque agree with the {by}")
     share = float(_size(parts[0])[0])  # of the torque, that one kilogram makes
     if not share > 0.0:
         return replace(NOT_TOLD, reason="the mass of a payload acts on no joint")
@@ -200,3 +202,14 @@ def _judged(
     if 0.0 < share * (mass + 2.0 * std) < config.payload_share:
         return CompensatedPayload(mass, std, False, by, "")
     return CompensatedPayload(mass, std, None, by, "the logs do not tell a payload from none")
+
+
+def _misfit(parts: Sequence[_Part], theta: Array, shared: int) -> float:
+    """Return what a fit leaves of a joint's torque beyond what any links leave, at most."""
+    own = theta[shared:].reshape(len(parts), *parts[0].target.shape[:1], -1)
+    most = 0.0
+    for part, laws in zip(parts, own, strict=True):
+        model = part.columns @ theta[:shared] + np.einsum("jnc,jc->jn", _own(part), laws)
+        beyond = np.mean((part.target - model) ** 2, axis=1) - part.fit.residual**2
+        most = max(most, float(np.sqrt(np.max(beyond, initial=0.0))))
+    return most
