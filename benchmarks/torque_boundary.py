@@ -164,13 +164,13 @@ def draw(seed: int) -> Machine:
         for k, ((a, alpha, d, kind), link) in enumerate(zip(rows, links, strict=True))
     )
     robot = RobotDescription(f"{family}-{seed}", (0.0, 0.0, -9.81), "dh", joints)
-    t, q, dq, ddq = _motion(rng, n, np.array(home), np.array([j.revolute for j in joints]))
+    t, q, dq, ddq = random_motion(rng, n, np.array(home), np.array([j.revolute for j in joints]))
     described = rng.choice(["none", "right", "wrong"])
     told = replace(
         robot,
         joints=tuple(replace(j, link=_as_described(j.link, str(described), rng)) for j in joints),
     )
-    load = _inverse_dynamics(robot, q, dq, ddq, DOWN)
+    load = inverse_dynamics(robot, q, dq, ddq, DOWN)
     direct = rng.random() < 0.25
     size = np.sqrt(np.mean(load**2, axis=0)) + 0.02 * np.sqrt(np.mean(load**2))
     speed = np.sqrt(np.mean(dq**2, axis=0))
@@ -185,7 +185,7 @@ def draw(seed: int) -> Machine:
     law = str(rng.choice(["tanh", "tanh", "stribeck", "concave", "load", "asymmetric"]))
     inertia = np.array(
         [
-            _inverse_dynamics(robot, q[:1], 0 * q[:1], np.eye(n)[k : k + 1], 0 * DOWN)[0, k]
+            inverse_dynamics(robot, q[:1], 0 * q[:1], np.eye(n)[k : k + 1], 0 * DOWN)[0, k]
             for k in range(n)
         ]
     )
@@ -247,7 +247,7 @@ def _as_described(
     )  # type: ignore[arg-type]
 
 
-def _motion(
+def random_motion(
     rng: np.random.Generator, n: int, home: Array, revolute: Array
 ) -> tuple[Array, Array, Array, Array]:
     rate, length = float(rng.choice([100, 125, 250, 500, 1000])), float(rng.uniform(10, 25))
@@ -299,7 +299,7 @@ def _pinocchio(robot: RobotDescription) -> Any:
     return model
 
 
-def _inverse_dynamics(
+def inverse_dynamics(
     robot: RobotDescription, q: Array, dq: Array, ddq: Array, gravity: Array
 ) -> Array:
     """(samples, n) torque by Pinocchio."""
@@ -311,7 +311,7 @@ def _inverse_dynamics(
     return np.array([pin.rnea(model, data, a, b, c) for a, b, c in zip(q, dq, ddq, strict=True)])
 
 
-def _friction(machine: Machine, load: Array) -> Array:
+def friction_torque(machine: Machine, load: Array) -> Array:
     f, v = machine.friction, machine.dq
     sign = np.tanh(v / f["width"])
     coulomb = f["coulomb"] * np.ones_like(v)
@@ -345,9 +345,9 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
     gravity = 0 * DOWN if kind == "no gravity" else turned
     if fault == "tilt":
         gravity = 9.81 * np.array([np.sin(0.087), 0, -np.cos(0.087)])
-    load = _inverse_dynamics(arm, q, machine.dq, machine.ddq, gravity)
+    load = inverse_dynamics(arm, q, machine.dq, machine.ddq, gravity)
     tau = load + machine.rotor * machine.ddq * (kind != "no friction" or rng.random() < 0.5)
-    friction = _friction(machine, load) * (kind != "no friction")
+    friction = friction_torque(machine, load) * (kind != "no friction")
     rigid, tau = tau, tau + friction
     tau, q = _faulty(tau, q, machine, fault, rng)
     tau = tau + machine.noise * rng.normal(size=tau.shape)
@@ -359,7 +359,7 @@ def case(seed: int, kind: str, fault: str = "healthy") -> tuple[ExperimentLog, d
     if kind == "permuted":
         while (order == np.arange(n)).all():
             order = rng.permutation(n) if rng.random() < 0.5 else _swapped(n, rng)
-    log = _log(machine, q[:, order], tau[:, order])
+    log = logged(machine, q[:, order], tau[:, order])
     truth = {
         "gravity": kind != "no gravity",
         "friction": kind != "no friction",
@@ -427,7 +427,7 @@ def _faulty(
     return tau, q
 
 
-def _log(machine: Machine, q: Array, tau: Array) -> ExperimentLog:
+def logged(machine: Machine, q: Array, tau: Array) -> ExperimentLog:
     units = "rad" if all(machine.robot.revolute) else "rad or m"
     signals = {
         "t": Signal(machine.t, "s", "time"),

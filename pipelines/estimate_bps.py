@@ -63,7 +63,7 @@ class Settings:
     jerk_std: tuple[float, ...] | None = None  # [rad/s^order]
     bandwidth: tuple[float, ...] | None = None  # [Hz]
     average: bool = True  # periods of periodic logs, where they differ by noise alone
-    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: five times the motion's highest frequency
+    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: the band of motion and dry friction
     decimate: int | None = None  # every Nth sample; None: four a period of the filter
     min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
     symmetric: bool = False  # p4 = p15 = 0
@@ -114,7 +114,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         settings.reconstruction.check(log.n_joints)
         refuse_unfit(settings, log)
     subjects, judging = _accepted(identify), _accepted(validate)
-    boundary, said_of_torque = _boundary(identify, settings)
+    boundary, said_of_torque = _boundary(identify, _references(inputs), settings)
     motions, said = _examined(identify, subjects, settings, said_of_torque)
     judges, said_too = _examined(validate, judging, settings, said_of_torque)
     even = for_equations((*motions, *judges))
@@ -161,9 +161,14 @@ def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
     return subjects
 
 
-def _boundary(logs: list[ExperimentLog], settings: Settings) -> tuple[Boundary | None, tuple[Check, ...]]:
+def _references(inputs: Inputs) -> list[ExperimentLog]:
+    return [opened.log for opened in inputs.logs if opened.log.role == "reference"]
+
+
+def _boundary(logs: list[ExperimentLog], references: list[ExperimentLog],
+              settings: Settings) -> tuple[Boundary | None, tuple[Check, ...]]:
     """What the torque of the logs is, and what of it is told, where a mismatch is allowed."""
-    boundary = torque_boundary([recording(log) for log in logs])
+    boundary = torque_boundary([recording(log) for log in (*logs, *references)])
     findings = boundary_findings(boundary, logs[0].source or logs[0].name)
     if findings and not settings.skip_sanity_checks:
         raise _with_way_out(findings[0]).as_error()

@@ -81,7 +81,7 @@ def boundary_card(boundary: Boundary | None) -> tuple[Section, ...]:
     if boundary is None:
         return ()
     rows = [_sign(boundary), _gravity(boundary), _direction(boundary), _friction(boundary)]
-    rows += [_order(boundary), _unit(boundary)]
+    rows += [_order(boundary), _unit(boundary), _payload(boundary)]
     table = Table(
         ("quantity", "estimate ± standard deviation", "meaning"),
         tuple(row[:3] for row in rows),
@@ -160,3 +160,10 @@ def _unit(boundary: Boundary) -> Row:
         return "unit", names, f"Taken from the log: not identifiable, {unit.reason}.", "neutral"
     scale = _number(unit.scale, unit.std)
     return "unit", f"{names}, times {scale}", "1 where the described links are right.", "neutral"
+
+
+def _payload(boundary: Boundary) -> Row:
+    payload = boundary.payload
+    tone: Tone = "bad" if payload.present else "neutral"
+    meaning = sentence("boundary", "payload", payload)
+    return "compensated payload [kg]", _number(payload.mass, payload.std), meaning, tone

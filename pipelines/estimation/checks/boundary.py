@@ -18,6 +18,12 @@ import numpy as np
 from pipelines.estimation.checks.channel_order import SIGNALS, ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
+from pipelines.estimation.checks.payload import (
+    NOT_TOLD,
+    CompensatedPayload,
+    payload_by_links,
+    payload_by_reference,
+)
 from pipelines.estimation.checks.spread import effective_moments, gravity_spread, jackknife
 from pipelines.estimation.checks.torque_rows import (
     CLUSTERS,
@@ -29,6 +35,7 @@ from pipelines.estimation.checks.torque_rows import (
 )
 from pipelines.estimation.checks.torque_sign import touches_of_zero
 from pipelines.log.doctor.checks_subject import Subject
+from pipelines.log.doctor.segments import Usable
 from pipelines.log.experiment import ExperimentLog
 from pipelines.log.robot import RobotDescription
 from pipelines.log.schema import joint_unit
@@ -133,18 +140,17 @@ class Boundary:
     fitted: tuple[str, ...]  # logs that were looked at
     without_gravity: bool = False  # whether the torque lacks the gravity that the description has
     turned: bool = False  # whether gravity points elsewhere than the description has it
+    payload: CompensatedPayload = NOT_TOLD  # that the controller subtracts
 
 
-_NEVER = (
-    NotIdentifiable(
-        "compensated payload",
-        "a payload that the controller subtracts is absorbed by the last links' masses: "
-        "it needs a reference log, or links described within 5 %",
-    ),
-    NotIdentifiable(
+def _never(payload: CompensatedPayload) -> tuple[NotIdentifiable, ...]:
+    """Return what the logs do not tell, `payload` among it where it is not identifiable."""
+    zero = NotIdentifiable(
         "joint zero", "a joint zero that is off is absorbed by the links' centres of mass"
-    ),
-)
+    )
+    if payload.present is not None:
+        return (zero,)
+    return NotIdentifiable("compensated payload", payload.reason), zero
 
 
 def torque_boundary(
@@ -155,8 +161,7 @@ def torque_boundary(
     A check that fails numerically leaves what it tells not identifiable, and its reason names it.
     """
     config = config or BoundaryConfig()
-    subjects = [Subject(log) for log in _informative(logs)]
-    usable = [one.good for one in subjects if one.sampled and one.good.time.known and one.good.runs]
+    usable = _usable(_informative(logs))
     if not any(np.isfinite(one.log.tau[run]).any() for one in usable for run in one.runs):
         return None
     robot = usable[0].log.robot
@@ -168,10 +173,13 @@ def torque_boundary(
             return _unread(robot, sign, names, "not identifiable from magnitudes", evidence)
         check = "fit"
         arm = generic_arm(robot)
-        motions = [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
-        if sum(len(motion.t) for motion in motions) < 4 * (len(arm.columns) + 6):
+        motions, enough = _sampled(usable), 4 * (len(arm.columns) + 6)
+        if sum(len(motion.t) for motion in motions) < enough:
             return None
-        return _Estimate(robot, arm, motions, config).boundary(names, sign, evidence)
+        before = _sampled(_usable([log for log in _moving(logs) if log.role == "reference"][:4]))
+        if usable[0].log.role == "reference" or sum(len(one.t) for one in before) < enough:
+            before = []
+        return _Estimate(robot, arm, motions, before, config).boundary(names, sign, evidence)
     except (ArithmeticError, np.linalg.LinAlgError, ValueError) as error:
         reason = f"not identifiable: the {check} failed: {error}"
         return _unread(robot, sign, names, reason, evidence)
@@ -193,9 +201,23 @@ def _sign(touches: Sequence[int | None], config: BoundaryConfig) -> tuple[str | 
     return "signed", "no torque changes its sign, or comes near zero"
 
 
+def _moving(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
+    return [log for log in logs if log.origin != "planned" and log.experiment in _MOVING]
+
+
+def _usable(logs: Sequence[ExperimentLog]) -> list[Usable]:
+    """Return the samples of `logs` that can be used."""
+    subjects = [Subject(log) for log in logs]
+    return [one.good for one in subjects if one.sampled and one.good.time.known and one.good.runs]
+
+
+def _sampled(usable: Sequence[Usable]) -> list[Sampled]:
+    return [motion for one in usable if (motion := sample_motion(one)) and len(motion.t) > 1]
+
+
 def _informative(logs: Sequence[ExperimentLog]) -> list[ExperimentLog]:
     """Logs in which all joints move; those of role "identify" where there are any."""
-    moving = [log for log in logs if log.origin != "planned" and log.experiment in _MOVING]
+    moving = _moving(logs)
     for role in ("identify", "validate", "reference"):
         if of_role := [log for log in moving if log.role == role]:
             return of_role[:4]
@@ -225,9 +247,11 @@ class _Estimate:
         robot: RobotDescription,
         arm: GenericArm,
         motions: Sequence[Sampled],
+        reference: Sequence[Sampled],
         config: BoundaryConfig,
     ) -> None:
         self.robot, self.arm, self.motions, self.config = robot, arm, motions, config
+        self.reference = reference
         self.described = np.array(robot.gravity)
 
     def boundary(self, names: tuple[str, ...], sign: str | None, evidence: str) -> Boundary:
@@ -236,6 +260,10 @@ class _Estimate:
         gravity, direction, removed, turned = self.gravity(fits, covariance)
         friction = self.friction(fits.model.rows.dissipated, coefficients, spread)
         little = friction.upper is not None and friction.upper < self.config.friction_absent
+        as_described = not (order.signal or order.reason or removed or turned)
+        payload = NOT_TOLD
+        if as_described and gravity.present is not False:
+            payload = self.payload(fits.model)
         sides = {True: None if little else "motor", False: "joint", None: None}
         if order.signal:
             removed = turned = False  # the order first: it is what the rest rests on
@@ -247,12 +275,28 @@ class _Estimate:
             direction,
             order,
             self.unit(fits),
-            _NEVER,
+            _never(payload),
             (evidence, *_in_words(fits, order)),
             names,
             removed,
             turned,
+            payload,
         )
+
+    def payload(self, model: GravityModel) -> CompensatedPayload:
+        """Return the payload that the torque lacks, by reference logs or else by the links."""
+        if self.reference:
+            rows = torque_rows(self.arm, self.reference)
+            before = GravityModel(rows, self.config.model_error)
+            residuals = before.residuals(before.fit(self.described))
+            before.effective = effective_moments(residuals, rows.start)
+            found = payload_by_reference(self.arm, model, before, self.described, self.config)
+            if found.present is not None:
+                return found
+        links = [joint.link for joint in self.robot.joints if joint.link is not None]
+        if len(links) < self.robot.n_joints:
+            return found if self.reference else NOT_TOLD
+        return payload_by_links(self.arm, model, links, self.described, self.config)
 
     def fits(self, order: ColumnOrder | None = None) -> _Fits:
         """Fit the gravity from the described one, from none and from every axis."""
@@ -611,7 +655,7 @@ def _unread(
         Direction(None, None, robot.gravity, None, reason=why),
         JointOrder(None, "", reason=why),
         Unit(_units(robot), None, None, why),
-        _NEVER,
+        _never(NOT_TOLD),
         evidence,
         names,
     )

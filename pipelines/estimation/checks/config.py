@@ -36,6 +36,11 @@ class BoundaryConfig:
         weighs: of its torque's RMS: a joint with less gravity has no share of its own.
         friction_absent: of torque times speed, both RMS: less is what compensation leaves, or a
             direct drive; geared drives have 10 to 50 %.
+        described: relative error of described links, up to which they show a payload.
+        doubt: difference in log likelihood, below which an error of described links is allowed: two
+            deviations.
+        payload_deviations: standard deviations by which a mass that is subtracted differs from 0.
+        payload_share: of the torque's RMS, that a payload makes which is looked for.
         no_negative: times the noise of a channel: a torque below minus that is negative.
         touches: times that a signed torque does not come down to zero without crossing it once.
     """
@@ -55,5 +60,9 @@ class BoundaryConfig:
     direction_std: float = 0.0436
     weighs: float = 0.1
     friction_absent: float = 0.02
+    described: float = 0.05
+    doubt: float = 2.0
+    payload_deviations: float = 4.0
+    payload_share: float = 0.05
     no_negative: float = 3.0
     touches: int = 3

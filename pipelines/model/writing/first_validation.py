@@ -120,7 +120,7 @@ def residual(log: ExperimentLog, motion: Reconstructed, parts: ArmTorque) -> Arr
 
 
 def _low_passed(log: ExperimentLog, motion: Reconstructed, torque: Array) -> tuple[Array, float | None]:
-    """`torque`, zero where nothing is known, below five times the motion's highest frequency, and that cut-off [Hz]."""
+    """`torque`, zero where nothing is known, in the band of motion and dry friction, and that cut-off [Hz]."""
     left = np.where(_known(log, motion)[:, None], torque, 0.0)
     how = condition(motion.motion, 1.0 / log.sample_time, None, None, np.zeros(log.n_joints))
     if how.low_pass is None or len(left) <= how.low_pass.padding:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,3 +42,28 @@ def test_a_gap_is_no_fast_motion(gap: float, missing: str) -> None:
     whole = wanted_cutoff(motion(0.0, missing), RATE)
     assert whole == pytest.approx(5.0 * FASTEST, rel=0.05)
     assert wanted_cutoff(motion(gap, missing), RATE) == pytest.approx(whole, rel=0.15)
+
+
+def slow(f: float) -> Motion:
+    """Forty seconds of two joints that turn to and fro at `f` [Hz], and one that is held."""
+    t = np.arange(0.0, 40.0, 1.0 / RATE)
+    x = 2.0 * np.pi * f * t
+    dq = np.stack([np.sin(x), np.cos(x), np.zeros_like(t)], axis=1)
+    return Motion(t, np.zeros_like(dq), dq, np.zeros_like(dq))
+
+
+@pytest.mark.parametrize("f", [0.1, 0.2])
+def test_a_slow_motion_keeps_the_harmonics_of_friction_that_changes_sign(f: float) -> None:
+    """Five harmonics of a square wave lack a twelfth of its power, forty a hundredth."""
+    assert 25.0 * f < wanted_cutoff(slow(f), RATE) < 45.0 * f
+
+
+def test_the_harmonics_of_friction_end_where_arms_may_bend() -> None:
+    """At 1 Hz the fortieth would be far above the first mode of many arms."""
+    assert wanted_cutoff(slow(1.0), RATE) == 10.0
+
+
+def test_how_fast_a_joint_moves_does_not_change_the_cut_off() -> None:
+    """Friction changes its sign as often, however far the joint goes."""
+    fast = slow(0.2)
+    assert wanted_cutoff(replace(fast, dq=5.0 * fast.dq), RATE) == wanted_cutoff(fast, RATE)
