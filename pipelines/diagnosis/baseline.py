@@ -6,6 +6,7 @@ because every model has errors; unlike noise, these grow with the number of rows
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import comb
 
@@ -19,7 +20,9 @@ from pipelines.diagnosis.screening import Screened, best_of, screen
 from pipelines.fit.bootstrap import chi2_bound, upper_point
 from pipelines.fit.joint_table import Array, Arrow, Structure, Table
 
-__all__ = ["Baseline", "baseline"]
+__all__ = ["Baseline", "Parts", "Sums", "baseline"]
+
+Sums = tuple[Array, tuple[Array, ...]]  # B Cᵀ, and C Cᵀ of each group
 
 _SPLITS = 6  # of the reference into two
 _HALF = 0.5  # numerics: of a fault's power, what a family explains that is like its own
@@ -42,15 +45,14 @@ class Baseline:
 
 
 def baseline(
-    dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
+    parts: Parts, dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig
 ) -> Baseline:
     """Return what screening and residual are between parts of the reference."""
-    parts = _Parts.of(dataset, dictionary, prior)
     families = len({group.key for group in dictionary.groups})
     excess: dict[str, list[float]] = {}
     largest: dict[str, Screened] = {}
     fits: list[float] = []
-    for before, after in _splits(len(prior.parts)):
+    for before, after in _splits(len(parts.counts)):
         found, fit, rows = parts.compared(before, list(after))
         fits.append(fit)
         for one in best_of(found).values():
@@ -70,7 +72,7 @@ def baseline(
 
 
 def _unlike(
-    bias: dict[str, float], best: dict[str, Screened], parts: _Parts, candidates: Table
+    bias: dict[str, float], best: dict[str, Screened], parts: Parts, candidates: Table
 ) -> dict[str, float]:
     """Return each family's bias, at most the largest of those that are not like it.
 
@@ -108,7 +110,7 @@ def _unlike(
 
 
 @dataclass(frozen=True, eq=False)
-class _Parts:
+class Parts:
     """Products of the columns over each part of the reference, in units of the noise."""
 
     prior: Prior
@@ -120,7 +122,7 @@ class _Parts:
     counts: Array  # (parts,) rows
 
     @classmethod
-    def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior) -> _Parts:
+    def of(cls, dataset: Dataset, dictionary: Dictionary, prior: Prior) -> Parts:
         rows, y, parts = dataset.known, dataset.known.y, prior.parts
         candidates = dictionary.known
         base, spans = prior.table(rows.nominal, candidates), [g.span for g in dictionary.groups]
@@ -136,6 +138,11 @@ class _Parts:
             np.array([sum(int(m.sum()) for m in part) for part in parts], dtype=np.float64),
         )
 
+    def sums(self, parts: Sequence[int]) -> Sums:
+        """Return B Cᵀ (k, columns), and C Cᵀ of each group, over some parts together."""
+        each = zip(*(self.squares[k] for k in parts), strict=True)
+        return self.cross[list(parts)].sum(axis=0), tuple(np.sum(own, axis=0) for own in each)
+
     def compared(
         self, before: tuple[int, ...], after: list[int]
     ) -> tuple[list[Screened], float, float]:
@@ -146,13 +153,9 @@ class _Parts:
         own = np.sum([self.prior.moments[k] for k in after], axis=0)
         known = Arrow.of(info + gram, self.prior.structure)
         mean = known.solve(moment + own)
-        cross, rows = self.cross[after].sum(axis=0), float(self.counts[after].sum())
-        squares = [
-            np.sum(own, axis=0) for own in zip(*(self.squares[k] for k in after), strict=True)
-        ]
-        found = screen(
-            self.groups, known, cross, squares, self.moments[after].sum(axis=0) - cross.T @ mean
-        )
+        (cross, squares), rows = self.sums(after), float(self.counts[after].sum())
+        left = self.moments[after].sum(axis=0) - cross.T @ mean
+        found = screen(self.groups, known, cross, squares, left)
         cost = self.powers[after].sum() - (moment + own) @ mean
         cost += expected @ moment
         return found, float(cost) / rows, rows

@@ -192,8 +192,7 @@ def _lay_unnamed(rows: Rows, key: Key, make: Make, groups: list[Group], parts: l
         out[:, j] = own
         return out
 
-    part = rows.table(rows.data.lay(on_joint)).compact()
-    first = sum(one.width for one in parts)
+    part, first = rows.table(rows.data.lay(on_joint)).compact(), sum(one.width for one in parts)
     standing = key[0].split()[0] in ("ripple", "friction")
     groups.append(Group(key, 0, first, part.width, standing, "unnamed"))
     parts.append(part)

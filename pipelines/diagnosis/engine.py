@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.diagnosis.baseline import Baseline, baseline
+from pipelines.diagnosis.baseline import Baseline, Parts, Sums, baseline
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.compliance import Compliance, compliance, new_causes
 from pipelines.diagnosis.config import DiagnosisConfig
@@ -53,11 +53,8 @@ class Look:
         Args:
             usual: prior and baseline, where reference logs have given them; None: compute them.
         """
-        if usual is None:
-            prior = prior_of(dataset, dictionary, config)
-            usual = prior, baseline(dataset, dictionary, prior, config)
-        prior, known = usual
-        later = Later.of(dataset, dictionary, prior, config)
+        prior, known, sums = (*usual, None) if usual else _usual(dataset, dictionary, config)
+        later = Later.of(dataset, dictionary, prior, config, sums)
         return cls(later, known, select(later, known, responses, found))
 
     @property
@@ -80,6 +77,17 @@ class Look:
         """The rows and columns of the reference."""
         rows, columns = self.later.dataset.reference, self.later.dictionary.reference
         return None if rows is None or columns is None else (rows, columns)
+
+
+def _usual(
+    dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig
+) -> tuple[Prior, Baseline, Sums | None]:
+    """Return prior and baseline, and without reference logs products over the later rows."""
+    prior = prior_of(dataset, dictionary, config)
+    parts = Parts.of(dataset, dictionary, prior)
+    every = range(len(parts.counts))  # without reference logs they are the later rows
+    sums = parts.sums(every) if dataset.reference is None else None
+    return prior, baseline(parts, dataset, dictionary, config), sums
 
 
 def _explained(rough: Dataset, every: Dictionary, look: Look) -> Explained:

@@ -61,10 +61,12 @@ def _standing_out(
         for half in (False, True):
             own = [w.gain for w in others if (w.touched.mean() > middle) == half]
             gains.append(max(own, default=0.0))
-    if best is None or best.gain < config.relevance**2 * _power(rows, best.touched):
+    if best is None:
         return None
+    power = sum(float(y[best.touched] @ y[best.touched]) for y in rows.y)
     bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
-    if best.gain <= max(bound, upper_point(gains, config.alpha)):
+    usual = max(bound, upper_point(gains, config.alpha))
+    if best.gain < config.relevance**2 * power or best.gain <= usual:
         return None
     return replace(best, free=_free(rows, best, residual))
 
@@ -100,10 +102,6 @@ def _free(rows: Rows, window: Window, residual: Sequence[Array]) -> float:
         x = column * w[window.rows]
         gain += float(x @ r[window.rows]) ** 2 / max(float(x @ x), 1e-300)
     return gain - max(rows.n_joints - DIRECTIONS, 0) * float(np.log(rows.count))
-
-
-def _power(rows: Rows, touched: Indices) -> float:
-    return sum(float(y[touched] @ y[touched]) for y in rows.y)
 
 
 def windows_of(

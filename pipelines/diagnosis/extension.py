@@ -119,12 +119,10 @@ def _doubt(worth: Worth, place: int) -> str:
 
 def _numbers(done: Candidate) -> str:
     """Return ": order = 6.02 1/rev, …" of a cause whose numbers are impossible."""
-    one = done.state.model.effects[-1]
-    joint, revolute = one.effect.joint, done.state.model.arm.robot.revolute
-    turning = joint is None or revolute[joint - 1]
-    units = {
-        q.name: "" if q.unit == "1" else f" {q.unit_at(turning)}" for q in one.effect.parameters
-    }
+    one, revolute = done.state.model.effects[-1], done.state.model.arm.robot.revolute
+    turning = one.effect.joint is None or revolute[one.effect.joint - 1]
+    every = one.effect.parameters
+    units = {q.name: "" if q.unit == "1" else f" {q.unit_at(turning)}" for q in every}
     shown = one.effect.reported(one.values).items()
     told = [
         f"{name} = {plain_number(value, 3)}{units[name]}"

@@ -182,18 +182,14 @@ def prior_of(dataset: Dataset, dictionary: Dictionary, config: DiagnosisConfig) 
     keep = np.flatnonzero(np.r_[np.ones(first, bool), visible > _LEAST_VARIANCE])
     at = np.ix_(keep, keep)
     kept = tuple(of[k - first] for k in keep[first:])
-    out = Prior(
-        scale,
-        columns[keep[first:] - first],
-        kept,
-        np.diag(found.precision[keep]),
-        _drift(dataset, scale, found, of, config)[keep],
-        parts,
-        tuple(g[at] for g in grams),
-        tuple(m[keep] for m in moments),
+    drift = _drift(dataset, scale, found, of, config)[keep]
+    standing = columns[keep[first:] - first], kept, np.diag(found.precision[keep]), drift
+    sums = tuple(g[at] for g in grams), tuple(m[keep] for m in moments)
+    start, structure = (
         (np.zeros((0, 0)), np.zeros(0)),
         Structure.of(table.take(keep), now.take(keep)),
     )
+    out = Prior(scale, *standing, parts, *sums, start, structure)
     if dataset.reference is not None:
         return replace(out, start=out.of(range(len(parts))))
     gram, moment = np.sum(out.grams, axis=0), np.sum(out.moments, axis=0)

@@ -15,6 +15,7 @@ from math import ceil
 
 import numpy as np
 
+from pipelines.diagnosis.baseline import Sums
 from pipelines.diagnosis.candidates import Dictionary, Group, laid
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
@@ -69,24 +70,21 @@ class Later:
 
     @classmethod
     def of(
-        cls, dataset: Dataset, dictionary: Dictionary, prior: Prior, config: DiagnosisConfig
+        cls,
+        dataset: Dataset,
+        dictionary: Dictionary,
+        prior: Prior,
+        config: DiagnosisConfig,
+        sums: Sums | None = None,
     ) -> Later:
+        """Return the later rows; `sums` are products of their columns, if known."""
         rows = dataset.later
         base = prior.table(rows.nominal, dictionary.later)
-        table = dictionary.later
-        return cls(
-            rows,
-            dictionary,
-            prior,
-            dataset,
-            config,
-            base,
-            table,
-            base.gram(base),
-            base.gram(table),
-            table.squares([g.span for g in dictionary.groups]),
-            rows.blocks(config.block),
-        )
+        table, gram = dictionary.later, base.gram(base)
+        if sums is None:
+            sums = base.gram(table), table.squares([g.span for g in dictionary.groups])
+        known, block = (rows, dictionary, prior, dataset, config), rows.blocks(config.block)
+        return cls(*known, base, table, gram, *sums, block)
 
     @cached_property
     def block_rows(self) -> Array:
