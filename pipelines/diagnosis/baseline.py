@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb
+from itertools import combinations
 
 import numpy as np
 
@@ -163,19 +163,6 @@ class Parts:
 
 def _splits(parts: int) -> list[tuple[tuple[int, ...], tuple[int, ...]]]:
     """Return splits of the parts into two, half of them each, spread evenly over all splits."""
-    count, size = comb(parts, parts // 2), parts // 2
-    ranks = range(0, count, max(1, count // _SPLITS))[:_SPLITS]
-    halves = [_combination(parts, size, rank) for rank in ranks]
+    every = list(combinations(range(parts), parts // 2))
+    halves = every[:: max(1, len(every) // _SPLITS)][:_SPLITS]
     return [(half, tuple(k for k in range(parts) if k not in half)) for half in halves]
-
-
-def _combination(parts: int, size: int, rank: int) -> tuple[int, ...]:
-    """Return the combination of `size` parts at place `rank` in lexicographic order."""
-    out: list[int] = []
-    for k in range(parts):
-        with_k = comb(parts - k - 1, size - len(out) - 1) if len(out) < size else 0
-        if rank < with_k:
-            out.append(k)
-        else:
-            rank -= with_k
-    return tuple(out)

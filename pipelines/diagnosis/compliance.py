@@ -115,12 +115,6 @@ def _answer(one: frf.Seen) -> Answer:
     first = one.measured.first
     shown = relative_acceleration(one.measured).within(*one.modes.band)
     unit = "1" if first.quantity == "r" else "1/(kg m^2)" if first.revolute else "1/kg"
-    return Answer(
-        one.measured.joint,
-        np.asarray(first.posture, dtype=np.float64),
-        unit,
-        shown.frequency,
-        np.abs(shown.response),
-        shown.coherence,
-        np.abs(one.modes.fit.response(shown.frequency)),
-    )
+    fitted, at = np.abs(one.modes.fit.response(shown.frequency)), np.asarray(first.posture, float)
+    seen = (shown.frequency, np.abs(shown.response), shown.coherence)
+    return Answer(one.measured.joint, at, unit, *seen, fitted)

@@ -1,6 +1,6 @@
 """Decide: a cause, none, unknown, or that the logs cannot show it.
 
-decision = decide(later, selection, baseline, reported)
+decision = decide(later, selection, baseline)
 result = limited_by_estimate(result, prepared)         the verdict "cannot-judge"
 """
 
@@ -17,7 +17,6 @@ from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Diagnosis, Verdict
 from pipelines.diagnosis.selection import Cause, Round, Selection
 from pipelines.diagnosis.state import State
-from pipelines.diagnosis.trained import covariance
 from pipelines.diagnosis.unnamed import in_words
 from pipelines.fit.bootstrap import chi2_bound
 from pipelines.fit.joint_table import Array, in_rows
@@ -39,14 +38,11 @@ class Decision:
     causes: tuple[Cause, ...]
 
 
-def decide(later: Later, selection: Selection, baseline: Baseline, reported: State) -> Decision:
+def decide(later: Later, selection: Selection, baseline: Baseline) -> Decision:
     """Return the verdict by significance and goodness of fit.
 
     Causes lose their names where they explain less than half of what is more than noise at the
     joints on which they act. The residual at other joints is reported with them.
-
-    Args:
-        reported: the causes with the numbers that are reported.
     """
     causes, end, config = selection.causes, selection.end, later.config
     left = end.mean_squares * later.dataset.noise_ratio
@@ -63,9 +59,9 @@ def decide(later: Later, selection: Selection, baseline: Baseline, reported: Sta
         if explained < config.share:
             reason = f"{causes[0].key[0]} explains {explained:.0%} of the excess residual"
             return Decision("unknown", reason, ())
-        if doubtful := _confused(later, end) | _unsure(later, reported):
-            first = min(doubtful)  # effects that were selected earlier do not depend on it
-            rest, causes = doubtful[first], causes[:first]
+        if wandering := _confused(later, end):
+            first = min(wandering)  # effects that were selected earlier do not depend on it
+            rest, causes = wandering[first], causes[:first]
         if not causes:
             return Decision("unknown", rest, ())
         if causes[0].alternatives:
@@ -189,23 +185,6 @@ def _confused(later: Later, end: State) -> dict[int, str]:
             if np.sum(size**2 / chance) < bound:
                 found[place] = _wanders(slow)
     return found
-
-
-def _unsure(later: Later, reported: State) -> dict[int, str]:
-    """Return {index of the effect: reason} of causes whose size may be none by its deviations."""
-    effects, names = reported.model.effects, later.slopes(reported.model)[1]
-    std = np.sqrt(np.diag(covariance(later, later.uncertain(reported)))[-len(names) :])
-    sizes = np.zeros(len(effects))
-    for (of_effect, place, name), deviation in zip(names, std, strict=True):
-        if of_effect and name.isdigit():
-            size = abs(effects[place].amplitudes[int(name)]) / max(deviation, 1e-300)
-            sizes[place] = max(sizes[place], size)
-    keys = [in_words((one.effect.name, one.effect.joint)) for one in effects]
-    return {
-        place: f"{key} may be none: its size is {sizes[place]:.1f} standard deviations"
-        for place, key in enumerate(keys)
-        if not effects[place].effect.parameters.fixed and sizes[place] < later.config.deviations
-    }
 
 
 def _followed(later: Later, selection: Selection) -> tuple[Array, tuple[str, ...]]:

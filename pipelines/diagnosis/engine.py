@@ -18,8 +18,10 @@ from pipelines.diagnosis.prior import Prior, prior_of
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.selection import SearchStart, Selection, select
 from pipelines.diagnosis.state import State
-from pipelines.diagnosis.variance import Explained, settle
-from pipelines.fit.joint_table import Table, in_rows
+from pipelines.diagnosis.trained import covariance
+from pipelines.diagnosis.variance import settle
+from pipelines.fit.bootstrap import wald
+from pipelines.fit.joint_table import Array, Table, in_rows
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
@@ -72,6 +74,24 @@ class Look:
         known = self.reference is not None or not end.model.effects
         return end if known else self.later.unchanged(end)
 
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the nominal numbers and those of the causes reported, in their own units."""
+        held = self.reported is not self.selection.end
+        return covariance(self.later, self.reported, held)
+
+    @property
+    def unsure(self) -> int | None:
+        """Index of the cause whose size may best be none; None: they all have one."""
+        model, alpha, ratios = self.reported.model, self.later.config.alpha, dict[int, float]()
+        names, first = self.later.slopes(model)[1], len(model.beta)
+        for place, one in enumerate(model.effects):
+            at = [first + k for k, n in enumerate(names) if n[:2] == (1, place) and n[2].isdigit()]
+            if one.effect.parameters.fixed is None:
+                sizes = np.array(one.amplitudes)
+                ratios[place] = wald(sizes, self.covariance[np.ix_(at, at)], alpha)
+        return min((k for k in ratios if ratios[k] < 1.0), key=lambda k: ratios[k], default=None)
+
     @property
     def reference(self) -> tuple[Rows, Table] | None:
         """The rows and columns of the reference."""
@@ -90,14 +110,13 @@ def _usual(
     return prior, baseline(parts, dataset, dictionary, config), sums
 
 
-def _explained(rough: Dataset, every: Dictionary, look: Look) -> Explained:
-    """Return the torque of the causes of a look, and of all that was fitted with them."""
+def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:
+    """Return the torque (rows,) [N m] of the causes, and of all that was fitted with them."""
     rows, end, prior = rough.later, look.reported, look.later.prior
     whole = end.model.torque(rows.data)
     small = every.later.take(prior.standing).times(end.theta[prior.n_nominal :])
     cause = whole - replace(end.model, effects=()).torque(rows.data)
-    fit = whole + in_rows(small, rows.joint) / rows.weight
-    return Explained(cause, fit, look.reference)
+    return cause, whole + in_rows(small, rows.joint) / rows.weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,14 +168,17 @@ def diagnose_prepared(
         power, found, usual = last.later.dataset.noise_power, last.selection.found, last.usual
         if not found.causes:
             break
-        dataset, columns = settle(rough, every, config, _explained(rough, every, last))
+        torques = _torques(rough, every, last)
+        dataset, columns = settle(rough, every, config, *torques, last.reference)
         change = np.abs(np.log(dataset.noise_power / power)).max()
         if change < _SETTLED and (usual is not None or len(found.causes) == known):
             break
         del last  # its columns take the memory that the next ones need
         last, known = Look.of(dataset, columns(), named, config, found, usual), len(found.causes)
     last = replace(last, selection=last.selection.without_selected_alternatives)
-    decision = decide(last.later, last.selection, last.baseline, last.reported)
+    while (place := last.unsure) is not None:
+        last = replace(last, selection=last.selection.without(last.later, place))
+    decision = decide(last.later, last.selection, last.baseline)
     return Diagnosis(decision, last, responses)
 
 

@@ -23,7 +23,7 @@ from pipelines.diagnosis.screening import best_of
 from pipelines.diagnosis.selection import Candidate, refit
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.state import State
-from pipelines.diagnosis.trained import train
+from pipelines.diagnosis.trained import covariance, train
 from pipelines.model.arm import Acting
 from pipelines.model.rows.families import Wanted, usable
 from pipelines.model.rows.fit import worse_log
@@ -71,7 +71,8 @@ def extend(
         place = max(k for k, doubt in enumerate(doubts) if doubt)  # the last gains least
         cause = left.pop(place)
         refused.append(Rejected(cause.effect.name, cause.effect.joint, doubts[place]))
-    findings = findings_of(worth, later, state, [(None, ())] * len(left), responses)
+    known, open_sets = covariance(later, state), [(None, ())] * len(left)
+    findings = findings_of(worth, later, state, known, open_sets, responses)
     found = replace(extension_of(prepared, worth, findings), rejected=tuple(refused))
     return found if left else replace(found, arm=None, gain=None)
 

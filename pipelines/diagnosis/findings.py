@@ -28,7 +28,7 @@ from pipelines.diagnosis.result import (
 from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.selection import Round, laws_of
 from pipelines.diagnosis.state import Fit, State
-from pipelines.diagnosis.trained import Standing, Trained, covariance, parameters, told
+from pipelines.diagnosis.trained import Standing, Trained, parameters, told
 from pipelines.fit.joint_table import Array
 from pipelines.model.arm import Acting
 from pipelines.model.rows.exact import Named
@@ -103,12 +103,14 @@ def findings_of(
     worth: Worth,
     later: Later,
     end: State,
+    known: Array,
     causes: Sequence[tuple[float | None, tuple[Alternative, ...]]],
     responses: Compliance | None,
 ) -> tuple[Finding, ...]:
     """Return the causes of a model, strongest first, their numbers by all rows.
 
     Args:
+        known: covariance of their numbers.
         causes: probability and alternatives of each.
     """
     if not causes:
@@ -121,7 +123,7 @@ def findings_of(
         np.zeros(0),
         np.zeros((len(end.model.beta) + len(names), 0)),
         tuple(names),
-        covariance(later, later.uncertain(end)),
+        known,
     )
     out = []
     for place, (probability, others) in enumerate(causes):

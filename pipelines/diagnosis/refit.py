@@ -434,11 +434,6 @@ class Later:
             return state
         return self.fit(state.model, state.theta, state.belief.held(at))
 
-    def uncertain(self, state: State) -> State:
-        """Return the state with standing numbers where they are, and as uncertain as the prior."""
-        belief = self.belief_of(state.model)
-        return replace(state, belief=belief, exact=lambda: self._exact(belief, state.model))
-
     def beside(self, belief: Belief, effect: Effect) -> Belief:
         """Return the belief for a model that contains an effect.
 

@@ -110,6 +110,17 @@ class Selection:
         rounds = tuple(replace(one, cause=new.get(id(one.cause), one.cause)) for one in self.rounds)
         return replace(self, causes=tuple(new.values()), rounds=rounds)
 
+    def without(self, later: Later, place: int) -> Selection:
+        """Return the selection without a cause whose size may be none, the others fitted anew."""
+        gone, model = self.causes[place], self.end.model.without(place)
+        why = f"the size of {in_words(gone.key)} may be none by its standard deviation"
+        rounds = (
+            replace(r, cause=None, stopped=why) if r.cause is gone else r for r in self.rounds
+        )
+        end = later.fit(model, self.end.theta, later.belief_of(model))
+        causes = tuple(one for one in self.causes if one is not gone)
+        return replace(self, causes=causes, end=end, rounds=tuple(rounds))
+
     @property
     def found(self) -> SearchStart:
         """The selected causes, for a further search."""
@@ -324,15 +335,18 @@ class _Step:
         """Return the causes that explain something else than a shape without a name does.
 
         Fitted together with it they are significant, gain more than a share of what they gain
-        alone, and more than the shape leaves because no law is exact.
+        alone, and more than the shape leaves at their joints because no law is exact.
         """
-        config, gains = self.later.config, {s.group: s.gain for s in self.later.screened(other)}
-        inexact = config.relevance * (self.state.cost - other.cost)
-        return [
-            key
-            for key, one in self.significant.items()
-            if gains[one.group] > max(config.share * one.gain, inexact, self._threshold(one))
-        ]
+        later, config = self.later, self.later.config
+        gains = {s.group: s.gain for s in later.screened(other)}
+        saved = config.relevance * np.maximum(self.state.squares - other.squares, 0.0)
+
+        def least(one: Screened) -> float:
+            inexact = float(later.shares[later.dictionary.groups.index(one.group)] @ saved)
+            return max(config.share * one.gain, inexact, self._threshold(one))
+
+        found = self.significant.items()
+        return [key for key, one in found if gains[one.group] > least(one)]
 
     def _contest(
         self,

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.diagnosis.candidates import Group
 from pipelines.diagnosis.dataset import Rows
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.result import Standing as Told
@@ -66,16 +67,14 @@ def _reference(later: Later) -> Later:
     """Return the rows of the reference with a flat prior on nominal numbers, and what may stand."""
     dataset, dictionary, prior = later.dataset, later.dictionary, later.prior
     n = prior.n_nominal
-    groups = tuple(
-        group
-        for group in dictionary.groups
-        if (group.kind == "unnamed" and group.key[0] != FORM)  # standing laws may have its form
-        or (
-            group.kind == "named"
-            and (shape := dictionary.families[group.key].shapes[group.shape]).evidence == "residual"
-            and adds(shape)
-        )
-    )
+
+    def stands(group: Group) -> bool:
+        if group.kind != "named":
+            return group.kind == "unnamed" and group.key[0] != FORM  # standing laws may have it
+        shape = dictionary.families[group.key].shapes[group.shape]
+        return shape.evidence == "residual" and adds(shape)
+
+    groups = tuple(group for group in dictionary.groups if stands(group))
     assert dictionary.reference is not None
     return Later.of(
         replace(dataset, later=dataset.known, reference=None),

@@ -6,7 +6,7 @@
 Standing numbers s_g ~ N(0, τ_g), with τ_g by empirical Bayes: expectation maximisation, each group
 shrunk to its family (Dempster, Laird & Rubin 1977; Efron & Morris 1973). The noise Σ of each
 session is an autoregressive process for each joint: what the nominal model and every candidate
-together leave, fitted by generalised least squares (Cochrane & Orcutt 1949).
+together leave, fitted to rows alone by generalised least squares (Cochrane & Orcutt 1949).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from pipelines.diagnosis.screening import best_of, screen
 from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
 from pipelines.model.arm import Arm
 
-__all__ = ["Components", "Explained", "components", "settle"]
+__all__ = ["Components", "components", "settle"]
 
 _FLAT = 1e-10  # numerics: of a column's information
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
@@ -100,20 +100,13 @@ def _family(group: Group) -> tuple[str, int | None]:
     return (group.family, group.key[1])
 
 
-@dataclass(frozen=True, eq=False)
-class Explained:
-    """What an earlier look has explained, and the reference rows and columns that it whitened."""
-
-    cause: Array  # (rows,) [N m] torque of the causes found, which is no noise of the later rows
-    fit: Array  # (rows,) [N m] of the whole fitted model: the residual of the rows is the noise
-    reference: tuple[Rows, Table] | None
-
-
 def settle(
     dataset: Dataset,
     dictionary: Dictionary,
     config: DiagnosisConfig,
-    known: Explained | None = None,
+    cause: Array | None = None,
+    fit: Array | None = None,
+    reference: tuple[Rows, Table] | None = None,
 ) -> tuple[Dataset, Callable[[], Dictionary]]:
     """Return the rows of each session whitened, in units of its own noise, and their columns.
 
@@ -121,32 +114,36 @@ def settle(
     comparable. Rows alone use the best shape of each cause, and the best window of each log, or a
     fault of another shape would be noise. The columns, which take most memory, are made when they
     are asked for.
+
+    Args:
+        cause: (rows,) [N m] torque of causes found before, which is no noise of the later rows.
+        fit: (rows,) [N m] torque of the whole fitted model; the residual of the rows is the noise.
+        reference: rows and columns of the reference that were whitened before.
     """
     alone = dataset.reference is None
     first = tuple(group for group in dictionary.groups if group.shape == 0)
 
-    def left(rows: Rows, table: Table, white: Rows, columns: Table) -> list[Array]:
+    def noise_of(rows: Rows, table: Table, white: Rows, columns: Table) -> list[Array]:
         groups = _best_shapes(white, columns, dictionary.groups) if alone else first
         numbers = _imitated(white, columns, groups, config)
         torque = Table.stacked([rows.nominal, table]).times(numbers)
         noise = [y - t for y, t in zip(rows.y, torque, strict=True)]
         return _less_events(rows, dictionary, dataset.arm, noise) if alone else noise
 
-    cause, fit = (None, None) if known is None else (known.cause, known.fit)
     rows, table, bins = dataset.later.less(fit), dictionary.later, config.noise_bins
-    noise = left(rows, table, rows, table)
-    if alone and known is None:  # what fits best depends on the noise
+    noise = noise_of(rows, table, rows, table)
+    if alone and fit is None:  # what fits best depends on the noise
         white, through = rows.whitened(noise, bins)
-        noise = left(rows, table, white, through(table))
+        noise = noise_of(rows, table, white, through(table))
     cleared, to_later = dataset.later.less(cause).whitened(noise, bins)
     now = replace(dataset, later=cleared.less(None), cleared=cleared)
     before, own = dataset.reference, dictionary.reference
-    done = None if known is None else known.reference
-    if done is None and before is not None and own is not None:
-        white, through = before.whitened(left(before, own, before, own), bins)
-        done = white, through(own)
-    if done is not None:
-        now, dictionary = replace(now, reference=done[0]), replace(dictionary, reference=done[1])
+    if reference is None and before is not None and own is not None:
+        white, through = before.whitened(noise_of(before, own, before, own), bins)
+        reference = white, through(own)
+    if reference is not None:
+        white, columns = reference
+        now, dictionary = replace(now, reference=white), replace(dictionary, reference=columns)
     return now, lambda: replace(dictionary, later=to_later(table))
 
 

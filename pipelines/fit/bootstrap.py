@@ -2,6 +2,7 @@
 
     low, high = apart(ours, theirs, power, rng)       95 % of  error of theirs - error of ours
     chi2_bound, upper_point                           what chance exceeds rarely, by its law or by values seen
+    wald(numbers, covariance, alpha)                  whether numbers differ from none: above 1
 
 Efron 1979; blocks of consecutive samples, whose residuals depend on one another, stay whole (Künsch 1989). Both errors are
 of the same blocks in every draw, so that what is hard for both falls out.
@@ -15,7 +16,7 @@ import numpy as np
 
 from pipelines.fit.equations import Array
 
-__all__ = ["apart", "apart_in", "chi2_bound", "drawn", "upper_point"]
+__all__ = ["apart", "apart_in", "chi2_bound", "drawn", "upper_point", "wald"]
 
 _DRAWS = 4000
 _NORMAL = 1.96  # standard deviations of 95 %
@@ -72,3 +73,15 @@ def upper_point(values: Sequence[float], alpha: float) -> float:
     x = np.asarray(values)
     scale = max(float(x.std(ddof=1)) * np.sqrt(6.0) / np.pi, 1e-12) if len(x) > 1 else 1e-12
     return float(x.mean() - np.euler_gamma * scale - scale * np.log(-np.log1p(-alpha)))
+
+
+def wald(numbers: Array, covariance: Array, alpha: float) -> float:
+    """Return aᵀ C⁻¹ a of numbers a over its χ² bound, which numbers of none exceed with probability `alpha` (Wald 1943).
+
+    Args:
+        numbers: a (k,).
+        covariance: C (k, k); numbers of variance 0 are not known, and count for nothing.
+    """
+    known = np.flatnonzero(np.diag(covariance) > 0.0)
+    a, inverse = numbers[known], np.linalg.pinv(covariance[np.ix_(known, known)], hermitian=True)
+    return float(a @ inverse @ a) / chi2_bound(alpha, max(len(a), 1))

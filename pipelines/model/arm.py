@@ -144,8 +144,6 @@ class Arm:
 
     def _kept(self, kind: str, motion: Motion, work: Callable[[Motion], Array]) -> Array:
         """Return what `work` makes of a motion, kept with it where its arrays are only read."""
-        if any(x.flags.writeable for x in (motion.q, motion.dq, motion.ddq)):
-            return work(motion)
         return motion.kept((kind, self.body, self.base, self.friction), lambda: work(motion))
 
     def _friction_torque(self, motion: Motion) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.fit.bootstrap import apart
+from pipelines.fit.bootstrap import apart, wald
 from pipelines.fit.equations import Array
 
 
@@ -39,3 +39,24 @@ def test_a_difference_is_seen_that_scatter_of_each_would_hide() -> None:
 
 def test_one_block_says_nothing() -> None:
     assert apart(np.ones(1), np.ones(1), np.ones(1), np.random.default_rng(0)) == (-np.inf, np.inf)
+
+
+@pytest.mark.parametrize("count", [1, 2, 10])
+def test_numbers_of_none_differ_from_none_by_chance_alone(count: int) -> None:
+    """Together one in twenty: of ten the largest alone would pass its own bound four times in ten."""
+    rng = np.random.default_rng(count)
+    half = rng.standard_normal((count, count))
+    numbers = rng.standard_normal((4000, count)) @ half
+    passed = np.mean([wald(one, half.T @ half, 0.05) > 1.0 for one in numbers])
+    assert passed == pytest.approx(0.05, abs=0.012)
+
+
+def test_two_numbers_that_imitate_each_other_are_sure_together() -> None:
+    """Each within its deviation, ±1, and their sum four of its deviations from none."""
+    covariance = np.array([[1.0, -0.99], [-0.99, 1.0]])
+    assert wald(np.array([0.3, 0.3]), covariance, 0.01) > 1.0
+    assert wald(np.array([0.3, -0.3]), covariance, 0.01) < 0.1
+
+
+def test_a_number_of_which_nothing_is_known_differs_from_nothing() -> None:
+    assert wald(np.array([5.0]), np.zeros((1, 1)), 0.01) == 0.0

@@ -28,7 +28,7 @@ from pipelines.log.recording.column_groups import (
     tables_beside,
     texts_of,
 )
-from pipelines.log.recording.column_names import WORDS, read_name, words_of
+from pipelines.log.recording.column_names import WORDS, words_of
 from pipelines.log.recording.evidence import Slope, crossed, slope_of
 from pipelines.log.recording.raw import RawTable
 from pipelines.log.robot import RobotDescription
@@ -268,10 +268,11 @@ def _without_rest(table: RawTable, group: Group, n: int | None) -> Group:
 
 
 def _without_gripper(group: Group, listed: Sequence[Sequence[str]]) -> Group:
-    """Leave out the columns that as many names, listed in the file, call a gripper's."""
-    names = next((words for words in listed if len(words) == len(group.columns)), ())
+    """Leave out the columns that as many different names, listed in the file, call a gripper's."""
+    width = len(group.columns)
+    names = next((words for words in listed if len(words) == len({*words}) == width), ())
     pairs = zip(group.columns, names, strict=False)
-    gripper = tuple(c for c, name in pairs if read_name(name).quantity == "other")
+    gripper = tuple(c for c, name in pairs if re.search("grip|finger|jaw|claw", name.lower()))
     kept = tuple(column for column in group.columns if column not in gripper)
     return replace(group, columns=kept, gripper=gripper) if kept else group
 

@@ -15,7 +15,7 @@ __all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "refu
 
 Array = npt.NDArray[np.float64]
 
-_KEPT = 24  # numerics: torques of a motion: slopes of seven joints, of the arm and of the body, and more
+_KEPT = 16  # numerics: torques of a motion: slopes of seven joints, of the arm and of the body, and two more
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,11 @@ class Motion:
     def kept(self, key: tuple[object, ...], work: Callable[[], Array]) -> Array:
         """Return what `work` makes of this motion: once for the objects of a key, of the last few.
 
-        It is not to be written to. Slopes by differences ask for the same torque once a number.
+        It is not to be written to. Slopes by differences ask for the same torque once a number. Of a motion whose arrays may be
+        written to nothing is kept.
         """
+        if any(x.flags.writeable for x in (self.q, self.dq, self.ddq)):
+            return work()
         for place, (known, torque) in enumerate(self._kept):
             if len(known) == len(key) and all(a is b for a, b in zip(key, known, strict=True)):
                 self._kept.insert(0, self._kept.pop(place))

@@ -64,19 +64,19 @@ def perturbed_by(slopes: Array, d: Array, rate: Array, second: Array) -> Array:
 
 
 def torque_slopes(torque: Torque, motion: Motion, index: int) -> Array:
-    """K_j, C_j, M_j (3, samples, joints), for whoever asks P_j of several directions."""
+    """Return K_j, C_j, M_j (3, samples, joints): P_j of any direction follows from them."""
     zero, one = np.zeros(len(motion.t)), np.ones(len(motion.t))
     units = ((one, zero, zero), (zero, one, zero), (zero, zero, one))
     return np.stack([perturbed_torque(torque, motion, index, *unit) for unit in units])
 
 
 def arm_slopes(arm: Moving, motion: Motion, index: int) -> Array:
-    """The same of an arm with its friction, kept with the motion."""
+    """Return K_j, C_j, M_j (3, samples, joints) of an arm with its friction, kept with the motion."""
     return motion.kept(("slopes of the arm", arm, index), lambda: torque_slopes(arm.torque, motion, index))
 
 
 def rigid_slopes(body: RigidBody, p: Array, motion: Motion, index: int) -> Array:
-    """The same of the rigid arm alone, kept with the motion."""
+    """Return K_j, C_j, M_j (3, samples, joints) of the rigid arm alone, kept with the motion."""
     def torque(there: Motion) -> Array:
         return body.torque(there.q, there.dq, there.ddq, p)
 

@@ -349,11 +349,11 @@ class Data:
             times: (k,) numbers of the columns, for the torque (rows,) that they give; None: the columns themselves.
         """
         def lay(one: LogData) -> Callable[[], Array]:
-            return lambda: one.lay(torque(one.motion))
+            return lambda: np.ascontiguousarray(one.lay(torque(one.motion)))  # to be seen as (k, rows) without a copy
 
         each = (one.kept.of((one.place, key), lay(one)) for one in self.logs)
-        laid = [x.reshape(len(x), -1) for x in each]
-        return np.concatenate(laid if times is None else [times @ x for x in laid], axis=-1)
+        laid = (x.reshape(len(x), -1) for x in each)
+        return np.concatenate([x if times is None else times @ x for x in laid], axis=-1)
 
     def blocks(self, count: int) -> Indices:
         """(rows,) to which of about `count` stretches of time a row belongs, each within one log, all joints alike."""

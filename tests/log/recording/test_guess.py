@@ -341,6 +341,16 @@ def test_a_gripper_in_a_list_of_names_is_no_joint_of_an_arm_whose_end_is_open(tm
         assert f"# left out, a gripper's by the file's names: {name}_1, {name}_2" in draft
 
 
+def test_words_of_a_control_mode_are_no_names_of_columns(tmp_path: Path) -> None:
+    """Three words, one of them "mode", beside three joints took the third joint for a gripper."""
+    run = simulate(THREE, seed=3, seconds=2.0)
+    data = {"control": "joint position mode", "t": run.t.tolist(), "position": run.q.tolist(), "effort": run.tau.tolist()}
+    (tmp_path / "run.json").write_text(json.dumps(data))
+    draft = draft_recipe(tmp_path / "run.json").text
+    assert "position_3" in draft
+    assert "gripper" not in draft
+
+
 def test_a_position_that_never_moves_is_no_joint(tmp_path: Path) -> None:
     columns = good()
     named = {"t": columns["t"], "grippers_angle": 0.0 * columns["t"]} | {f"joint_{j}": columns[f"q_{j}"] for j in (1, 2, 3)}

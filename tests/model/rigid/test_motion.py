@@ -10,6 +10,7 @@ from pipelines.model.rigid.body import Motion
 def test_a_motion_keeps_the_last_torques_of_the_very_objects() -> None:
     """Equal objects are others: what they compare by may be arrays."""
     x = np.zeros((4, 2))
+    x.flags.writeable = False
     motion, asked = Motion(np.zeros(4), x, x, x), list[int]()
 
     def work() -> np.ndarray:
@@ -27,3 +28,12 @@ def test_a_motion_keeps_the_last_torques_of_the_very_objects() -> None:
     for k in range(40):
         motion.kept(("torque", np.full(1, k)), work)
     assert motion.kept(("torque", one), work)[0] == 44.0
+
+
+def test_a_motion_that_may_be_written_to_keeps_nothing() -> None:
+    x = np.zeros((4, 2))
+    motion = Motion(np.zeros(4), x, x, x)
+    first = motion.kept(("sum",), lambda: x + 1.0)
+    x[:] = 3.0
+    assert first.max() == 1.0
+    assert motion.kept(("sum",), lambda: x + 1.0).max() == 4.0
