@@ -17,7 +17,7 @@ class DiagnosisConfig:
     lowest_hz: float = 10.0  # of a low-pass that is found: blocks and whitening need rows enough
     keep: float = 2.6  # rows a period of the low-pass; more fill a band that it keeps back
     highest_hz: float = 25.0  # of a low-pass that is found: above it quantised positions dominate
-    alpha: float = 0.01  # family-wise error of screening, all candidates together
+    alpha: float = 0.01  # family-wise error of screening, all candidates; of tests of one number
     set_alpha: float = 0.05  # of the model confidence set (Hansen, Lunde & Nason 2011)
     block: float = 1.0  # [s] blocks of the predictive score, longer than the low-pass remembers
     blocks_together: int = 3  # length of the moving blocks of the bootstrap, in blocks

@@ -345,8 +345,7 @@ class _Step:
             inexact = float(later.shares[later.dictionary.groups.index(one.group)] @ saved)
             return max(config.share * one.gain, inexact, self._threshold(one))
 
-        found = self.significant.items()
-        return [key for key, one in found if gains[one.group] > least(one)]
+        return [key for key, s in self.significant.items() if gains[s.group] > least(s)]
 
     def _contest(
         self,

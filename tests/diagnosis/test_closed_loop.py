@@ -177,7 +177,7 @@ def test_a_lag_is_no_lag_of_another_length() -> None:
 @pytest.mark.slow
 def test_a_short_link_is_not_distinguished_from_a_long_next_one(tmp_path: Path) -> None:
     """A SCARA shows the ratio of its links alone: link 1 by -23.3 mm was reported as link 2 by 17.7 mm, ± 0.1 mm."""
-    finding = told(67010, tmp_path)
+    finding = finding_of(67010, tmp_path)
     link = finding["parameters"]["link"]
     assert finding["cause"] == "link_length"
     assert abs(link["value"] - 1.0) < 2.0 * link["std"]
@@ -186,14 +186,14 @@ def test_a_short_link_is_not_distinguished_from_a_long_next_one(tmp_path: Path) 
 @pytest.mark.slow
 def test_a_lag_is_as_sure_as_the_small_lags_of_healthy_joints_allow(tmp_path: Path) -> None:
     """With these taken for none, 5.065 ms of a true 5.055 ms were sure to 4 µs."""
-    finding = told(72079, tmp_path)
+    finding = finding_of(72079, tmp_path)
     lag = finding["parameters"]["time_constant"]
     assert finding["cause"] == "drive_lag"
     assert abs(lag["value"] - 5.0551e-3) < 2.0 * lag["std"]
     assert lag["std"] < 0.01 * lag["value"]
 
 
-def told(number: int, folder: Path) -> dict[str, Any]:
+def finding_of(number: int, folder: Path) -> dict[str, Any]:
     """Return the one finding of a drawn machine, as it is written."""
     seed = number // 1000
     case = next(case for case in drawn(1 + number % 1000, seed) if case.number_in_name == number)
