@@ -31,6 +31,7 @@ _LARGEST = 1e150  # beyond it the axis limits overflow; a damaged sample may be 
 _SCALES = ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns"))
 _POINTS = 800  # of a curve among others
 _ROW = 0.8  # [inch] height of the axes of one joint
+_WIDE = 70  # characters of a legend that a figure is wide enough for
 DASHED = (0, (5, 1.5))
 
 
@@ -110,8 +111,10 @@ def joint_colour(joint: int) -> str:
 
 
 def legend_above(axis: Axes, columns: int = 1) -> None:
-    """A legend outside the axes, to the right of the title."""
-    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=columns)
+    """A legend outside the axes, to the right of the title; in fewer columns where names are long."""
+    longest = max((len(name) for name in axis.get_legend_handles_labels()[1]), default=0)
+    fewer = max(1, min(columns, _WIDE // max(longest, 1)))
+    axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=fewer)
 
 
 def label_rows(
