@@ -111,7 +111,7 @@ def joint_colour(joint: int) -> str:
 
 
 def legend_above(axis: Axes, columns: int = 1) -> None:
-    """A legend outside the axes, to the right of the title; in fewer columns where names are long."""
+    """A legend outside the axes, right of the title; in fewer columns where names are long."""
     longest = max((len(name) for name in axis.get_legend_handles_labels()[1]), default=0)
     fewer = max(1, min(columns, _WIDE // max(longest, 1)))
     axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderpad=0.0, ncols=fewer)
