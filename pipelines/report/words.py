@@ -73,7 +73,7 @@ def at_places(places: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
 
 
 def _at_joints(cause: str, joints: Sequence[str]) -> str:
-    own = [joint for joint in joints if joint]
+    own = list(dict.fromkeys(joint for joint in joints if joint))  # several orders at one joint
     if not own:
         return named(cause, None)
     rest = " and at all joints together" if "" in joints else ""

@@ -29,7 +29,7 @@ from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section, proof_figures
 from pipelines.report.diagnosis_report import diagnosis_report, torque_errors
-from pipelines.report.words import format_values, in_order, meaning_of, named, spoken, together, without_keys
+from pipelines.report.words import at_places, format_values, in_order, meaning_of, named, spoken, together, without_keys
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')
@@ -280,3 +280,9 @@ def test_nothing_wrong_says_at_once_of_what_it_says_nothing() -> None:
     one = diagnosis_report(Result(**(NOTHING | {"not_identifiable": beyond[2:]}))).verdict
     assert "they say nothing of payload at the tip;" in one
     assert "nothing of" not in diagnosis_report(Result(**NOTHING)).verdict
+
+
+def test_several_orders_of_cogging_at_a_joint_name_it_once() -> None:
+    """An ODrive's three orders were "cogging at joints 1, 1 and 1"."""
+    assert at_places([("cogging", "1")] * 3) == [("cogging", "cogging at joint 1")]
+    assert at_places([("cogging", "1"), ("cogging", "1"), ("cogging", "3")]) == [("cogging", "cogging at joints 1 and 3")]
