@@ -124,6 +124,15 @@ def test_a_unit_that_every_angle_is_in_is_hinted_at(seed: int, factor: float, hi
     assert f"q fits if every angle is multiplied by {hint}" in found[0].message
 
 
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_row_that_is_stored_again_does_not_accelerate_the_arm(every: int) -> None:
+    """A position held for a sample or two is a staircase, whose second derivative is a share of the speed."""
+    log = make_log(fourier(np.random.default_rng(7)), seed=7)
+    again = np.arange(log.n_samples) // (4 * every) * 4 * every  # a controller at 250 Hz and slower, logged at 1 kHz
+    fresh, stale = evidence(log).motion, evidence(with_signal(log, q=log.q[again], tau=log.tau[again])).motion
+    assert np.interp(fresh.t, stale.t, stale.ddq[:, 1]) == pytest.approx(fresh.ddq[:, 1], abs=0.05 * fresh.ddq[:, 1].std())
+
+
 @pytest.mark.parametrize("seed", seeds(3))
 @pytest.mark.parametrize("level", [1.0, 0.3])
 @pytest.mark.parametrize("factor", [0.5, 2.0])
