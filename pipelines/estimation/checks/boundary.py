@@ -63,8 +63,8 @@ _HELD = 0.02  # of the travel of the joint that moves most: a joint that moves l
 
 @dataclass(frozen=True)
 class Share:
-    """Share of a part of the torque; of gravity 1 is all of it, of friction the share of the
-    torque's RMS.
+    """Share of a part of the torque; of gravity 1 is all of the gravity, of friction the share is
+    that of the torque: mean power over RMS torque times RMS speed, 1 where all of it is friction.
     """
 
     share: float | None  # of all joints; null: not identifiable
@@ -416,9 +416,6 @@ class _Estimate:
             found = Share(None, None, present=present, reason=reason)
         else:
             found = Share(share, std, present=present)
-        if found.share is not None and present:
-            joint_share, joint_std = _each_joint(model, best, config)
-            found = replace(found, joint_share=joint_share, joint_std=joint_std)
         told = tuple(described.tolist())
         if present is False:
             removed = (
@@ -438,6 +435,10 @@ class _Estimate:
         )
         spread, reason = self.direction_spread(fits)
         pointing = tuple(map(float, top.gravity[0]))
+        if found.share is not None and present:
+            acting = top.gravity[0] if turned else described
+            joint_share, joint_std = _each_joint(model, best, acting, config)
+            found = replace(found, joint_share=joint_share, joint_std=joint_std)
         if reason:
             return found, Direction(None, None, told, None, pointing, reason), False, turned
         angle = _angle(top.gravity[0], described)
@@ -588,8 +589,11 @@ def _present(
     top: GravityFit, none: GravityFit, share: tuple[float, float] | None, config: BoundaryConfig
 ) -> bool | None:
     """Return whether the torque holds gravity: by its share, and by the fits of gravity of its
-    whole size and of zero gravity.
+    whole size and of zero gravity; None where both fit alike within the error of any model.
     """
+    apart = none.residual**2 - top.residual**2  # of each joint's torque
+    if np.abs(apart).max() < config.suspect**2:
+        return None
     if share is None:
         half = _power(top) < config.explained * _power(none)
         return True if half and top.score > none.score + config.alike else None
@@ -600,9 +604,11 @@ def _present(
 
 
 def _each_joint(
-    model: GravityModel, best: GravityFit, config: BoundaryConfig
+    model: GravityModel, best: GravityFit, acting: Array, config: BoundaryConfig
 ) -> tuple[tuple[float | None, ...], ...]:
-    """Return the share of each joint's gravity, where its torque tells it, and its deviation."""
+    """Return the share of each joint's gravity, where the gravity that is `acting` (3,) weighs on
+    it and its torque tells it, and its deviation.
+    """
     n = len(best.gravity)
     size = float(np.linalg.norm(best.gravity[0]))
     groups = np.einsum("jk,jx->kjx", np.eye(n), best.gravity)
@@ -610,7 +616,7 @@ def _each_joint(
     std = np.sqrt(np.maximum(np.diag(gravity_spread(model, apart, groups)[0]), 0.0))
     std = std * size / STANDARD_GRAVITY
     share = apart.gravity @ best.gravity[0] / size / STANDARD_GRAVITY
-    pulled = model.pulls(best) @ best.gravity[0]
+    pulled = model.pulls(best) @ acting
     weighs = np.sqrt(np.mean(pulled**2, axis=1)) > config.weighs
     known = (std < config.undetermined) & weighs
     return tuple(
