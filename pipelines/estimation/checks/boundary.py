@@ -265,6 +265,12 @@ class _Estimate:
         if as_described and gravity.present is not False:
             payload = self.payload(fits.model)
         sides = {True: None if little else "motor", False: "joint", None: None}
+        acting = fits.turned[0].gravity[0] if turned else self.described
+        if gravity.present is False:
+            acting = np.zeros(3)
+        elif gravity.share and gravity.std and abs(gravity.share - 1.0) > 3.0 * gravity.std:
+            acting = fits.best.gravity[0]  # partly compensated
+        unit = self.unit(fits, acting)
         if order.signal:
             removed = turned = False  # the order first: it is what the rest rests on
         return Boundary(
@@ -274,7 +280,7 @@ class _Estimate:
             friction,
             direction,
             order,
-            self.unit(fits),
+            unit,
             _never(payload),
             (evidence, *_in_words(fits, order)),
             names,
@@ -533,8 +539,11 @@ class _Estimate:
             return Share(None, None, joints[0], joints[1], reason=reason)
         return Share(share, own, joints[0], joints[1], present, upper, reason)
 
-    def unit(self, fits: _Fits) -> Unit:
-        """Return the unit, and the rigid part of the torque over that of the described links."""
+    def unit(self, fits: _Fits, acting: Array) -> Unit:
+        """Return the unit, and the rigid part of the torque over that of the described links under
+        the gravity `acting` (3,): a gravity fitted with other links would take the scale's place.
+        """
+        config = self.config
         units = _units(self.robot)
         links = [joint.link for joint in self.robot.joints if joint.link is not None]
         if len(links) < self.robot.n_joints:
@@ -542,7 +551,7 @@ class _Estimate:
             return Unit(units, None, None, reason)
         rows, size = fits.model.rows, fits.model.size
         phi = self.arm.combine @ np.ravel(standard_parameters(links))
-        pulled = np.einsum("jnkm,k,m->jn", rows.gravity, fits.best.gravity[0], phi[rows.heavy])
+        pulled = np.einsum("jnkm,k,m->jn", rows.gravity, acting, phi[rows.heavy])
         expected = (rows.inertial @ phi + pulled) / size[:, None]
         xx, xy, yy = np.zeros(CLUSTERS), np.zeros(CLUSTERS), 0.0
         for j in range(len(size)):
@@ -554,7 +563,9 @@ class _Estimate:
         if xx.sum() <= 0.0 or xy.sum() ** 2 < 0.8 * xx.sum() * yy:
             return Unit(units, None, None, "the described links do not explain the torque")
         scale, covariance = jackknife(xx[:, None, None], xy[:, None], np.zeros((1, 1)))
-        return Unit(units, float(scale[0]), float(np.sqrt(covariance[0, 0])))
+        # the error that any model has may be in phase with the torque of the links
+        floor = config.model_error**2 * len(rows.cluster) / float(xx.sum())
+        return Unit(units, float(scale[0]), float(np.sqrt(covariance[0, 0] + floor)))
 
 
 def _angle(one: Array, other: Array) -> float:
