@@ -106,7 +106,7 @@ def _filled(grid: Array, t: Array, x: Array, spoilt: npt.NDArray[np.bool_]) -> A
     columns = []
     for column, bad in zip(x.T, spoilt.T, strict=True):
         ok = np.isfinite(column) & ~bad
-        columns.append(np.interp(grid, t[ok], column[ok]) if ok.sum() > 1 else np.zeros(grid.size))
+        columns.append(np.interp(grid, t[ok], column[ok]) if ok.any() else np.zeros(grid.size))
     return np.stack(columns, axis=-1)
 
 
