@@ -13,7 +13,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.row_fit import Sampled, quick_residual, shared_residual
 from pipelines.model.torque_scale import torque_scale
 
-__all__ = ["encoder_scale", "position_columns", "torque_columns"]
+__all__ = ["ANGLE_UNITS", "UNIT_REMEDY", "encoder_scale", "position_columns", "torque_columns"]
 
 _BAD, _GOOD, _MUCH_BETTER = 0.15, 0.3, 0.35  # relative residuals, and the ratio of two
 # A wrong scale can hide well, but the right one then is far better.
@@ -22,7 +22,8 @@ _WORSE = 1.03  # times what a row left before: chance
 _EITHER = 1.5  # of two explanations, neither leaves so much more than the other: these rows cannot tell them apart
 _SCALES = {"0.5": 0.5, "2": 2.0, "0.1": 0.1, "10": 10.0, "pi/180 (degrees)": np.pi / 180, "180/pi": 180 / np.pi,
            "2 pi (turns)": 2 * np.pi, "1/(2 pi)": 0.5 / np.pi, "-1": -1.0}
-_UNITS = {name: factor for name, factor in _SCALES.items() if "pi" in name}  # what a file may have every angle in
+ANGLE_UNITS = {name: factor for name, factor in _SCALES.items() if "pi" in name}  # what a file may have every angle in
+UNIT_REMEDY = "correct the unit of the angles on import, rad or deg or turns: it is declared for all of them"
 
 
 def torque_columns(e: Evidence) -> list[Check]:
@@ -126,7 +127,7 @@ def _angle(e: Evidence, before: float, after: float, joint: int | None, factor: 
         return e.subject.say("S15", "warn",
                              f"q fits if every angle is multiplied by {factor}, residual {before:.2g} -> {after:.2g}",
                              signal="q", gate=True,
-                             remedy="correct the unit of the angles on import, rad or deg or turns: it is declared for all of them")
+                             remedy=UNIT_REMEDY)
     return e.subject.say("S15", "warn",
                          f"q of joint {joint + 1} fits if multiplied by {factor}, residual {before:.2g} -> {after:.2g}"
                          f"{alternative}",
@@ -149,7 +150,7 @@ def _scaled(e: Evidence, residual: Callable[..., Array], alone: Callable[..., Ar
     found: list[tuple[float, int | None, str]] = []
     turning = np.array([one.revolute for one in e.subject.log.robot.joints])
     places = [(joint, _SCALES, np.arange(e.n_joints) == joint) for joint in e.telling.tolist()]
-    for joint, scales, there in (*places, (None, _UNITS, turning)):
+    for joint, scales, there in (*places, (None, ANGLE_UNITS, turning)):
         for name, factor in scales.items():
             scale = np.where(there, factor, 1.0)
             other = {"q": motion.q * scale, "dq": motion.dq * scale, "ddq": motion.ddq * scale}

@@ -22,7 +22,7 @@ from pipelines.model.clock_offset import away_from_reversals, clock_offset
 from pipelines.model.commanded import against_command
 from pipelines.model.evidence import Evidence
 from pipelines.model.excited import excited
-from pipelines.model.mix_ups import encoder_scale, position_columns, torque_columns
+from pipelines.model.mix_ups import ANGLE_UNITS, UNIT_REMEDY, encoder_scale, position_columns, torque_columns
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
@@ -172,28 +172,56 @@ def _ratios(e: Evidence) -> Sequence[Check | NotTested]:
     if known is None:
         return _against_the_others(e) or e.subject.cannot_tell(
             "S15", "the robot's description has no masses and inertias to compare with", signal="tau")
-    motion = e.motion
-    expected = e.body.torque(motion.q, motion.dq, motion.ddq, known)
-    found, seen = [], []
-    for j in e.telling.tolist():
-        friction = np.stack([motion.dq[:, j], motion.coulomb[:, j], np.ones(len(motion.t))], axis=-1)
-        columns = np.concatenate([expected[:, j:j + 1], friction], axis=1)
-        slope = float(np.linalg.lstsq(columns, motion.tau[:, j], rcond=None)[0][0])
-        without, left = _unexplained(friction, motion.tau[:, j]), _unexplained(columns, motion.tau[:, j])
-        if left > _RATIO_RESIDUAL or left > 0.4 * without:
-            continue  # the described links are not this arm's; they say nothing
-        seen.append(f"joint {j + 1}: {slope:.3g}")
-        if slope > _RATIO or 0 < slope < 1 / _RATIO:
-            found.append(e.subject.say("S15", "warn",
-                                       f"tau of joint {j + 1} is {slope:.3g} times what the described links need",
-                                       signal="tau", joint=j, gate=True,
-                                       remedy=_divided(j + 1, slope)))
+    slopes = _slopes(e, known)
+    seen = [f"joint {j + 1}: {slope:.3g}" for j, slope in slopes.items()]
+    if (far := _far(slopes)) and (unit := _angle_unit(e, known, slopes)):
+        return [unit]
+    found = [e.subject.say("S15", "warn",
+                           f"tau of joint {j + 1} is {slope:.3g} times what the described links need",
+                           signal="tau", joint=j, gate=True,
+                           remedy=_divided(j + 1, slope)) for j, slope in far.items()]
     if not seen:
         return _against_the_others(e) or e.subject.cannot_tell(
             "S15", "the described masses and inertias do not explain the torque of any joint, so that a wrong gear ratio or unit "
             "would not show", signal="tau")
     return found or _against_the_others(e) or e.subject.ok(
         "S15", f"torque over that of the described links: {', '.join(seen)}", signal="tau")
+
+
+def _slopes(e: Evidence, known: Array, angles: float = 1.0) -> dict[int, float]:
+    """Torque over that of the described links, of each joint that they explain, with every angle times `angles`."""
+    motion = e.motion
+    scale = np.where([one.revolute for one in e.subject.log.robot.joints], angles, 1.0)
+    expected = e.body.torque(motion.q * scale, motion.dq * scale, motion.ddq * scale, known)
+    slopes = {}
+    for j in e.telling.tolist():
+        friction = np.stack([motion.dq[:, j], motion.coulomb[:, j], np.ones(len(motion.t))], axis=-1)
+        columns = np.concatenate([expected[:, j:j + 1], friction], axis=1)
+        without, left = _unexplained(friction, motion.tau[:, j]), _unexplained(columns, motion.tau[:, j])
+        if left <= _RATIO_RESIDUAL and left <= 0.4 * without:  # else the described links are not this arm's; they say nothing
+            slopes[j] = float(np.linalg.lstsq(columns, motion.tau[:, j], rcond=None)[0][0])
+    return slopes
+
+
+def _far(slopes: dict[int, float]) -> dict[int, float]:
+    return {j: slope for j, slope in slopes.items() if slope > _RATIO or 0 < slope < 1 / _RATIO}
+
+
+def _angle_unit(e: Evidence, known: Array, as_declared: dict[int, float]) -> Check | None:
+    """S15: with every angle in another unit the described links explain the torques of more joints, each as large as they need.
+
+    Where no more are explained, as of one joint that only turns inertia, a gear ratio would do the same.
+    """
+    joint, far = max(_far(as_declared).items(), key=lambda one: abs(np.log(one[1])))
+    for name, factor in ANGLE_UNITS.items():
+        slopes = _slopes(e, known, factor)
+        if as_declared.keys() < slopes.keys() and not _far(slopes) and min(slopes.values()) > 0.0:
+            return e.subject.say("S15", "warn",
+                                 f"the unit of q looks wrong: as declared, tau of joint {joint + 1} is {far:.3g} times what the "
+                                 f"described links need; with every angle multiplied by {name}, "
+                                 f"{min(slopes.values()):.3g} to {max(slopes.values()):.3g} times",
+                                 signal="q", gate=True, remedy=UNIT_REMEDY)
+    return None
 
 
 def _against_the_others(e: Evidence) -> list[Check]:

@@ -78,16 +78,19 @@ def _sample_run(good: Usable, run: slice, half: int, reach: int, spacing: int) -
     if samples < 4 * half + 2 * reach + 2 * spacing:
         return None
     grid = t[0] + ts * np.arange(samples)
-    q = _filled(grid, t, log.q[run], good.position_spikes[run])
-    tau = _filled(grid, t, log.tau[run], good.torque_spikes[run])
+    # A row that was stored again is no sample: held positions add a share of their speed to the acceleration.
+    again = np.diff(np.concatenate([log.q[run], log.tau[run]], axis=1), axis=0, prepend=np.nan) == 0.0
+    stale = again.all(axis=1, keepdims=True)
+    q = _filled(grid, t, log.q[run], good.position_spikes[run] | stale)
+    tau = _filled(grid, t, log.tau[run], good.torque_spikes[run] | stale)
     if log.torque != "measured":  # held until the next sample: its middle lies half a sample later
         tau[1:] = 0.5 * (tau[1:] + tau[:-1])
     motion = local_polynomial(q, ts, half)
     # speeds far below the usual say nothing about the sign of friction
     slow = np.minimum(0.01, 0.02 * np.sqrt(np.mean(motion.first**2, axis=0)) + 1e-12)
-    again = kernel(half, 4, 0)
-    coulomb = apply_kernel(np.tanh(motion.first / slow), again)
-    torque = apply_kernel(tau, again)
+    smooth = kernel(half, 4, 0)
+    coulomb = apply_kernel(np.tanh(motion.first / slow), smooth)
+    torque = apply_kernel(tau, smooth)
     moments = np.arange(half + reach, samples - 3 * half - reach, spacing)  # in samples of `motion`
     if not moments.size:
         return None
@@ -103,7 +106,7 @@ def _filled(grid: Array, t: Array, x: Array, spoilt: npt.NDArray[np.bool_]) -> A
     columns = []
     for column, bad in zip(x.T, spoilt.T, strict=True):
         ok = np.isfinite(column) & ~bad
-        columns.append(np.interp(grid, t[ok], column[ok]) if ok.sum() > 1 else np.zeros(grid.size))
+        columns.append(np.interp(grid, t[ok], column[ok]) if ok.any() else np.zeros(grid.size))
     return np.stack(columns, axis=-1)
 
 

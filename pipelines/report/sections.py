@@ -141,7 +141,7 @@ def _direction(boundary: Boundary) -> Row:
 def _friction(boundary: Boundary) -> Row:
     share = boundary.friction
     meaning = sentence("boundary", "friction", share, boundary.side)
-    return "share of friction", _number(share.share, share.std), meaning, "neutral"
+    return "friction, share of the torque", _number(share.share, share.std), meaning, "neutral"
 
 
 def _order(boundary: Boundary) -> Row:

@@ -10,9 +10,10 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.log.doctor.checks import NotTested, Subject
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.log.experiment import Array, ExperimentLog, Signal
 from pipelines.log.files import Opened, open_log
-from pipelines.log.robot import LinkParameters
+from pipelines.log.robot import LinkParameters, format_robot
+from pipelines.log.robot_files import load_robot
 from pipelines.model import plausibility as plausibility_module
 from pipelines.model.clock_offset import Offset, clock_offset
 from pipelines.model.evidence import Evidence
@@ -122,6 +123,35 @@ def test_a_unit_that_every_angle_is_in_is_hinted_at(seed: int, factor: float, hi
     found = [c for c in plausibility(Subject(with_signal(log, q=log.q * factor))) if c.level != "ok"]
     assert [(c.code, c.gate) for c in found] == [("RRID-S15", True)]
     assert f"q fits if every angle is multiplied by {hint}" in found[0].message
+
+
+def test_radians_declared_as_degrees_are_told_from_a_torque_that_is_too_large(shared: Folder) -> None:
+    """Case 47, a UR5: by its torque alone tau of joint 4 would be 60 times too large."""
+    table = np.genfromtxt(shared / "cases" / "47-stale-samples" / "run1.csv", delimiter=",", names=True)
+    q, tau = (np.stack([table[f"{name}_{j}"] for j in range(1, 7)], axis=1) for name in ("q", "tau"))
+    robot = load_robot(shared / "cases" / "47-stale-samples" / "arm.urdf")
+    signals = {"t": Signal(table["t"], "s", "time"), "q": Signal(np.radians(q), "rad", "position"),
+               "tau": Signal(tau, "N m", "torque")}
+    log = ExperimentLog("run1", "excitation", "identify", "measured", robot.name, 0.004, format_robot(robot), signals,
+                        torque="measured")
+    (check,) = [c for c in plausibility(Subject(log)) if c.gate]
+    assert (check.code, check.where.rpartition(" ")[2]) == ("RRID-S15", "q")
+    assert check.message.startswith("the unit of q looks wrong: as declared, tau of joint ")
+    assert "every angle multiplied by 180/pi" in check.message
+    right = with_signal(log, q=q)
+    assert [c for c in plausibility(Subject(right)) if c.gate] == []
+    for factors in (np.array([1, 1, 1, 60, 1, 1]), np.full(6, 57.3)):
+        found = [c for c in plausibility(Subject(with_signal(right, tau=tau * factors))) if c.gate]
+        assert any(c.message.startswith("tau of joint 4 is 5") for c in found)
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_row_that_is_stored_again_does_not_accelerate_the_arm(every: int) -> None:
+    """A position held for a sample or two is a staircase, whose second derivative is a share of the speed."""
+    log = make_log(fourier(np.random.default_rng(7)), seed=7)
+    again = np.arange(log.n_samples) // (4 * every) * 4 * every  # a controller at 250 Hz and slower, logged at 1 kHz
+    fresh, stale = evidence(log).motion, evidence(with_signal(log, q=log.q[again], tau=log.tau[again])).motion
+    assert np.interp(fresh.t, stale.t, stale.ddq[:, 1]) == pytest.approx(fresh.ddq[:, 1], abs=0.05 * fresh.ddq[:, 1].std())
 
 
 @pytest.mark.parametrize("seed", seeds(3))

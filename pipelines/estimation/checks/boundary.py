@@ -63,8 +63,8 @@ _HELD = 0.02  # of the travel of the joint that moves most: a joint that moves l
 
 @dataclass(frozen=True)
 class Share:
-    """Share of a part of the torque; of gravity 1 is all of it, of friction the share of the
-    torque's RMS.
+    """Share of a part of the torque; of gravity 1 is all of the gravity, of friction the share is
+    that of the torque: mean power over RMS torque times RMS speed, 1 where all of it is friction.
     """
 
     share: float | None  # of all joints; null: not identifiable
@@ -265,6 +265,12 @@ class _Estimate:
         if as_described and gravity.present is not False:
             payload = self.payload(fits.model)
         sides = {True: None if little else "motor", False: "joint", None: None}
+        acting = fits.turned[0].gravity[0] if turned else self.described
+        if gravity.present is False:
+            acting = np.zeros(3)
+        elif gravity.share and gravity.std and abs(gravity.share - 1.0) > 3.0 * gravity.std:
+            acting = fits.best.gravity[0]  # partly compensated
+        unit = self.unit(fits, acting)
         if order.signal:
             removed = turned = False  # the order first: it is what the rest rests on
         return Boundary(
@@ -274,7 +280,7 @@ class _Estimate:
             friction,
             direction,
             order,
-            self.unit(fits),
+            unit,
             _never(payload),
             (evidence, *_in_words(fits, order)),
             names,
@@ -416,9 +422,6 @@ class _Estimate:
             found = Share(None, None, present=present, reason=reason)
         else:
             found = Share(share, std, present=present)
-        if found.share is not None and present:
-            joint_share, joint_std = _each_joint(model, best, config)
-            found = replace(found, joint_share=joint_share, joint_std=joint_std)
         told = tuple(described.tolist())
         if present is False:
             removed = (
@@ -438,6 +441,10 @@ class _Estimate:
         )
         spread, reason = self.direction_spread(fits)
         pointing = tuple(map(float, top.gravity[0]))
+        if found.share is not None and present:
+            acting = top.gravity[0] if turned else described
+            joint_share, joint_std = _each_joint(model, best, acting, config)
+            found = replace(found, joint_share=joint_share, joint_std=joint_std)
         if reason:
             return found, Direction(None, None, told, None, pointing, reason), False, turned
         angle = _angle(top.gravity[0], described)
@@ -532,8 +539,11 @@ class _Estimate:
             return Share(None, None, joints[0], joints[1], reason=reason)
         return Share(share, own, joints[0], joints[1], present, upper, reason)
 
-    def unit(self, fits: _Fits) -> Unit:
-        """Return the unit, and the rigid part of the torque over that of the described links."""
+    def unit(self, fits: _Fits, acting: Array) -> Unit:
+        """Return the unit, and the rigid part of the torque over that of the described links under
+        the gravity `acting` (3,): a gravity fitted with other links would take the scale's place.
+        """
+        config = self.config
         units = _units(self.robot)
         links = [joint.link for joint in self.robot.joints if joint.link is not None]
         if len(links) < self.robot.n_joints:
@@ -541,7 +551,7 @@ class _Estimate:
             return Unit(units, None, None, reason)
         rows, size = fits.model.rows, fits.model.size
         phi = self.arm.combine @ np.ravel(standard_parameters(links))
-        pulled = np.einsum("jnkm,k,m->jn", rows.gravity, fits.best.gravity[0], phi[rows.heavy])
+        pulled = np.einsum("jnkm,k,m->jn", rows.gravity, acting, phi[rows.heavy])
         expected = (rows.inertial @ phi + pulled) / size[:, None]
         xx, xy, yy = np.zeros(CLUSTERS), np.zeros(CLUSTERS), 0.0
         for j in range(len(size)):
@@ -553,7 +563,9 @@ class _Estimate:
         if xx.sum() <= 0.0 or xy.sum() ** 2 < 0.8 * xx.sum() * yy:
             return Unit(units, None, None, "the described links do not explain the torque")
         scale, covariance = jackknife(xx[:, None, None], xy[:, None], np.zeros((1, 1)))
-        return Unit(units, float(scale[0]), float(np.sqrt(covariance[0, 0])))
+        # the error that any model has may be in phase with the torque of the links
+        floor = config.model_error**2 * len(rows.cluster) / float(xx.sum())
+        return Unit(units, float(scale[0]), float(np.sqrt(covariance[0, 0] + floor)))
 
 
 def _angle(one: Array, other: Array) -> float:
@@ -588,8 +600,11 @@ def _present(
     top: GravityFit, none: GravityFit, share: tuple[float, float] | None, config: BoundaryConfig
 ) -> bool | None:
     """Return whether the torque holds gravity: by its share, and by the fits of gravity of its
-    whole size and of zero gravity.
+    whole size and of zero gravity; None where both fit alike within the error of any model.
     """
+    apart = none.residual**2 - top.residual**2  # of each joint's torque
+    if np.abs(apart).max() < config.suspect**2:
+        return None
     if share is None:
         half = _power(top) < config.explained * _power(none)
         return True if half and top.score > none.score + config.alike else None
@@ -600,9 +615,11 @@ def _present(
 
 
 def _each_joint(
-    model: GravityModel, best: GravityFit, config: BoundaryConfig
+    model: GravityModel, best: GravityFit, acting: Array, config: BoundaryConfig
 ) -> tuple[tuple[float | None, ...], ...]:
-    """Return the share of each joint's gravity, where its torque tells it, and its deviation."""
+    """Return the share of each joint's gravity, where the gravity that is `acting` (3,) weighs on
+    it and its torque tells it, and its deviation.
+    """
     n = len(best.gravity)
     size = float(np.linalg.norm(best.gravity[0]))
     groups = np.einsum("jk,jx->kjx", np.eye(n), best.gravity)
@@ -610,7 +627,7 @@ def _each_joint(
     std = np.sqrt(np.maximum(np.diag(gravity_spread(model, apart, groups)[0]), 0.0))
     std = std * size / STANDARD_GRAVITY
     share = apart.gravity @ best.gravity[0] / size / STANDARD_GRAVITY
-    pulled = model.pulls(best) @ best.gravity[0]
+    pulled = model.pulls(best) @ acting
     weighs = np.sqrt(np.mean(pulled**2, axis=1)) > config.weighs
     known = (std < config.undetermined) & weighs
     return tuple(
