@@ -138,7 +138,7 @@ def findings_of(
                 effect.name,
                 effect.joint,
                 effect.words.title,
-                _among(parameters(every, place), laws_of(later, end, place)),
+                _between_laws(parameters(every, place), laws_of(later, end, place)),
                 _explained(worth, place),
                 _visibility(later, end, place),
                 others,
@@ -156,7 +156,7 @@ def findings_of(
     return tuple(sorted(out, key=lambda one: -one.explained))
 
 
-def _among(own: dict[str, Value], laws: Sequence[tuple[Named, float]]) -> dict[str, Value]:
+def _between_laws(own: dict[str, Value], laws: Sequence[tuple[Named, float]]) -> dict[str, Value]:
     """Add the variance between laws, Σ w (v - v_own)², to that of each number (Draper 1995)."""
     every = [one.effect.reported(one.values) for one, _ in laws]
     quantities, out = {q.name: q for q in laws[0][0].effect.parameters}, dict(own)
