@@ -24,6 +24,7 @@ from pipelines.fit.bootstrap import wald
 from pipelines.fit.joint_table import Array, Table, in_rows
 from pipelines.log.experiment import ExperimentLog
 from pipelines.model.arm import Acting
+from pipelines.model.rows.exact import difference
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_prepared", "pose"]
@@ -76,9 +77,16 @@ class Look:
 
     @cached_property
     def covariance(self) -> Array:
-        """Of the nominal numbers and those of the causes reported, in their own units."""
-        held = self.reported is not self.selection.end
-        return covariance(self.later, self.reported, held)
+        """Of the nominal numbers and those of the causes reported, in their own units.
+
+        What standing numbers s hold moves the others by G s, s and its covariance as the logs tell:
+        C = C(s fitted) + δ δᵀ, δ the change of the other numbers when s is fitted.
+        """
+        one, other = self.reported.model, self.selection.end.model
+        moved = np.array([difference(one, other, n) for n in self.later.slopes(other)[1]])
+        away = np.r_[one.beta - other.beta, moved]
+        known = covariance(self.later, self.selection.end)
+        return np.asarray(known + np.outer(away, away))
 
     @property
     def unsure(self) -> int | None:

@@ -252,16 +252,12 @@ def _fitted(later: Later, state: State, names: Sequence[Which]) -> list[int]:
     return [*range(first), *(first + names.index(one) for one in later.slopes(state.model)[1])]
 
 
-def covariance(later: Later, state: State, held: bool = False) -> Array:
+def covariance(later: Later, state: State) -> Array:
     """Return the covariance of the nominal numbers and those of the effects, in their own units.
 
     That of white noise of unit variance, P⁻¹; of a number that blocks of time together tell worse,
     by the scores of the blocks, P⁻¹ Σ_b J_b r_b r_bᵀ J_bᵀ P⁻¹ (White 1980; Liang & Zeger 1986).
     Numbers that the rows do not tell have the variance 0.
-
-    Args:
-        held: the standing numbers s ~ N(m, τ) were held at m. What they may be adds G τ Gᵀ, the
-            other numbers having the slopes G = P⁻¹ J Dᵀ by them.
     """
     slopes, _ = later.slopes(state.model)
     columns = Table.stacked([state.known.base, state.effects])
@@ -278,11 +274,6 @@ def covariance(later: Later, state: State, held: bool = False) -> Array:
     scale = np.r_[later.prior.scale, slopes.lengths]
     wider = wider[numbers] / scale
     out = white[np.ix_(numbers, numbers)] * wider * wider[:, None]
-    if held:
-        at = np.arange(later.prior.n_nominal, later.base.width)
-        across = np.concatenate([state.known.gram, state.effects.gram(state.known.base)])[:, at]
-        by = (white @ across)[numbers] / scale[:, None]
-        out += by / np.diag(later.belief_of(state.model).info)[at] @ by.T
     told = np.diag(white)[numbers] < _UNSEEN
     told[: later.prior.n_nominal] = True
     return np.asarray(out * told * told[:, None])

@@ -132,7 +132,7 @@ def settle(
 
     rows, table, bins = dataset.later.less(fit), dictionary.later, config.noise_bins
     noise = noise_of(rows, table, rows, table)
-    if alone and fit is None:  # what fits best depends on the noise
+    if alone:  # what fits best depends on the noise
         white, through = rows.whitened(noise, bins)
         noise = noise_of(rows, table, white, through(table))
     cleared, to_later = dataset.later.less(cause).whitened(noise, bins)

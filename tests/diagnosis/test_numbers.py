@@ -7,10 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from pipelines.diagnosis.config import DiagnosisConfig
-from pipelines.diagnosis.engine import pose
-from pipelines.diagnosis.trained import covariance, parameters, told
-from pipelines.fit.joint_table import Table
+from pipelines.diagnosis.trained import parameters, told
 from pipelines.log.experiment import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
@@ -26,7 +23,6 @@ from pipelines.model.rows.fit import Refined, _by_slopes, acting, refine
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.arms import hidden
-from tests.healthy import begun
 
 INERTIA, VISCOUS, COULOMB, SHARPNESS = 0.004, 0.03, 0.2, 90.0
 
@@ -116,25 +112,3 @@ def test_an_offset_at_a_slide_is_a_force() -> None:
             for kind in (True, False)}
     assert {kind: one.unit for kind, one in arms.items()} == {True: "N m", False: "N"}
     assert arms[False].std == pytest.approx(0.01)
-
-
-def test_a_deviation_holds_what_standing_numbers_may_be() -> None:
-    """By brute force: numbers a of columns X, fitted with those of D taken for none, err by P⁻¹ X Dᵀ s, s ~ N(0, τ)."""
-    config = DiagnosisConfig()
-    later = pose(prepare(Logs((begun(hidden(1), 4000),)), config.recipe()), config)
-    start = later.start()
-    effect = TorqueOffset(joint=2)
-    model = start.model.with_effect(effect, np.array([0.1]))
-    state = later.unchanged(later.fit(model, start.theta, later.beside(start.belief, effect)))
-    standing, first = later.prior.n_nominal, later.base.width
-    columns = Table.stacked([state.known.base, state.effects])
-    every = np.concatenate([columns.dense(j) for j in range(later.rows.n_joints)], axis=1)
-    x = np.concatenate([every[:standing], every[first:]])
-    info = np.zeros((len(x), len(x)))
-    info[:standing, :standing] = state.belief.info[:standing, :standing]
-    errors = np.linalg.solve(x @ x.T + info, x @ every[standing:first].T) / np.sqrt(np.diag(later.belief.info)[standing:])
-    scale = np.r_[later.prior.scale, later.slopes(state.model)[0].lengths]
-    expected = errors @ errors.T / scale / scale[:, None]
-    found = covariance(later, state, held=True) - covariance(later, state)
-    np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-3 * np.diag(expected).min())  # columns are in single precision
-    assert found[-1, -1] > 0.1 * covariance(later, state)[-1, -1]

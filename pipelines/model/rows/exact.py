@@ -29,7 +29,8 @@ from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows, several_rows
 
-__all__ = ["Exact", "Named", "Which", "further_slopes", "law_of", "nominal_slopes", "number_moved", "recorded", "slopes_of"]
+__all__ = ["Exact", "Named", "Which", "difference", "further_slopes", "law_of", "nominal_slopes", "number_moved", "recorded",
+           "slopes_of"]
 
 def recorded(arm: Arm, table: Array, motion: Motion) -> Array:
     """Return columns (samples, joints, k) as `arm` records them.
@@ -260,6 +261,17 @@ def number_moved(one: Named, name: str, by: float) -> Named:
 Which = tuple[int, int, str]  # 0 a law, 1 an effect; its place; the number of an amplitude, or the name of a shape
 
 _DIFFERENCE = 1e-3  # of a number
+
+
+def difference(one: Exact, other: Exact, which: Which) -> float:
+    """Return by how much a number of one model lies above that of another of the same effects, as `number_moved` counts it."""
+    kind, place, name = which
+    if name.isdigit():
+        return one.effects[place].amplitudes[int(name)] - other.effects[place].amplitudes[int(name)]
+    a, b = (model.effects[place].effect if kind else model.columns.laws[place] for model in (one, other))
+    here, there = (float(getattr(x, name)) for x in (a, b))
+    quantity = next(q for q in a.parameters if q.name == name)
+    return float(np.log(here / there)) if quantity.low > 0.0 else here - there
 
 
 def slopes_of(model: Exact, data: Data, rigid: Array, laid: Sequence[Array] | None = None) -> tuple[Array, list[Which]]:
