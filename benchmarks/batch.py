@@ -27,8 +27,8 @@ from pathlib import Path
 
 from pipelines.batch.plan import load_stage, module_of
 from pipelines.batch.process import economise
-from pipelines.log.files import open_log, write_log
-from pipelines.log.log_reader import end_reader
+from pipelines.io.files import open_log, write_log
+from pipelines.io.log_reader import end_reader
 from pipelines.stage import Request, run_stage
 
 REPO = Path(__file__).resolve().parents[1]

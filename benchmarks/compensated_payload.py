@@ -27,8 +27,8 @@ from benchmarks.torque_boundary import (
 )
 from pipelines.estimation.checks.boundary import torque_boundary
 from pipelines.estimation.checks.payload import CompensatedPayload
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.robot import RobotDescription
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.robot import RobotDescription
 
 __all__ = ["described", "main", "session", "subtracted"]
 

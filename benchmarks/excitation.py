@@ -31,17 +31,17 @@ from pathlib import Path
 
 import numpy as np
 
+from bench import experiments
+from bench.controllers import Decentralised
+from bench.experiments import Experiment
+from bench.machine import Machine, paper_machine
+from bench.reference import Reference
+from bench.session import record
 from pipelines import fit_friction
-from pipelines.bench import experiments
-from pipelines.bench.controllers import Decentralised
-from pipelines.bench.experiments import Experiment
-from pipelines.bench.machine import Machine, paper_machine
-from pipelines.bench.reference import Reference
-from pipelines.bench.session import record
-from pipelines.log.files import open_log, write_log
-from pipelines.log.robot import format_robot
-from pipelines.log.robot_files import load_robot
-from pipelines.log.urdf import import_urdf
+from pipelines.io.files import open_log, write_log
+from pipelines.io.robot import format_robot
+from pipelines.io.robot_files import load_robot
+from pipelines.io.urdf import import_urdf
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe, fit_logs
 from pipelines.model.estimation.nominal import nominal_columns

@@ -22,8 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.fit.rational import Mode
-from pipelines.log.experiment import Array, Controller, ExperimentLog
-from pipelines.log.files import open_log, write_log
+from pipelines.io.experiment import Array, Controller, ExperimentLog
+from pipelines.io.files import open_log, write_log
 from pipelines.model.frf.controller import continuous_controller, sampled_controller
 from pipelines.model.frf.findings import frf_findings
 from pipelines.model.frf.modes import fitted_modes

@@ -9,7 +9,7 @@
 
 "arms"       those of benchmarks.other_plants, two to six axes, with a rotor before a spring or gap,
              and a base; Runge-Kutta 4
-"bench"      the machines of pipelines.bench, at its 1 kHz
+"bench"      the machines of bench, at its 1 kHz
 """
 
 from __future__ import annotations
@@ -21,24 +21,24 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from bench.controllers import ComputedTorque, Decentralised, FeedForward, Step
+from bench.experiments import Experiment, frf_postures
+from bench.fault import Case as FaultCase
+from bench.fault import Fault
+from bench.faults.backlash import Backlash
+from bench.faults.base_resonance import BaseResonance
+from bench.faults.joint_elasticity import JointElasticity
+from bench.machine import Machine, draw_machine
+from bench.observer import Observer
+from bench.reference import Reference
+from bench.references import turning
+from bench.rigid import RigidDynamics, motor_share, typical_inertia
+from bench.session import record
 from benchmarks.other_plants.arms import ARMS, Arm
 from benchmarks.other_plants.friction import Friction
-from pipelines.bench.controllers import ComputedTorque, Decentralised, FeedForward, Step
-from pipelines.bench.experiments import Experiment, frf_postures
-from pipelines.bench.fault import Case as FaultCase
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults.backlash import Backlash
-from pipelines.bench.faults.base_resonance import BaseResonance
-from pipelines.bench.faults.joint_elasticity import JointElasticity
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.observer import Observer
-from pipelines.bench.reference import Reference
-from pipelines.bench.references import turning
-from pipelines.bench.rigid import RigidDynamics, motor_share, typical_inertia
-from pipelines.bench.session import record
-from pipelines.log import schema
-from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
-from pipelines.log.robot import format_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.robot import format_robot
 from sample_logs.bench_session import controllers_model
 
 __all__ = ["KINDS", "PLANTS", "Session", "recorded"]

@@ -23,8 +23,8 @@ import numpy as np
 
 from benchmarks.frf_plants import KINDS, PLANTS, Session, recorded
 from benchmarks.hidden_effects.table import wilson
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log, write_log
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log, write_log
 from pipelines.model.frf.findings import Findings, frf_findings, grouped
 from pipelines.model.frf.grouping import GroupingConfig
 

@@ -24,7 +24,17 @@ from pipelines.model.friction.fit import LawFit
 from pipelines.model.friction.laws import OneJoint, law_named
 from pipelines.model.friction.refine import fit_driven_alone
 from pipelines.signal.kalman import ExtendedTextbook
-from tests.model.friction.one_joint import ENCODER, INERTIA, JOINT, SINE, STEP, TRUTHS, driven_speeds, recorded, relative
+from tests.model.friction.one_joint import (
+    ENCODER,
+    INERTIA,
+    JOINT,
+    SINE,
+    STEP,
+    TRUTHS,
+    driven_speeds,
+    recorded,
+    relative,
+)
 
 ROUNDS = {"one call": 1, "refined twice": 2}
 STATES = np.array([0.0, 0.0, 1.0 / INERTIA, SINE, 0.4, 1.2, -0.4, 120.0, 60.0, 12.0, 0.12, 0.35])

@@ -10,7 +10,21 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from benchmarks.import_layouts import NM, RAD, UNITS, Answer, Signal, current, layout, names, recorded, si, table, values, wide
+from benchmarks.import_layouts import (
+    NM,
+    RAD,
+    UNITS,
+    Answer,
+    Signal,
+    current,
+    layout,
+    names,
+    recorded,
+    si,
+    table,
+    values,
+    wide,
+)
 from benchmarks.recorded_arm import FOUR, GEN3, IIWA, SCARA, SEVEN, SIX, THREE, TWO, UR, Run
 
 ALPHABETICAL = [2, 1, 0, 3, 4, 5]  # of the joints of a UR

@@ -7,7 +7,19 @@ import h5py
 import numpy as np
 import pandas as pd
 
-from benchmarks.import_layouts import UNITS, Answer, Signal, anywhere, current, layout, names, recorded, si, table, wide
+from benchmarks.import_layouts import (
+    UNITS,
+    Answer,
+    Signal,
+    anywhere,
+    current,
+    layout,
+    names,
+    recorded,
+    si,
+    table,
+    wide,
+)
 from benchmarks.recorded_arm import FOUR, IIWA, LIFT, SEVEN, SIX, THREE, TWO, UR, Run
 
 PLAIN = "t=t; *q{}=q; *tau{}=tau"

@@ -26,7 +26,20 @@ from benchmarks.import_layouts import (
     values,
     wide,
 )
-from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEFT, PANDA, SCARA, SIX, SO100, THREE, TWO, UR, Run
+from benchmarks.recorded_arm import (
+    FOUR,
+    GEN3,
+    IIWA,
+    LEFT,
+    PANDA,
+    SCARA,
+    SIX,
+    SO100,
+    THREE,
+    TWO,
+    UR,
+    Run,
+)
 
 
 @layout(TWO, robot=None)

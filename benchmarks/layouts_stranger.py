@@ -17,7 +17,18 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.import_layouts import Answer, current, layout, recorded, stamps, state, table, values, vector, wide
+from benchmarks.import_layouts import (
+    Answer,
+    current,
+    layout,
+    recorded,
+    stamps,
+    state,
+    table,
+    values,
+    vector,
+    wide,
+)
 from benchmarks.recorded_arm import LEG, SEVEN, SIX, THREE, UR, Run
 
 DATE = "*"  # time of day and date as text: it has no unit

@@ -13,8 +13,34 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.import_layouts import UNITS, Answer, Signal, current, layout, recorded, si, stamps, state, table, values, wide
-from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEFT, PANDA, SCARA, SEVEN, SIX, THREE, TWO, UR, Run
+from benchmarks.import_layouts import (
+    UNITS,
+    Answer,
+    Signal,
+    current,
+    layout,
+    recorded,
+    si,
+    stamps,
+    state,
+    table,
+    values,
+    wide,
+)
+from benchmarks.recorded_arm import (
+    FOUR,
+    GEN3,
+    IIWA,
+    LEFT,
+    PANDA,
+    SCARA,
+    SEVEN,
+    SIX,
+    THREE,
+    TWO,
+    UR,
+    Run,
+)
 
 turns = partial(layout, how="turns")
 moves = partial(layout, how="points")

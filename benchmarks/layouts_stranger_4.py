@@ -28,7 +28,20 @@ from benchmarks.import_layouts import (
     values,
     wide,
 )  # fmt: skip
-from benchmarks.recorded_arm import FOUR, IIWA, LEG, LIFT, SCARA, SEVEN, SIX, THREE, TWO, UR, Arm, Run
+from benchmarks.recorded_arm import (
+    FOUR,
+    IIWA,
+    LEG,
+    LIFT,
+    SCARA,
+    SEVEN,
+    SIX,
+    THREE,
+    TWO,
+    UR,
+    Arm,
+    Run,
+)
 
 DIGGER = Arm("excavator", ("swing", "boom", "stick", "bucket"), "zyyy", (300, 300, 150, 60))
 TEMPERATURE = ("degC", "C", "°C", "deg C")

@@ -12,8 +12,34 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.import_layouts import DEG, NM, RAD, Answer, Signal, anywhere, layout, recorded, stamps, table, wide
-from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEFT, LEG, PANDA, SEVEN, SIX, THREE, TWO, UR, Arm, Run
+from benchmarks.import_layouts import (
+    DEG,
+    NM,
+    RAD,
+    Answer,
+    Signal,
+    anywhere,
+    layout,
+    recorded,
+    stamps,
+    table,
+    wide,
+)
+from benchmarks.recorded_arm import (
+    FOUR,
+    GEN3,
+    IIWA,
+    LEFT,
+    LEG,
+    PANDA,
+    SEVEN,
+    SIX,
+    THREE,
+    TWO,
+    UR,
+    Arm,
+    Run,
+)
 
 YUMI_ORDER = (1, 2, 7, 3, 4, 5, 6)  # from the base to the flange, as yumi_description names its joints
 YUMI = Arm("yumi", tuple(f"yumi_joint_{j}_l" for j in YUMI_ORDER), "zyzyxyx", (40, 40, 30, 30, 12, 12, 6))

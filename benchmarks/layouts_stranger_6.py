@@ -13,8 +13,34 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.import_layouts import DEG, NM, RAD, RADS, Answer, Signal, anywhere, layout, recorded, table, vector, wide
-from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEG, PANDA, SEVEN, SIX, THREE, TWO, UR, Arm, Run
+from benchmarks.import_layouts import (
+    DEG,
+    NM,
+    RAD,
+    RADS,
+    Answer,
+    Signal,
+    anywhere,
+    layout,
+    recorded,
+    table,
+    vector,
+    wide,
+)
+from benchmarks.recorded_arm import (
+    FOUR,
+    GEN3,
+    IIWA,
+    LEG,
+    PANDA,
+    SEVEN,
+    SIX,
+    THREE,
+    TWO,
+    UR,
+    Arm,
+    Run,
+)
 
 PENDULUM = Arm("pendulum", ("R1",), "y", (20,))
 EPOCH = 1714744931.25  # [s]

@@ -11,7 +11,21 @@ import numpy as np
 import pandas as pd
 from scipy.io import savemat
 
-from benchmarks.import_layouts import DEG, DEGS, NM, RAD, RADS, Answer, Signal, anywhere, layout, recorded, table, values, wide
+from benchmarks.import_layouts import (
+    DEG,
+    DEGS,
+    NM,
+    RAD,
+    RADS,
+    Answer,
+    Signal,
+    anywhere,
+    layout,
+    recorded,
+    table,
+    values,
+    wide,
+)
 from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEG, SEVEN, SIX, THREE, TWO, UR, Arm, Run
 
 NAO = Arm("nao_larm", ("LShoulderPitch", "LShoulderRoll", "LElbowYaw", "LElbowRoll", "LWristYaw"), "yzxzx", (20, 20, 10, 10, 5))

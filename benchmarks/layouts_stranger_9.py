@@ -33,7 +33,22 @@ from benchmarks.import_layouts import (
     table,
     wide,
 )
-from benchmarks.recorded_arm import FOUR, GEN3, IIWA, LEG, PANDA, SCARA, SEVEN, SIX, SO100, THREE, TWO, UR, Arm, Run
+from benchmarks.recorded_arm import (
+    FOUR,
+    GEN3,
+    IIWA,
+    LEG,
+    PANDA,
+    SCARA,
+    SEVEN,
+    SIX,
+    SO100,
+    THREE,
+    TWO,
+    UR,
+    Arm,
+    Run,
+)
 
 FIVE = Arm("livelybot_arm", tuple(f"arm_joint{j}" for j in range(1, 6)), "zyyyx", (30, 30, 20, 10, 6))
 DOG = Arm("solo_leg", ("HAA", "HFE", "KFE"), "xyy", (12, 12, 12))

@@ -33,7 +33,7 @@ import numpy as np
 
 from pipelines.fit.least_squares import fit, solve
 from pipelines.fit.statistics import triangulate
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.equations import RigidEquations
 from pipelines.model.rigid.rrr import RRR
 

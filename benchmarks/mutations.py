@@ -24,9 +24,9 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import RrridError
-from pipelines.log.recording.guess import guess_recipe
-from pipelines.log.recording.recipe import parse_recipe
-from pipelines.log.robot_files import load_robot
+from pipelines.importers.guess import guess_recipe
+from pipelines.importers.recipe import parse_recipe
+from pipelines.io.robot_files import load_robot
 from rrrid_cli.settings import make_settings
 
 __all__ = ["Reading", "mutations", "read_apart", "warm_up"]

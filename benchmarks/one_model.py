@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis.engine import Diagnosis, diagnose
-from pipelines.log.hdf5 import read_parts
+from pipelines.io.hdf5 import read_parts
 
 __all__ = ["answer", "diagnosed"]
 

@@ -18,10 +18,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from pipelines.log import schema
-from pipelines.log.experiment import ExperimentLog, Signal
-from pipelines.log.files import open_log, write_log
-from pipelines.log.hdf5 import read_parts
+from pipelines.io import schema
+from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.files import open_log, write_log
+from pipelines.io.hdf5 import read_parts
 
 ROBOT = Path(__file__).parents[1] / "sample_logs/robots/rrr.toml"
 NAMES = ("q", "tau", "q_ref", "dq_ref", "ddq_ref", "temperature")

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.signal import butter, filtfilt
 
 from pipelines.estimate_bps import Settings, compute
-from pipelines.log.files import open_log
+from pipelines.io.files import open_log
 from pipelines.model.estimation.result import Result
 from pipelines.stage import Inputs
 

@@ -25,9 +25,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot
-from pipelines.log.urdf import import_urdf
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot
+from pipelines.io.urdf import import_urdf
 from pipelines.model.rigid import chain as serial
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.geometry import SerialChain

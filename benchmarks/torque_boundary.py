@@ -27,10 +27,10 @@ import numpy.typing as npt
 from benchmarks.hidden_effects.table import wilson
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.config import BoundaryConfig
-from pipelines.log.doctor.checks_subject import Subject
-from pipelines.log.experiment import ExperimentLog, Signal
-from pipelines.log.robot import Joint, LinkParameters, RobotDescription, format_robot
+from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.robot import Joint, LinkParameters, RobotDescription, format_robot
 from pipelines.model.row_fit import sample_motion
+from pipelines.quality.checks_subject import Subject
 
 __all__ = ["KINDS", "Machine", "case", "draw", "main"]
 

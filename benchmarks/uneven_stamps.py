@@ -20,9 +20,9 @@ import numpy.typing as npt
 
 from benchmarks.hidden_effects.table import wilson
 from pipelines.estimate_bps import Result, Settings, compute
-from pipelines.log.experiment import ExperimentLog, Signal
-from pipelines.log.files import Opened
-from pipelines.log.robot import format_robot
+from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.files import Opened
+from pipelines.io.robot import format_robot
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Inputs

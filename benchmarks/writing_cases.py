@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.bench import experiments
-from pipelines.bench.machine import SAMPLE_TIME, Machine, draw_machine
-from pipelines.bench.reference import Reference
-from pipelines.bench.session import record
-from pipelines.log.experiment import Array, ExperimentLog
+from bench import experiments
+from bench.machine import SAMPLE_TIME, Machine, draw_machine
+from bench.reference import Reference
+from bench.session import record
+from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.in_folder import fitted_in_folder
 from pipelines.model.estimation.outcome import torques

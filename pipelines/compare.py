@@ -19,12 +19,18 @@ from typing import Any
 
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
-from pipelines.log.compared import called, label_of, of_other_commands
-from pipelines.log.result_figures import fitted, numbers_of, residuals, robot_of
-from pipelines.log.result_models import less_findings, modelled
-from pipelines.log.run_results import read_any_result
+from pipelines.io.compared import called, label_of, of_other_commands
+from pipelines.io.result_figures import fitted, numbers_of, residuals, robot_of
+from pipelines.io.result_models import less_findings, modelled
+from pipelines.io.run_results import read_any_result
 from pipelines.model.parameter_names import named_in, quantity_of
-from pipelines.report.comparison_report import Answer, Comparison, Figure, Residual, comparison_report
+from pipelines.report.comparison_report import (
+    Answer,
+    Comparison,
+    Figure,
+    Residual,
+    comparison_report,
+)
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage
 

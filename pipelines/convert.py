@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.canonical import digest_of
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log, write_log
-from pipelines.log.results import NOT_STORED
-from pipelines.log.table import write_csv
+from pipelines.io.canonical import digest_of
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log, write_log
+from pipelines.io.results import NOT_STORED
+from pipelines.io.table import write_csv
 from pipelines.report.report import Report, Section, Table
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 

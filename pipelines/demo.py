@@ -15,9 +15,9 @@ from pathlib import Path
 
 from pipelines.diagnosis.result import Diagnosis, NotIdentifiable
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
-from pipelines.log.results import NOT_STORED
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
+from pipelines.io.results import NOT_STORED
 from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
 from pipelines.report.report import Report, Section, Table

@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import NothingMatched, UsageError
-from pipelines.log.atomic import write_file
-from pipelines.log.files import write_log
-from pipelines.log.model_file import read_model
-from pipelines.log.recording.controller_side import controller_table, write_controller_table
-from pipelines.log.recording.recipe import Recipe
-from pipelines.log.results import json_text, stored_result
-from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
-from pipelines.log.text import read_small_text
+from pipelines.importers.controller_side import controller_table, write_controller_table
+from pipelines.importers.recipe import Recipe
+from pipelines.io.atomic import write_file
+from pipelines.io.files import write_log
+from pipelines.io.model_file import read_model
+from pipelines.io.results import json_text, stored_result
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
+from pipelines.io.text import read_small_text
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.allowed import refuse_strange
 from pipelines.model.excitation.apart import Pair, refuse_hidden, refuse_one
@@ -121,7 +121,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     arm = _arm(settings.model, robot)
     recipe = None
     if settings.recipe is not None:
-        from pipelines.log.recording.recipe import find_recipe, parse_recipe
+        from pipelines.importers.recipe import find_recipe, parse_recipe
 
         path = find_recipe(settings.recipe)
         recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)

@@ -21,7 +21,7 @@ from pipelines.diagnosis.result import Diagnosis, Extended, Result
 from pipelines.diagnosis.words import summary_of
 from pipelines.errors import Check, UsageError
 from pipelines.estimation.checks.gates import examined, logs_of_roles
-from pipelines.log.model_file import read_model
+from pipelines.io.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.named_cause import refuse_unknown

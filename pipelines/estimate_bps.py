@@ -15,22 +15,29 @@ from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.fit.identifiability import hard_to_see, not_separated
-from pipelines.log.canonical import digest_of
-from pipelines.log.covariance_file import read_covariance, write_covariance
-from pipelines.log.derive import derive, recording
-from pipelines.log.doctor.checks import Subject, check_log
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
-from pipelines.log.model_file import Source, read_model, write_model
-from pipelines.log.results import encode
-from pipelines.log.schema import joint_unit
+from pipelines.io.canonical import digest_of
+from pipelines.io.covariance_file import read_covariance, write_covariance
+from pipelines.io.derive import derive, recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
+from pipelines.io.model_file import Source, read_model, write_model
+from pipelines.io.results import encode
+from pipelines.io.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.estimation.balance import power_balance
 from pipelines.model.estimation.checks import consistency
 from pipelines.model.estimation.compare import compare
 from pipelines.model.estimation.floor import averaged, residuals
-from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, fit_logs, judge, with_cutoff
+from pipelines.model.estimation.logs import (
+    Fitted,
+    Judged,
+    Motions,
+    Recipe,
+    fit_logs,
+    judge,
+    with_cutoff,
+)
 from pipelines.model.estimation.negative_viscous import negative_viscous
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.estimation.outcome import Direction, course, parameters, validity
@@ -44,6 +51,7 @@ from pipelines.model.motion import Reconstructed, for_equations, reconstruct
 from pipelines.model.parameter import Uncertainty
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
+from pipelines.quality.checks import Subject, check_log
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug

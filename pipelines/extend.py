@@ -25,11 +25,11 @@ from pipelines.diagnosis.result import Extended, Extension
 from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.estimation.checks.gates import examined, logs_of_roles
-from pipelines.log.canonical import digest_of
-from pipelines.log.derive import derive, recording
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
-from pipelines.log.model_file import Source, read_model, write_model
+from pipelines.io.canonical import digest_of
+from pipelines.io.derive import derive, recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
+from pipelines.io.model_file import Source, read_model, write_model
 from pipelines.model.arm import Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect

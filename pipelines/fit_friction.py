@@ -15,19 +15,26 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
-from pipelines.log.canonical import digest_of
-from pipelines.log.derive import derive, recording
-from pipelines.log.doctor.checks import Subject, check_log
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
-from pipelines.log.model_file import ModelFile, Source, read_model, write_model
-from pipelines.log.results import encode
+from pipelines.io.canonical import digest_of
+from pipelines.io.derive import derive, recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
+from pipelines.io.model_file import ModelFile, Source, read_model, write_model
+from pipelines.io.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.estimation.nominal import fitted_arm
 from pipelines.model.estimation.outcome import validity
 from pipelines.model.friction.findings import log_findings, misfits, nuisance_findings
-from pipelines.model.friction.joint import METHODS, JointFit, JointLogs, Seen, by_method, fit_joint, friction_of
+from pipelines.model.friction.joint import (
+    METHODS,
+    JointFit,
+    JointLogs,
+    Seen,
+    by_method,
+    fit_joint,
+    friction_of,
+)
 from pipelines.model.friction.laws import LADDER, Law, law_named
 from pipelines.model.friction.output_error import refuse_unpolished
 from pipelines.model.friction.result import Result, joint_result, several_results
@@ -37,6 +44,7 @@ from pipelines.model.parameter import Parameter
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
+from pipelines.quality.checks import Subject, check_log
 from pipelines.report.friction_report import friction_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug

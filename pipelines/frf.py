@@ -18,10 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.log.derive import recording
-from pipelines.log.doctor.checks import Subject, check_log
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.model_file import read_model
+from pipelines.io.derive import recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.frf.findings import Findings, frf_findings
 from pipelines.model.frf.grouping import GroupingConfig, advance
@@ -38,6 +37,7 @@ from pipelines.model.frf.result import (
     posture_of,
     undecided,
 )
+from pipelines.quality.checks import Subject, check_log
 from pipelines.report.frf_report import frf_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs

@@ -1,8 +1,8 @@
 """Import recordings: CSV, JSON, MAT and NumPy files become logs, by a recipe.
 
-Reads    a recipe (TOML, `pipelines.log.recording.recipe`) and the recorded files its patterns match
+Reads    a recipe (TOML, `pipelines.importers.recipe`) and the recorded files its patterns match
 Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet for maps without a clock, result.json, report.html
-Source   log-format.md; transmission and torque constants as `pipelines.log.recording.joint_side` says
+Source   log-format.md; transmission and torque constants as `pipelines.importers.joint_side` says
 
 A log whose samples were altered (repaired, unwrapped, resampled) is a derived log. Its attribute `created` is the time of the
 recording where the recipe says it; otherwise 1970-01-01T00:00:00Z, which means "not known": the hour of the import would make
@@ -18,20 +18,20 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import Check, Gathering, InputRejected, UsageError
-from pipelines.log.doctor.checks_subject import many
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.files import regular_file, write_log
-from pipelines.log.recording import filenames
-from pipelines.log.recording.assemble import Map, Material, Source, assemble, collect, parse_map
-from pipelines.log.recording.guess import Draft, guess_recipe
-from pipelines.log.recording.joint_side import Converted, joint_side
-from pipelines.log.recording.make_log import ImportedTable, SourceFile, examine, import_table, make_log
-from pipelines.log.recording.recipe import ResampleSpec
-from pipelines.log.recording.repair import Limits, Recording, late_intervals, repair
-from pipelines.log.results import NOT_STORED
-from pipelines.log.robot import RobotDescription
-from pipelines.log.table import write_table
+from pipelines.importers import filenames
+from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
+from pipelines.importers.guess import Draft, guess_recipe
+from pipelines.importers.joint_side import Converted, joint_side
+from pipelines.importers.make_log import ImportedTable, SourceFile, examine, import_table, make_log
+from pipelines.importers.recipe import ResampleSpec
+from pipelines.importers.repair import Limits, Recording, late_intervals, repair
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.files import regular_file, write_log
+from pipelines.io.results import NOT_STORED
+from pipelines.io.robot import RobotDescription
+from pipelines.io.table import write_table
 from pipelines.model.rigid.choose import rigid_body
+from pipelines.quality.checks_subject import many
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.signal.resample import grid, resample
 from pipelines.stage import Inputs, Request, Stage, slug

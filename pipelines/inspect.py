@@ -16,16 +16,16 @@ from dataclasses import dataclass, replace
 from pipelines.errors import Check, RrridError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
-from pipelines.log.codes import first_to_read, title_of
-from pipelines.log.derive import recording
-from pipelines.log.doctor.checks import NotTested, Subject, check_together, findings
-from pipelines.log.doctor.checks_subject import many
-from pipelines.log.doctor.checks_unit import TRUSTED
-from pipelines.log.doctor.columns_first import columns_first
-from pipelines.log.doctor.summary import LogSummary, summary_of
-from pipelines.log.files import Opened
-from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.io.codes import first_to_read, title_of
+from pipelines.io.derive import recording
+from pipelines.io.files import Opened
+from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.plausibility import plausibility_findings
+from pipelines.quality.checks import NotTested, Subject, check_together, findings
+from pipelines.quality.checks_subject import many
+from pipelines.quality.checks_unit import TRUSTED
+from pipelines.quality.columns_first import columns_first
+from pipelines.quality.summary import LogSummary, summary_of
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import boundary_card, checks_table, level_tone

@@ -20,14 +20,22 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, NothingMatched
-from pipelines.log.derive import derive, recording
-from pipelines.log.doctor.checks import Subject, check_log
-from pipelines.log.experiment import Array
-from pipelines.log.files import Opened, open_log, write_log
-from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.io.derive import derive, recording
+from pipelines.io.experiment import Array
+from pipelines.io.files import Opened, open_log, write_log
+from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.motion_result import LogResult, ObserverResult, Place, alarm, assess, coloured, straying
+from pipelines.model.motion_result import (
+    LogResult,
+    ObserverResult,
+    Place,
+    alarm,
+    assess,
+    coloured,
+    straying,
+)
+from pipelines.quality.checks import Subject, check_log
 from pipelines.report.motion_report import motion_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug

@@ -20,12 +20,12 @@ from typing import Any
 from pipelines.diagnosis.result import Diagnosis
 from pipelines.errors import Check, InputRejected, Level, NothingMatched, UsageError, did_you_mean
 from pipelines.estimation.checks.boundary import Boundary
-from pipelines.log.doctor.columns_first import columns_first
-from pipelines.log.files import expanded
-from pipelines.log.mixed import of_one_session
-from pipelines.log.places import renamed, short_names, tilde
-from pipelines.log.results import decode, encode
-from pipelines.log.robot import format_robot
+from pipelines.io.files import expanded
+from pipelines.io.mixed import of_one_session
+from pipelines.io.places import renamed, short_names, tilde
+from pipelines.io.results import decode, encode
+from pipelines.io.robot import format_robot
+from pipelines.quality.columns_first import columns_first
 from pipelines.recall.chain import Chain
 from pipelines.recall.key import Key, digest_of_json
 from pipelines.recall.pictures import Pictures, pictures_of, with_pictures, write_drawing

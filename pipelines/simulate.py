@@ -16,15 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.log.derive import recording
-from pipelines.log.doctor.checks import Subject, check_log
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.files import Opened, write_log
-from pipelines.log.model_file import read_model
-from pipelines.log.results import encode
+from pipelines.io.derive import recording
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.files import Opened, write_log
+from pipelines.io.model_file import read_model
+from pipelines.io.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.named_cause import acting_cause
 from pipelines.model.simulation.imitate import How, Imitation, imitate
+from pipelines.quality.checks import Subject, check_log
 from pipelines.report.report import Report
 from pipelines.report.simulation_report import simulation_report
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug

@@ -22,13 +22,13 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, RrridError, clean
-from pipelines.log.atomic import environment_faults, remove_folder, staging_place, write_file
-from pipelines.log.earlier import Coming, put_in_place
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import PROVENANCE, expanded, hash_file
-from pipelines.log.inputs import Inputs, Rejected, Request, read_by_role, read_logs
-from pipelines.log.mixed import check_alike, of_one_session, refuse_mixed
-from pipelines.log.places import (
+from pipelines.io.atomic import environment_faults, remove_folder, staging_place, write_file
+from pipelines.io.earlier import Coming, put_in_place
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import PROVENANCE, expanded, hash_file
+from pipelines.io.inputs import Inputs, Rejected, Request, read_by_role, read_logs
+from pipelines.io.mixed import check_alike, of_one_session, refuse_mixed
+from pipelines.io.places import (
     given_names,
     keep_apart,
     refuse_foreign,
@@ -39,8 +39,8 @@ from pipelines.log.places import (
     tilde,
     told_apart,
 )
-from pipelines.log.results import encode, headed, json_text, write_series
-from pipelines.log.robot_files import robot_sources
+from pipelines.io.results import encode, headed, json_text, write_series
+from pipelines.io.robot_files import robot_sources
 from pipelines.report.report import Report
 
 __all__ = ["Beside", "Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "footer_of", "read_by_role",

@@ -13,16 +13,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.errors import NothingMatched, UsageError
-from pipelines.log.canonical import digest_of
-from pipelines.log.derive import derive, recording
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
-from pipelines.log.model_file import ModelFile, read_model
-from pipelines.log.recording.controller_side import controller_table, write_controller_table
-from pipelines.log.recording.recipe import Recipe
-from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot, robot_at_hand, robot_sources
-from pipelines.log.text import read_small_text
+from pipelines.importers.controller_side import controller_table, write_controller_table
+from pipelines.importers.recipe import Recipe
+from pipelines.io.canonical import digest_of
+from pipelines.io.derive import derive, recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
+from pipelines.io.model_file import ModelFile, read_model
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
+from pipelines.io.text import read_small_text
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.in_folder import fitted_in_folder
 from pipelines.model.motion import Reconstructed, Reconstruction
@@ -108,7 +108,7 @@ def read(request: Request, settings: Settings) -> Inputs:
         robot, known = _robot(request, inputs)
         sources += known
         if settings.recipe is not None:
-            from pipelines.log.recording.recipe import find_recipe, parse_recipe
+            from pipelines.importers.recipe import find_recipe, parse_recipe
 
             path = find_recipe(settings.recipe)
             recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)

@@ -71,7 +71,7 @@ def batch(
 
 def _jobs(jobs: int | None) -> int:
     if jobs is None:
-        from pipelines.log.processors import processors
+        from pipelines.io.processors import processors
 
         return processors()
     if not 1 <= jobs <= 4096:

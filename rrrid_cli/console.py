@@ -98,7 +98,7 @@ def _write(text: str) -> None:
 def say_outcome(outcome: Outcome[Any], *, as_json: bool, quiet: bool, verbose: bool) -> None:
     """The verdict, the key figures, what is not in order, and the folder; where `as_json` leaves room."""
     if as_json:
-        from pipelines.log.results import json_text
+        from pipelines.io.results import json_text
 
         sys.stdout.write(json_text(outcome.json))
     if quiet:
@@ -174,7 +174,7 @@ def say_checks(checks: Iterable[Check], verbose: bool = False, stream: Any = Non
 
     Before all of it where an earlier result lies now: no report has that.
     """
-    from pipelines.log.codes import first_to_read
+    from pipelines.io.codes import first_to_read
 
     alike: dict[tuple[str, str], list[Check]] = {}
     for check in sorted(dict.fromkeys(checks), key=lambda check: (check.code != "RRID-C05", *first_to_read(check))):
@@ -211,7 +211,7 @@ def say_error(problem: RrridError) -> None:
 
 def say_error_object(problem: RrridError) -> None:
     """Print the error as a JSON object on standard output."""
-    from pipelines.log.results import json_text
+    from pipelines.io.results import json_text
 
     others = {"others": [other.as_dict() for other in problem.others]} if problem.others else {}
     sys.stdout.write(json_text({"error": problem.as_dict(), "exit": problem.exit_code, **others}))

@@ -16,7 +16,7 @@ import typer
 
 from pipelines.batch.process import economise
 from pipelines.errors import EnvironmentFault, Interrupted, RrridError
-from pipelines.log.atomic import fault_of
+from pipelines.io.atomic import fault_of
 from rrrid_cli.commands import app
 from rrrid_cli.console import say_error, say_error_object
 from rrrid_cli.streams import prepare_streams

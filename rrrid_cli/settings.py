@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from pipelines.errors import UsageError, clean, did_you_mean
-from pipelines.log.text import read_small_text
-from pipelines.log.toml_text import TomlError, parse_toml
+from pipelines.io.text import read_small_text
+from pipelines.io.toml_text import TomlError, parse_toml
 
 __all__ = ["known_options", "make_settings", "stage_of"]
 

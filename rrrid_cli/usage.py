@@ -44,7 +44,7 @@ def as_given(problem: RrridError, words: Iterable[str]) -> RrridError:
 
     Stages work with absolute paths, so that no other working folder changes what they mean.
     """
-    from pipelines.log.places import renamed
+    from pipelines.io.places import renamed
 
     try:
         os.getcwd()

@@ -12,16 +12,16 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
-from pipelines.bench.experiments import Experiment
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults.base_resonance import BaseResonance
-from pipelines.bench.friction import ThreeSigmoid as TrueFriction
-from pipelines.bench.machine import Machine, draw_machine, with_links
-from pipelines.bench.reference import Reference
-from pipelines.bench.session import record
-from pipelines.bench.solid import Solid
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.robot import RobotDescription
+from bench.experiments import Experiment
+from bench.fault import Fault
+from bench.faults.base_resonance import BaseResonance
+from bench.friction import ThreeSigmoid as TrueFriction
+from bench.machine import Machine, draw_machine, with_links
+from bench.reference import Reference
+from bench.session import record
+from bench.solid import Solid
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 from sample_logs.controller_model import ControllerModel, controller_model

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipelines.log.model_file import model_text
+from pipelines.io.model_file import model_text
 from pipelines.model.arm import Arm
 from pipelines.model.online import OnlineModel, OnlineTorque
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import datetime
 
-from pipelines.bench import experiments
-from pipelines.bench.experiments import FEEDFORWARD, Experiment
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults.cogging import Cogging
-from pipelines.bench.machine import Machine
-from pipelines.log.experiment import ExperimentLog
+from bench import experiments
+from bench.experiments import FEEDFORWARD, Experiment
+from bench.fault import Fault
+from bench.faults.cogging import Cogging
+from bench.machine import Machine
+from pipelines.io.experiment import ExperimentLog
 from sample_logs.bench_session import controllers_model, machine, recorded
 from sample_logs.make_healthy import WRITING_STIFFNESS, text
 

@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.log import schema
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 from sample_logs.make_model import synthetic_arm

@@ -7,11 +7,11 @@ from datetime import datetime
 
 import numpy as np
 
-from pipelines.bench import experiments
-from pipelines.bench.experiments import Experiment
-from pipelines.bench.machine import SAMPLE_TIME, Machine
-from pipelines.bench.reference import Reference
-from pipelines.log.experiment import ExperimentLog
+from bench import experiments
+from bench.experiments import Experiment
+from bench.machine import SAMPLE_TIME, Machine
+from bench.reference import Reference
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.writing.reference import writing_task
 from sample_logs.bench_session import controllers_model, machine, recorded
 

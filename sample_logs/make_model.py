@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from pipelines.log.model_file import Validity, model_text
-from pipelines.log.robot_files import load_robot
+from pipelines.io.model_file import Validity, model_text
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 

@@ -12,11 +12,11 @@ import sys
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 
-from pipelines.bench.machine import SAMPLE_TIME
-from pipelines.bench.plan import plan_of
-from pipelines.bench.spec import build
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
+from bench.machine import SAMPLE_TIME
+from bench.plan import plan_of
+from bench.spec import build
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
 from sample_logs.bench_session import machine
 from sample_logs.make_changed import changed_logs
 from sample_logs.make_closed_form import closed_form_logs

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.log.log_reader import end_reader
+from pipelines.io.log_reader import end_reader
 
 _REPO = Path(__file__).resolve().parents[1]
 
@@ -37,7 +37,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(autouse=True)
 def _fresh_reader(request: pytest.FixtureRequest) -> Iterator[None]:
     """A test that changes this process begins as a program does, and leaves no child that has its changes: one costs 30 ms."""
-    changes = "monkeypatch" in request.fixturenames or request.path.parent.name in ("log", "rows", "mutation")
+    folder = request.path.parent.name
+    changes = "monkeypatch" in request.fixturenames or folder in ("io", "importers", "quality", "rows", "mutation")
     if changes:
         end_reader()
     yield

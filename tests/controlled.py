@@ -6,13 +6,13 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipelines.bench.controllers import Decentralised
-from pipelines.bench.machine import paper_machine
-from pipelines.bench.plant import run
-from pipelines.bench.reference import Reference
-from pipelines.log import schema
-from pipelines.log.experiment import ExperimentLog, Signal
-from pipelines.log.robot import format_robot
+from bench.controllers import Decentralised
+from bench.machine import paper_machine
+from bench.plant import run
+from bench.reference import Reference
+from pipelines.io import schema
+from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.robot import format_robot
 from tests.model.simulation.arms import waving
 
 __all__ = ["TORQUE_NOISE", "controlled_log"]

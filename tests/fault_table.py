@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from tests.faulty import (
     clipped,
     drifting,
@@ -24,7 +24,16 @@ from tests.faulty import (
     turning,
     wrapped,
 )
-from tests.healthy import changed, fourier, good_log, make_log, one_joint, rows, with_extra, with_signal
+from tests.healthy import (
+    changed,
+    fourier,
+    good_log,
+    make_log,
+    one_joint,
+    rows,
+    with_extra,
+    with_signal,
+)
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipelines.log import schema
-from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
-from pipelines.log.robot import RobotDescription, format_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.robot import RobotDescription, format_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.choose import rigid_body
 
 TS = 1e-3  # [s]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.log.recording.good import RECIPE, good, lines, text, write
+from tests.importers.good import RECIPE, good, lines, text, write
 
 ANY = RECIPE.replace('"*.csv"', '["*.csv", "*.mat"]') + "[missing]\nvalues = [-999]\n"
 

@@ -13,9 +13,9 @@ import pytest
 
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, RrridError, UsageError
 from pipelines.import_log import STAGE, Result, Settings, compute
-from pipelines.log.files import open_log
+from pipelines.io.files import open_log
 from pipelines.stage import Request, run_stage
-from tests.log.recording.good import RECIPE, codes, good, lines, run, strict_checker, text, write
+from tests.importers.good import RECIPE, codes, good, lines, run, strict_checker, text, write
 from tests.repairs import REPAIRS, Repair, clock_set_back, lossy, rows_changed, split_files, spoiled
 
 
@@ -216,7 +216,7 @@ def test_f14_a_file_that_changes_meanwhile(folder: Path, monkeypatch: pytest.Mon
             file.write("1\n")
         return compute(inputs, settings)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("tests.log.recording.good.STAGE", dataclasses.replace(STAGE, compute=meddle))
+    monkeypatch.setattr("tests.importers.good.STAGE", dataclasses.replace(STAGE, compute=meddle))
     with pytest.raises(InputRejected, match="RRID-F14"):
         run(folder)
 

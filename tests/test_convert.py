@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from pipelines import convert
-from pipelines.log.files import open_log, write_log
-from pipelines.log.table import csv_cell
+from pipelines.io.files import open_log, write_log
+from pipelines.io.table import csv_cell
 from pipelines.stage import Request, run_stage
-from tests.log.logs import random_log, small_log
+from tests.io.logs import random_log, small_log
 
 
 def _convert(path: Path, out: Path, to: str = "") -> Path:

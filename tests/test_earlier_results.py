@@ -12,11 +12,11 @@ import pytest
 
 from pipelines import convert, inspect
 from pipelines.errors import UsageError
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Outcome, Request, Stage, read_logs, run_stage
 from tests.cli.commands import rrrid
-from tests.log.logs import ROBOT_TEXT, small_log
+from tests.io.logs import ROBOT_TEXT, small_log
 
 
 @pytest.fixture

@@ -18,10 +18,10 @@ from matplotlib.collections import Collection
 from matplotlib.figure import Figure as Drawing
 
 from pipelines.errors import Check
-from pipelines.log.files import PROVENANCE, open_log, write_log
-from pipelines.log.result_schema import result_schema
-from pipelines.log.results import decode, encode, read_series
-from pipelines.log.table import write_csv
+from pipelines.io.files import PROVENANCE, open_log, write_log
+from pipelines.io.result_schema import result_schema
+from pipelines.io.results import decode, encode, read_series
+from pipelines.io.table import write_csv
 from pipelines.recall.key import digest_of_json
 from pipelines.report import render
 from pipelines.report.report import Figure
@@ -31,8 +31,8 @@ from rrrid_cli.commands import STAGES
 from tests.controlled import controlled_log
 from tests.diagnose.sessions import but, session, written
 from tests.healthy import begun
-from tests.log.recording.good import RECIPE, good, text, write
-from tests.log.recording.good import run as run_import
+from tests.importers.good import RECIPE, good, text, write
+from tests.importers.good import run as run_import
 from tests.repairs import REPAIRS, Repair
 from tests.test_compare import written as written_result
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.files import open_log
+from pipelines.io.files import open_log
 from tests.cli.commands import rrrid
 
 SLIDING = {'unit = "rad"': 'unit = ["rad", "rad", "m", "rad"]', 'unit = "N m"': 'unit = ["N m", "N m", "N", "N m"]'}

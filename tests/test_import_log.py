@@ -12,10 +12,10 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import STAGE, Result, Settings, report
-from pipelines.log.files import open_log
-from pipelines.log.results import decode
+from pipelines.io.files import open_log
+from pipelines.io.results import decode
 from pipelines.stage import Request, run_stage
-from tests.log.recording.good import RECIPE, good, run, strict_checker, text, write
+from tests.importers.good import RECIPE, good, run, strict_checker, text, write
 from tests.repairs import split_files
 
 

@@ -10,9 +10,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.import_log import STAGE, Result, Settings
-from pipelines.log.files import open_log
+from pipelines.io.files import open_log
 from pipelines.stage import Outcome, Request, run_stage
-from tests.log.recording.good import codes, strict_checker
+from tests.importers.good import codes, strict_checker
 
 
 @pytest.fixture(scope="module")

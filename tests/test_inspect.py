@@ -12,9 +12,9 @@ import pytest
 
 from pipelines import import_log, inspect, reconstruct
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import find_logs, open_log, write_log
-from pipelines.log.results import decode, read_series
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import find_logs, open_log, write_log
+from pipelines.io.results import decode, read_series
 from pipelines.stage import Outcome, Request, run_stage
 from tests.fault_table import FAULTS
 from tests.faulty import faster, good_path
@@ -122,7 +122,7 @@ def test_the_report_of_a_broken_log_is_drawn(row: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("every", [12, pytest.param(1, marks=pytest.mark.slow)])
 def test_every_fault_has_a_report(every: int) -> None:
     """Words and tables for each; nothing is drawn here."""
-    from pipelines.log.files import Opened
+    from pipelines.io.files import Opened
     from pipelines.stage import Inputs
 
     for fault in FAULTS[::every]:
@@ -210,7 +210,7 @@ def test_a_folder_is_judged_as_a_whole(tmp_path: Path) -> None:
 
 def test_signals_of_the_preview_cover_the_log() -> None:
     """Envelopes keep the extremes: no peak is lost in 400 points."""
-    from pipelines.log.doctor.checks import Subject
+    from pipelines.quality.checks import Subject
     from pipelines.report.log_preview import log_preview
 
     log = good_log()
@@ -222,7 +222,7 @@ def test_signals_of_the_preview_cover_the_log() -> None:
 
 def test_a_preview_is_broken_at_every_gap() -> None:
     """A hole of 30 samples, less than a bucket: no bucket holds both its sides, and a blank stands between them."""
-    from pipelines.log.doctor.checks import Subject
+    from pipelines.quality.checks import Subject
     from pipelines.report.log_preview import log_preview
 
     log = make_log(lambda t: (np.outer(t, np.ones(3)), np.ones((t.size, 3)), np.zeros((t.size, 3))), duration=20.0)

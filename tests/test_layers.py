@@ -13,37 +13,48 @@ REPO = Path(__file__).resolve().parents[1]
 # The layers from the bottom up (design.md). The longest prefix that fits decides.
 LAYERS = {
     "pipelines.errors": 0,
-    "pipelines.log": 1,
-    "pipelines.fit": 2, "pipelines.signal": 2,
-    "pipelines.model.parameter": 2,
-    "pipelines.model.rigid": 3,
-    "pipelines.model.effects": 4,
-    "pipelines.model": 5,
-    "pipelines.model.rows": 6,
-    "pipelines.estimation": 7,  # what is checked before any model is fitted
-    "pipelines.model.estimation.result": 8, "pipelines.diagnosis": 9,
-    "pipelines.report": 10,
-    "pipelines.stage": 11,
-    "pipelines.recall": 12,  # what a run may take back of its stages
-    "pipelines": 13,
-    "pipelines.stored": 14,
-    "pipelines.installation": 14,
-    "pipelines.batch": 14,  # calls stages, and nothing but the command line calls it
-    "rrrid_cli": 15,
+    "pipelines.io": 1,
+    "pipelines.quality": 2,
+    "pipelines.importers": 3,
+    "pipelines.fit": 4, "pipelines.signal": 4,
+    "pipelines.model.parameter": 4,
+    "pipelines.model.rigid": 5,
+    "pipelines.model.effects": 6,
+    "pipelines.model": 7,
+    "pipelines.model.rows": 8,
+    "pipelines.estimation": 9,  # what is checked before any model is fitted
+    "pipelines.model.estimation.result": 10, "pipelines.diagnosis": 11,
+    "pipelines.report": 12,
+    "pipelines.stage": 13,
+    "pipelines.recall": 14,  # what a run may take back of its stages
+    "pipelines": 15,
+    "pipelines.stored": 16,
+    "pipelines.installation": 16,
+    "pipelines.batch": 16,  # calls stages, and nothing but the command line calls it
+    "rrrid_cli": 17,
 }
 CALL_STAGES = {"pipelines.run"}
 # Of the effects, all that one of them may import.
 CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".fast", ".kinds", ".placed", ".terms")}
-DOORS = {
-    "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": "pipelines.log",
-    "pandas": "pipelines.log", "pyarrow": "pipelines.log", "filterpy": "pipelines.signal.kalman", "mujoco": "pipelines.bench",
-    "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody", "pydantic": "pipelines.log", "pydantic_core": "pipelines.log",
-    "tomllib": "pipelines.log.toml_text",
+FILES = ("pipelines.io", "pipelines.importers")
+DOORS: dict[str, str | tuple[str, ...]] = {
+    "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": FILES,
+    "pandas": FILES, "pyarrow": FILES, "filterpy": "pipelines.signal.kalman", "mujoco": "bench",
+    "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody", "pydantic": FILES, "pydantic_core": FILES,
+    "tomllib": "pipelines.io.toml_text",
     "rich": "rrrid_cli", "pebble": "pipelines.batch", "dask": "pipelines.batch", "distributed": "pipelines.batch",
 }
 NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy alone
+# Not yet opened; the list only shrinks.
+CIRCLES = {
+    ("bench.fault", "bench.faults.cogging", "bench.machine", "bench.nuisances", "bench.nuisances.coloured_noise",
+     "bench.nuisances.gain_ripple"),
+    ("pipelines.installation.examine", "pipelines.installation.self_test"),
+    ("pipelines.signal.observer", "pipelines.signal.segments", "pipelines.signal.tuning"),
+    ("rrrid_cli.batch", "rrrid_cli.commands", "rrrid_cli.commands.workflow"),
+}
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.
-BY_NAME = {"pipelines.run", "pipelines.stored.redraw", "pipelines.batch.plan", "pipelines.model.effects", "pipelines.bench.faults",
+BY_NAME = {"pipelines.run", "pipelines.stored.redraw", "pipelines.batch.plan", "pipelines.model.effects", "bench.faults",
            "rrrid_cli.settings", "rrrid_cli.commands"}
 HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
 
@@ -53,7 +64,7 @@ def _name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-MODULES = {_name(path): path for folder in ("pipelines", "rrrid_cli") for path in sorted((REPO / folder).rglob("*.py"))}
+MODULES = {_name(path): path for folder in ("pipelines", "rrrid_cli", "bench") for path in sorted((REPO / folder).rglob("*.py"))}
 
 
 def _named(call: ast.Call) -> str | None:
@@ -95,15 +106,15 @@ def _breaches(module: str, imported: set[str]) -> list[str]:
     """What of `imported` the module may not import."""
     wrong = []
     for name in imported & set(MODULES):
-        if module.startswith("pipelines.bench"):
-            allowed = (name.startswith(("pipelines.bench", "pipelines.log", "pipelines.errors"))
-                       and not (module.startswith("pipelines.bench.faults.") and name.startswith("pipelines.bench.faults")))
-        elif name.startswith("pipelines.bench"):
+        if f"{module}.".startswith("bench."):
+            allowed = (name.startswith(("bench", "pipelines.io", "pipelines.errors"))
+                       and not (module.startswith("bench.faults.") and name.startswith("bench.faults")))
+        elif name.startswith("bench"):
             allowed = False
         elif module.startswith("pipelines.model.effects."):
-            allowed = _layer(name) < 4 or name in CONTRACT
-        elif _layer(module) == 13:
-            allowed = _layer(name) < 13 or module in CALL_STAGES
+            allowed = _layer(name) < LAYERS["pipelines.model.effects"] or name in CONTRACT
+        elif _layer(module) == LAYERS["pipelines"]:
+            allowed = _layer(name) < LAYERS["pipelines"] or module in CALL_STAGES
         else:
             allowed = _layer(name) < _layer(module) or _toolbox(name) == _toolbox(module)
         wrong += [] if allowed or name == module else [f"{module} imports {name}"]
@@ -117,22 +128,42 @@ def test_a_line_imports_only_lines_below() -> None:
 
 def test_the_rule_can_be_broken() -> None:
     """Each kind of breach is seen: upwards, sideways between stages, between effects, out of the bench."""
-    for module, imported in (("pipelines.log.files", "pipelines.model.rigid.body"), ("pipelines.convert", "pipelines.inspect"),
+    for module, imported in (("pipelines.io.files", "pipelines.model.rigid.body"), ("pipelines.convert", "pipelines.inspect"),
                              ("pipelines.model.effects.coulomb", "pipelines.model.effects.viscous"),
-                             ("pipelines.signal", "pipelines.fit"), ("pipelines.bench.plant", "pipelines.model.arm"),
-                             ("pipelines.bench.faults.payload", "pipelines.bench.faults.cogging"),
-                             ("pipelines.run", "pipelines.bench"),
+                             ("pipelines.signal", "pipelines.fit"), ("bench.plant", "pipelines.model.arm"),
+                             ("bench.faults.payload", "bench.faults.cogging"),
+                             ("pipelines.run", "bench"),
                              ("pipelines.report.render", "pipelines.stage")):
         assert imported in MODULES
         assert _breaches(module, {imported}) == [f"{module} imports {imported}"]
 
 
+def _circles() -> set[tuple[str, ...]]:
+    """The groups of modules that import each other, directly or through others."""
+    graph = {module: sorted(_imports(path) & set(MODULES) - {module}) for module, path in MODULES.items()}
+    reach = {module: {module} for module in graph}
+    for module in graph:
+        waiting = [module]
+        while waiting:
+            new = set(graph[waiting.pop()]) - reach[module]
+            reach[module] |= new
+            waiting += new
+    groups = {tuple(sorted(name for name in reach[module] if module in reach[name])) for module in graph}
+    return {group for group in groups if len(group) > 1}
+
+
+def test_no_import_runs_in_a_circle() -> None:
+    """A module can be read, and taken out, with what lies below it alone."""
+    assert _circles() == CIRCLES
+
+
 def test_each_library_has_one_door() -> None:
-    """matplotlib only in the report, h5py, pandas and pydantic only in the log, typer and rich only in the command line, pickle
+    """matplotlib only in the report, h5py and pandas only where files are read, typer and rich only in the command line, pickle
     nowhere, scipy not among the equations."""
     for module, name in ((module, name) for module, path in MODULES.items() for name in _imports(path)):
-        door = DOORS.get(name.split(".")[0])
-        assert door is None or f"{module}.".startswith(f"{door}."), f"{module} imports {name}, whose door is {door}"
+        door = DOORS.get(name.split(".")[0], f"{module}")
+        doors = (door,) if isinstance(door, str) else door
+        assert any(f"{module}.".startswith(f"{d}.") for d in doors), f"{module} imports {name}, whose door is {door}"
         closed = NOT_IN.get(name.split(".")[0])
         assert closed is None or not f"{module}.".startswith(f"{closed}."), f"{module} imports {name}"
         assert name != "?" or module in BY_NAME, f"{module} puts the name of a module together"
@@ -144,10 +175,10 @@ def test_the_bench_works_without_the_model() -> None:
 import sys
 for name in ("model", "fit", "signal", "report", "stage"):
     sys.modules[f"pipelines.{name}"] = None
-from pipelines.bench.experiments import excitation
-from pipelines.bench.faults import fault_names, find_fault, make
-from pipelines.bench.machine import draw_machine
-from pipelines.bench.session import record
+from bench.experiments import excitation
+from bench.faults import fault_names, find_fault, make
+from bench.machine import draw_machine
+from bench.session import record
 machine = draw_machine(1)
 for name in fault_names():
     find_fault(name)
@@ -167,7 +198,7 @@ def test_imports_by_name_are_seen(tmp_path: Path) -> None:
 
 def test_importing_everything_imports_nothing_heavy() -> None:
     """Heavy libraries load inside the function that needs them, and importing a module prints and writes nothing."""
-    names = [module for module in MODULES if not module.startswith("pipelines.bench")]
+    names = [module for module in MODULES if not module.startswith("bench")]
     code = f"import sys\nfor m in {names}: __import__(m)\nprint(sorted(set({HEAVY}) & set(sys.modules)))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=REPO, check=False)
     assert (done.stdout, done.stderr) == ("[]\n", "")

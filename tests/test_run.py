@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps, fit_friction, run, validate_writing
-from pipelines.log.experiment import Signal
-from pipelines.log.files import open_log, write_log
-from pipelines.log.sessions import apart
+from pipelines.io.experiment import Signal
+from pipelines.io.files import open_log, write_log
+from pipelines.io.sessions import apart
 from pipelines.report.run_report import stage_lines
 from pipelines.report.sections import CARD
 from pipelines.stage import Outcome, Request, read_logs, run_stage

@@ -11,14 +11,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.bench.experiments import WRITING_CASES
-from pipelines.log.canonical import digest_of
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log
+from bench.experiments import WRITING_CASES
+from pipelines.io.canonical import digest_of
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_changed import changed_logs
-from sample_logs.make_closed_form import NOISE, SAMPLE_TIME, Fourier, averaged_torque, closed_form_logs, torque_step
+from sample_logs.make_closed_form import (
+    NOISE,
+    SAMPLE_TIME,
+    Fourier,
+    averaged_torque,
+    closed_form_logs,
+    torque_step,
+)
 from sample_logs.make_healthy import healthy_logs
 from sample_logs.make_model import synthetic_arm
 from sample_logs.make_samples import FOLDERS, rounds_alike

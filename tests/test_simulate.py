@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, RrridError, UsageError
-from pipelines.log.canonical import digest_of
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log, write_log
-from pipelines.log.model_file import model_text, read_model
+from pipelines.io.canonical import digest_of
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log, write_log
+from pipelines.io.model_file import model_text, read_model
 from pipelines.model.named_cause import acting_cause
 from pipelines.simulate import STAGE, Settings
 from pipelines.stage import Outcome, Request, run_stage

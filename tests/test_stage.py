@@ -17,10 +17,10 @@ import pytest
 
 from pipelines import convert, inspect, run
 from pipelines.errors import Check, InputRejected, RrridError, UsageError
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, run_stage, tilde
-from tests.log.logs import ROBOT_TEXT, small_log
+from tests.io.logs import ROBOT_TEXT, small_log
 
 
 @pytest.fixture
@@ -160,7 +160,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
     def work(inputs: Inputs, settings: _Nothing) -> _Nothing:
         raise AssertionError("it was begun")
 
-    monkeypatch.setattr("pipelines.log.places.os.access", lambda path, mode: allowed)
+    monkeypatch.setattr("pipelines.io.places.os.access", lambda path, mode: allowed)
     with pytest.raises(RrridError, match=code):
         run_stage(_stage(work), Request((logs / "a.h5",), out=logs.parent / out), _Nothing())
 
@@ -208,7 +208,7 @@ def test_an_earlier_output_does_not_go_aside_for_one_that_cannot_come(logs: Path
             raise OSError(errno.EIO, "the disk fails")
         move(source, target)
 
-    monkeypatch.setattr("pipelines.log.atomic.os.replace", fail)
+    monkeypatch.setattr("pipelines.io.atomic.os.replace", fail)
     sparing = _stage(lambda inputs, settings: _Nothing(), spare=lambda result, folder: ("cogging:2",))
     with pytest.raises(RrridError, match="RRID-P02"):
         run_stage(sparing, Request((logs,)), _Nothing())

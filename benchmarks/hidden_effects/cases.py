@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from bench.faults import fault_names, find_fault
 from benchmarks.hidden_effects.robots import ROBOTS
-from pipelines.bench.faults import fault_names, find_fault
 
 __all__ = ["COMPLIANT", "EASY", "FAMILIES", "OUTSIDE", "STRENGTHS", "Hidden", "SealedCase", "campaign", "in_part"]
 

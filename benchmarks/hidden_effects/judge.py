@@ -22,7 +22,7 @@ from benchmarks.hidden_effects.make import Sealed, answers_in
 from benchmarks.hidden_effects.score import Score, score
 from benchmarks.hidden_effects.verdict import Said, read_verdict
 from pipelines.errors import RrridError
-from pipelines.log.results import encode
+from pipelines.io.results import encode
 from pipelines.stage import Request, run_stage
 
 __all__ = ["Diagnose", "asked", "by_command", "by_compute", "engine_named", "judge", "scores_in", "tasks"]

@@ -15,12 +15,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from bench.session import answer
 from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.sessions import Session, record_case
-from pipelines.bench.session import answer
 from pipelines.errors import UsageError
-from pipelines.log.atomic import write_file
-from pipelines.log.files import write_log
+from pipelines.io.atomic import write_file
+from pipelines.io.files import write_log
 
 __all__ = ["Sealed", "answers_in", "make_case", "make_cases", "seal"]
 

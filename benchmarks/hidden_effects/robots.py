@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from pipelines.log.robot import Joint, RobotDescription
+from pipelines.io.robot import Joint, RobotDescription
 
 __all__ = ["ROBOTS"]
 

@@ -19,18 +19,18 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from bench import experiments
+from bench.controllers import Decentralised, FeedForward
+from bench.experiments import Experiment
+from bench.fault import Fault
+from bench.faults import make
+from bench.machine import Machine, draw_machine, machine_of, with_links
+from bench.session import peak_torque
+from bench.solid import Solid
 from benchmarks.hidden_effects.cases import Hidden, SealedCase
 from benchmarks.hidden_effects.robots import ROBOTS
-from pipelines.bench import experiments
-from pipelines.bench.controllers import Decentralised, FeedForward
-from pipelines.bench.experiments import Experiment
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults import make
-from pipelines.bench.machine import Machine, draw_machine, machine_of, with_links
-from pipelines.bench.session import peak_torque
-from pipelines.bench.solid import Solid
 from pipelines.errors import UsageError
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous

@@ -21,7 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 
 try:
     from benchmarks.hidden_effects.judge import asked

@@ -14,8 +14,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from pipelines.log.experiment import Array
-from pipelines.log.robot import Drive, Joint, RobotDescription
+from pipelines.io.experiment import Array
+from pipelines.io.robot import Drive, Joint, RobotDescription
 
 __all__ = ["ARMS", "Arm", "Axis"]
 

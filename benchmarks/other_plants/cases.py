@@ -17,9 +17,9 @@ from benchmarks.other_plants.faults import Fault
 from benchmarks.other_plants.friction import Friction
 from benchmarks.other_plants.loops import Loop, motion
 from benchmarks.other_plants.plant import Plant
-from pipelines.log import schema
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.robot import format_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.robot import format_robot
 
 __all__ = ["BEFORE", "CASES", "DELAY", "FIVE", "FOUR", "SLOW", "THREE", "Case"]
 

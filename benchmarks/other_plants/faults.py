@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.other_plants.friction import Friction
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
 
 __all__ = ["Acting", "Fault", "Now", "Several"]
 

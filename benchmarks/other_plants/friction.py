@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
 
 __all__ = ["Friction"]
 

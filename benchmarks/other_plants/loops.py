@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from benchmarks.other_plants.arms import Arm
-from pipelines.log.experiment import Array, Controller
+from pipelines.io.experiment import Array, Controller
 
 __all__ = ["Loop", "motion"]
 

@@ -18,7 +18,7 @@ from benchmarks.other_plants.arms import Arm
 from benchmarks.other_plants.faults import Fault, Now, Several
 from benchmarks.other_plants.friction import Friction
 from benchmarks.other_plants.loops import Loop
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
 
 __all__ = ["Plant"]
 

@@ -18,8 +18,8 @@ from pipelines.batch.parts import Part, place_of
 from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.fit.differences import difference
-from pipelines.log.model_file import ModelFile, StoredEffect, StoredValue
-from pipelines.log.result_figures import name_in
+from pipelines.io.model_file import ModelFile, StoredEffect, StoredValue
+from pipelines.io.result_figures import name_in
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.parameter_names import quantity_of

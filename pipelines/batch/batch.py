@@ -30,9 +30,9 @@ from pipelines.batch.signals import Listener
 from pipelines.batch.summary import Summary, summary_report
 from pipelines.batch.work import undone
 from pipelines.errors import Check, EnvironmentFault, NothingMatched, UsageError
-from pipelines.log.model_file import ModelFile, read_model
-from pipelines.log.places import keep_apart, slug, tilde
-from pipelines.log.results import encode, headed
+from pipelines.io.model_file import ModelFile, read_model
+from pipelines.io.places import keep_apart, slug, tilde
+from pipelines.io.results import encode, headed
 from pipelines.stage import Outcome
 
 __all__ = ["Wanted", "run_batch"]

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from pipelines.batch.parts import Part
 from pipelines.batch.record import Record
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
 from pipelines.model.parameter_names import quantity_of
 
 __all__ = ["LIMIT", "Course", "Drift", "drift_of", "from_others"]

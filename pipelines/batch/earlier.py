@@ -11,10 +11,10 @@ from pipelines.batch.folder import BatchFolder
 from pipelines.batch.items import Item
 from pipelines.batch.lock import LOCK, locked
 from pipelines.errors import Check, RrridError, clean
-from pipelines.log.atomic import environment_faults
-from pipelines.log.earlier import beside, kept, of_other_data, replaced
-from pipelines.log.files import hash_file
-from pipelines.log.places import provenance_of, refuse_own_place, tilde
+from pipelines.io.atomic import environment_faults
+from pipelines.io.earlier import beside, kept, of_other_data, replaced
+from pipelines.io.files import hash_file
+from pipelines.io.places import provenance_of, refuse_own_place, tilde
 
 __all__ = ["make_way"]
 

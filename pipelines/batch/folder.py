@@ -24,11 +24,11 @@ from pipelines.batch.plan import Plan
 from pipelines.batch.record import Ledger, Record
 from pipelines.batch.summary import KINDS, Summary, rows_of
 from pipelines.errors import UsageError
-from pipelines.log.atomic import environment_faults, staging_folder, sweep, write_file
-from pipelines.log.files import PROVENANCE, hash_file
-from pipelines.log.places import tilde, written_by
-from pipelines.log.results import json_text
-from pipelines.log.table import write_rows
+from pipelines.io.atomic import environment_faults, staging_folder, sweep, write_file
+from pipelines.io.files import PROVENANCE, hash_file
+from pipelines.io.places import tilde, written_by
+from pipelines.io.results import json_text
+from pipelines.io.table import write_rows
 from pipelines.report.report import Report
 
 __all__ = ["BatchFolder"]

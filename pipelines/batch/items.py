@@ -15,9 +15,9 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pipelines.errors import Check, RrridError, UsageError
-from pipelines.log.atomic import fault_of
-from pipelines.log.files import entries, nothing_there, regular_file
-from pipelines.log.places import slug
+from pipelines.io.atomic import fault_of
+from pipelines.io.files import entries, nothing_there, regular_file
+from pipelines.io.places import slug
 
 __all__ = ["Item", "find_items", "read_shard", "shard"]
 

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Final
 
 from pipelines.errors import EnvironmentFault, clean
-from pipelines.log.atomic import environment_faults
+from pipelines.io.atomic import environment_faults
 
 __all__ = ["LOCK", "locked"]
 

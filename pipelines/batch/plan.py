@@ -13,9 +13,9 @@ from importlib import import_module
 from typing import Any, Final
 
 from pipelines.errors import UsageError, did_you_mean
-from pipelines.log.files import hash_file
-from pipelines.log.results import decode, encode
-from pipelines.log.robot_files import robot_sources
+from pipelines.io.files import hash_file
+from pipelines.io.results import decode, encode
+from pipelines.io.robot_files import robot_sources
 from pipelines.recall.code import code_of, libraries
 from pipelines.recall.key import digest_of_json
 from pipelines.stage import Stage

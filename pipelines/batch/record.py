@@ -18,8 +18,8 @@ from typing import Any, Literal
 from pipelines.batch.items import Item
 from pipelines.batch.parts import Part, read_part
 from pipelines.errors import RrridError
-from pipelines.log.atomic import environment_faults
-from pipelines.log.files import PROVENANCE, hash_file
+from pipelines.io.atomic import environment_faults
+from pipelines.io.files import PROVENANCE, hash_file
 
 __all__ = ["Ledger", "Record", "Status", "fresh", "intact", "relative"]
 

@@ -20,11 +20,11 @@ from pipelines.batch.lock import locked
 from pipelines.batch.record import Record
 from pipelines.batch.summary import Summary, summary_report
 from pipelines.errors import Check, InputRejected, UsageError
-from pipelines.log.atomic import environment_faults, write_file
-from pipelines.log.files import PROVENANCE, hash_file
-from pipelines.log.places import keep_apart, tilde
-from pipelines.log.results import json_text
-from pipelines.log.stored_result import read_result
+from pipelines.io.atomic import environment_faults, write_file
+from pipelines.io.files import PROVENANCE, hash_file
+from pipelines.io.places import keep_apart, tilde
+from pipelines.io.results import json_text
+from pipelines.io.stored_result import read_result
 from pipelines.report.render import write_report
 from pipelines.report.report import Report
 

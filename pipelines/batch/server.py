@@ -18,7 +18,7 @@ from multiprocessing.util import Finalize
 from typing import Final
 
 from pipelines.batch.process import one_thread
-from pipelines.log.atomic import remove_folder, temporary_folder
+from pipelines.io.atomic import remove_folder, temporary_folder
 
 __all__ = ["warm_up"]
 

@@ -14,7 +14,7 @@ from pipelines.batch.drift import LIMIT, Course, Drift
 from pipelines.batch.parts import Part
 from pipelines.batch.record import Record, Status
 from pipelines.errors import Check
-from pipelines.log.model_file import ModelFile
+from pipelines.io.model_file import ModelFile
 from pipelines.report.drift_figures import Panel, drift_figure
 from pipelines.report.report import Figure, Report, Section, Table, Tone
 from pipelines.report.sections import checks_table

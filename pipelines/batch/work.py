@@ -23,10 +23,10 @@ from pipelines.batch.plan import Plan, load_stage, read_plan
 from pipelines.batch.process import economise
 from pipelines.batch.record import Record, Status, relative
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, RrridError, clean
-from pipelines.log.files import PROVENANCE, hash_file
-from pipelines.log.guard import die_with_parent
-from pipelines.log.mixed import SeveralSessions
-from pipelines.log.places import renamed, tilde
+from pipelines.io.files import PROVENANCE, hash_file
+from pipelines.io.guard import die_with_parent
+from pipelines.io.mixed import SeveralSessions
+from pipelines.io.places import renamed, tilde
 from pipelines.stage import Inputs, Outcome, Request, Stage, run_stage
 
 __all__ = ["attempt", "begin", "undone"]

@@ -11,9 +11,9 @@ from typing import Literal
 
 from pipelines.errors import Check
 from pipelines.estimation.checks.boundary import Boundary
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.model_file import ModelFile
-from pipelines.log.results import NOT_STORED
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.model_file import ModelFile
+from pipelines.io.results import NOT_STORED
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.rows.fit import TorqueGain

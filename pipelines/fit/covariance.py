@@ -28,7 +28,7 @@ import numpy.typing as npt
 
 from pipelines.fit.equations import Array, Block, Indices
 from pipelines.fit.least_squares import Solution
-from pipelines.log.order_statistics import distinct
+from pipelines.io.order_statistics import distinct
 
 __all__ = ["Robust", "robust_covariance"]
 

@@ -18,7 +18,7 @@ from typing import Final, Literal
 
 from pipelines import __version__
 from pipelines.errors import clean
-from pipelines.log.processors import processors
+from pipelines.io.processors import processors
 
 __all__ = ["Finding", "examine"]
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from pipelines.errors import RrridError, clean
-from pipelines.log.files import open_log, write_log
+from pipelines.io.files import open_log, write_log
 
 if TYPE_CHECKING:
     from pipelines.installation.examine import Finding
-    from pipelines.log.experiment import ExperimentLog
+    from pipelines.io.experiment import ExperimentLog
 
 __all__ = ["run_self_test"]
 

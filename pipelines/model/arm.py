@@ -15,8 +15,15 @@ from functools import cached_property
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError, did_you_mean
-from pipelines.log.model_file import ModelFile, Source, StoredEffect, StoredParameter, StoredValue, Validity
-from pipelines.log.robot import RobotDescription, format_robot, parse_robot
+from pipelines.io.model_file import (
+    ModelFile,
+    Source,
+    StoredEffect,
+    StoredParameter,
+    StoredValue,
+    Validity,
+)
+from pipelines.io.robot import RobotDescription, format_robot, parse_robot
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve, joints_of
 from pipelines.model.effects.fast import speed_curve

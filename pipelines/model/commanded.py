@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
-from pipelines.log.doctor.checks_subject import Subject
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation import Experiment
 from pipelines.model.simulation.control import Controlling
+from pipelines.quality.checks_subject import Subject
 
 __all__ = ["against_command", "commanded"]
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.log.doctor.faults import Mask
-from pipelines.log.doctor.segments import Usable, usable
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.quality.faults import Mask
+from pipelines.quality.segments import Usable, usable
 from pipelines.signal.instants import Instants, average_held, instants, merge_close
 from pipelines.signal.resample import grid, resample
 

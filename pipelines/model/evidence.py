@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.doctor.checks_subject import Subject
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.row_fit import Row, Sampled, relative_residual, row_fits
+from pipelines.quality.checks_subject import Subject
 
 __all__ = ["Evidence"]
 

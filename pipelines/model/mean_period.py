@@ -25,14 +25,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, Level
-from pipelines.log.derive import recording
-from pipelines.log.doctor.faults import Mask, quantum
-from pipelines.log.doctor.segments import Usable, usable
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.limits import shorter_than_period
+from pipelines.io.derive import recording
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.limits import shorter_than_period
 from pipelines.model.measured import Measured, measured
-from pipelines.model.motion import Mean, Reconstructed, Reconstruction, encoder_resolution, reconstruct
+from pipelines.model.motion import (
+    Mean,
+    Reconstructed,
+    Reconstruction,
+    encoder_resolution,
+    reconstruct,
+)
 from pipelines.model.rigid.body import Motion
+from pipelines.quality.faults import Mask, quantum
+from pipelines.quality.segments import Usable, usable
 from pipelines.signal.filters import passed_both_ways
 from pipelines.signal.grid import Grid, grids, lay_on
 from pipelines.signal.periods import Periods, Repeats, average_periods, mean_of_periods, passed_std

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.log.doctor.segments import Usable, usable
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.limits import SHORTEST, recorded_span
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.limits import SHORTEST, recorded_span
+from pipelines.quality.segments import Usable, usable
 from pipelines.signal.grid import Grid, grids
 
 __all__ = ["Measured", "measured"]

@@ -19,16 +19,22 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.derive import derived_by
-from pipelines.log.doctor.faults import Mask
-from pipelines.log.doctor.segments import Usable, usable
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.order_statistics import median
+from pipelines.io.derive import derived_by
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.order_statistics import median
 from pipelines.model.even import Evened, evened
 from pipelines.model.measured import Measured, measured
 from pipelines.model.rigid.body import Motion
 from pipelines.model.trackers import difference_tracker, filter_tracker
-from pipelines.model.tuned import METHODS, Observers, Reconstruction, encoder_resolution, tuned_observers
+from pipelines.model.tuned import (
+    METHODS,
+    Observers,
+    Reconstruction,
+    encoder_resolution,
+    tuned_observers,
+)
+from pipelines.quality.faults import Mask
+from pipelines.quality.segments import Usable, usable
 from pipelines.signal.grid import Tracker, on_grid
 
 __all__ = ["METHODS", "Mean", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "for_equations",

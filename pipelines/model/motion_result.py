@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.results import NOT_STORED
-from pipelines.log.schema import joint_unit
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.results import NOT_STORED
+from pipelines.io.schema import joint_unit
 from pipelines.model import motion_quality as quality
 from pipelines.model.estimation.conditioning import cutoff_at, wanted_cutoff
 from pipelines.model.mean_period import NoiseFloor, mean_period, noise_floor

@@ -17,16 +17,22 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.doctor.checks_subject import NotTested, Subject, spread
 from pipelines.model.clock_offset import away_from_reversals, clock_offset
 from pipelines.model.commanded import against_command
 from pipelines.model.evidence import Evidence
 from pipelines.model.excited import excited
-from pipelines.model.mix_ups import ANGLE_UNITS, UNIT_REMEDY, encoder_scale, position_columns, torque_columns
+from pipelines.model.mix_ups import (
+    ANGLE_UNITS,
+    UNIT_REMEDY,
+    encoder_scale,
+    position_columns,
+    torque_columns,
+)
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
+from pipelines.quality.checks_subject import NotTested, Subject, spread
 
 __all__ = ["mismatches", "plausibility", "plausibility_findings"]
 

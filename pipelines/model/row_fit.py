@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.doctor.segments import Usable
 from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.quality.segments import Usable
 from pipelines.signal.derivatives import apply_kernel, half_width, kernel, local_polynomial
 
 __all__ = ["Row", "Sampled", "quick_residual", "relative_residual", "row_columns", "row_fits", "sample_motion",

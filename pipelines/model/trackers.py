@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import UsageError
-from pipelines.log.doctor.faults import Mask
-from pipelines.log.doctor.segments import long_blocks
-from pipelines.log.experiment import Array
-from pipelines.log.order_statistics import distinct
+from pipelines.io.experiment import Array
+from pipelines.io.order_statistics import distinct
 from pipelines.model.measured import Measured
 from pipelines.model.tuned import Observers, Reconstruction, tuned_observers
+from pipelines.quality.faults import Mask
+from pipelines.quality.segments import long_blocks
 from pipelines.signal.grid import Tracker
 from pipelines.signal.observer import Observer, Track, observe
 from pipelines.signal.smoother import Smoother, smooth, twicing_growth

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.doctor.segments import Usable
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
+from pipelines.quality.segments import Usable
 from pipelines.signal.chain import ORDERS, stationary
 from pipelines.signal.grid import Grid, lay_on
 from pipelines.signal.observer import BLOCK, Observer, design

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from pipelines.log.files import hash_file
-from pipelines.log.places import renamed, tilde
-from pipelines.log.results import encode
-from pipelines.log.schema import FORMAT_VERSION
+from pipelines.io.files import hash_file
+from pipelines.io.places import renamed, tilde
+from pipelines.io.results import encode
+from pipelines.io.schema import FORMAT_VERSION
 from pipelines.recall.code import code_of, libraries
 from pipelines.recall.key import Key, digest_of_json
 from pipelines.stage import Beside, Inputs, Stage

@@ -8,9 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from pipelines.log.atomic import write_file
-from pipelines.log.files import PROVENANCE, hash_file
-from pipelines.log.results import json_text
+from pipelines.io.atomic import write_file
+from pipelines.io.files import PROVENANCE, hash_file
+from pipelines.io.results import json_text
 from pipelines.recall.code import code_of, libraries
 from pipelines.recall.key import digest_of_json
 from pipelines.recall.store import CACHE

@@ -18,10 +18,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from pipelines.errors import EnvironmentFault, InputRejected
-from pipelines.log.atomic import environment_faults, replace_folder, staging_folder
-from pipelines.log.files import hash_file
-from pipelines.log.places import slug
-from pipelines.log.results import encode, json_text, read_series, write_series
+from pipelines.io.atomic import environment_faults, replace_folder, staging_folder
+from pipelines.io.files import hash_file
+from pipelines.io.places import slug
+from pipelines.io.results import encode, json_text, read_series, write_series
 from pipelines.recall.key import Key, changes, digest_of_json
 
 __all__ = ["CACHE", "Kept", "Missed", "Store"]

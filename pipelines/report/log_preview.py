@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipelines.log.doctor.checks_subject import Subject
-from pipelines.log.doctor.segments import long_blocks
-from pipelines.log.experiment import Array
-from pipelines.log.limits import GAP_TICKS
+from pipelines.io.experiment import Array
+from pipelines.io.limits import GAP_TICKS
+from pipelines.quality.checks_subject import Subject
+from pipelines.quality.segments import long_blocks
 from pipelines.report.figures import (
     Mask,
     Span,

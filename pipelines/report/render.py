@@ -17,8 +17,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pipelines.log.atomic import write_file
-from pipelines.log.shared_work import shared_out
+from pipelines.io.atomic import write_file
+from pipelines.io.shared_work import shared_out
 from pipelines.report.report import (
     Figure,
     Report,

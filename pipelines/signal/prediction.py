@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
 
 __all__ = ["prediction_errors", "prediction_weights"]
 

@@ -20,7 +20,18 @@ import numpy.typing as npt
 
 from pipelines.signal import blocks
 from pipelines.signal import segments as seg
-from pipelines.signal.observer import BLOCK, STARTS, Observer, Start, Track, advance, block_starts, checked, chunks, filter_run
+from pipelines.signal.observer import (
+    BLOCK,
+    STARTS,
+    Observer,
+    Start,
+    Track,
+    advance,
+    block_starts,
+    checked,
+    chunks,
+    filter_run,
+)
 from pipelines.signal.segments import Part, Piece, Prior, Run
 
 __all__ = ["Smoother", "smooth", "twicing_growth"]

@@ -15,12 +15,12 @@ from typing import Any
 
 from pipelines import __version__
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean
-from pipelines.log.atomic import environment_faults, replace_folder, staging_folder
-from pipelines.log.earlier import Coming, put_in_place
-from pipelines.log.files import PROVENANCE, hash_file
-from pipelines.log.places import keep_apart, refuse_foreign, refuse_own_place, tilde
-from pipelines.log.results import decode, headed, json_text, read_foreign_series
-from pipelines.log.stored_result import StoredResult, listed_outputs, read_result
+from pipelines.io.atomic import environment_faults, replace_folder, staging_folder
+from pipelines.io.earlier import Coming, put_in_place
+from pipelines.io.files import PROVENANCE, hash_file
+from pipelines.io.places import keep_apart, refuse_foreign, refuse_own_place, tilde
+from pipelines.io.results import decode, headed, json_text, read_foreign_series
+from pipelines.io.stored_result import StoredResult, listed_outputs, read_result
 from pipelines.recall.pictures import DRAWING, pictures_of, with_pictures, write_drawing
 from pipelines.recall.store import CACHE
 from pipelines.report.render import write_report

@@ -7,7 +7,15 @@ from typing import Annotated
 import typer
 
 from rrrid_cli.commands.application import app, go
-from rrrid_cli.options import CauseCommand, Common, Roles, SomeLogs, numbers, with_common, with_common_but
+from rrrid_cli.options import (
+    CauseCommand,
+    Common,
+    Roles,
+    SomeLogs,
+    numbers,
+    with_common,
+    with_common_but,
+)
 
 __all__ = ["diagnose", "extend"]
 

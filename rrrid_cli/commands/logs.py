@@ -74,7 +74,7 @@ def _guess(path: Path, common: Common) -> None:
         raise UsageError("C02", "--guess prints its draft", where="--out",
                          remedy="redirect it: rrrid import --guess FILE > recipe.toml")
     if common.json:
-        from pipelines.log.results import encode, json_text
+        from pipelines.io.results import encode, json_text
 
         sys.stdout.write(json_text(encode(drafted)[0]))
     else:

@@ -44,7 +44,7 @@ def report(
     debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an internal error.")] = False,
 ) -> None:
     """Draw a report again from its stored result; nothing is computed."""
-    from pipelines.log.stored_result import read_result
+    from pipelines.io.stored_result import read_result
     from pipelines.stored.redraw import redraw
 
     del debug  # `entry` looks for it
@@ -82,7 +82,7 @@ def doctor(
             print(f"  {_SIGNS[one.level]} {one.name}: {one.found}{remedy}", flush=True)
     bad = [one for one in found if one.level == "bad"]
     if json:
-        from pipelines.log.results import encode, headed, json_text
+        from pipelines.io.results import encode, headed, json_text
 
         sys.stdout.write(json_text(headed("doctor", {"works": not bad, "findings": encode(found)[0]})))
     else:
@@ -95,15 +95,15 @@ def schema(
     what: Annotated[str, typer.Argument(help="A command, for its result.json; model; log.")] = "model",
 ) -> None:
     """Print the JSON schema of what rrrid writes: of a command's result.json, of model.json, or of a log."""
-    from pipelines.log.results import json_text
+    from pipelines.io.results import json_text
 
     sys.stdout.write(json_text(_schema(what)))
 
 
 def _schema(what: str) -> dict[str, Any]:
-    from pipelines.log.log_schema import log_schema
-    from pipelines.log.model_file import model_schema
-    from pipelines.log.result_schema import result_schema
+    from pipelines.io.log_schema import log_schema
+    from pipelines.io.model_file import model_schema
+    from pipelines.io.result_schema import result_schema
     from pipelines.stage import result_type
     from rrrid_cli.settings import stage_of
 

@@ -11,7 +11,15 @@ import typer
 
 from rrrid_cli.batch import BatchCommand, batch
 from rrrid_cli.commands.application import app, asked, done, go
-from rrrid_cli.options import CauseCommand, Common, Roles, SomeLogs, StageCommand, with_common, with_common_but
+from rrrid_cli.options import (
+    CauseCommand,
+    Common,
+    Roles,
+    SomeLogs,
+    StageCommand,
+    with_common,
+    with_common_but,
+)
 
 __all__ = ["batch", "demo", "run"]
 
@@ -39,7 +47,7 @@ def run(
     finally:
         teller.done()
     if common.json:
-        from pipelines.log.results import encode, headed, json_text
+        from pipelines.io.results import encode, headed, json_text
 
         sys.stdout.write(json_text(headed("run", {"stages": encode(planned)[0]})))
     elif not common.quiet:

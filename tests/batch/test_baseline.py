@@ -11,7 +11,7 @@ from pipelines.batch.baseline import against, unheld
 from pipelines.batch.drift import drift_of
 from pipelines.batch.parts import part_of
 from pipelines.batch.record import Record, Status
-from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
+from pipelines.io.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue
 from tests.batch.conftest import Lay, obey
 from tests.batch.records import STD, item_of
 
@@ -247,7 +247,7 @@ def test_a_phase_is_the_same_after_a_whole_turn() -> None:
 
 def test_a_run_against_a_baseline_fails_for_changes_alone(lay: Lay, tmp_path: Path) -> None:
     """--check with --baseline: 0 while every figure is within its uncertainty, 1 when one item's is beyond."""
-    from pipelines.log.model_file import write_model
+    from pipelines.io.model_file import write_model
 
     rrr = (Path(__file__).parents[2] / "sample_logs/robots/rrr.toml").read_text()
     write_model(tmp_path / "model.json", ModelFile("known", rrr, _baseline().base_parameters))

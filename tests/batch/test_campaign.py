@@ -15,7 +15,7 @@ import pytest
 
 from pipelines.batch.items import find_items
 from pipelines.batch.record import Ledger, intact
-from pipelines.log.files import hash_file
+from pipelines.io.files import hash_file
 from tests.batch.conftest import Lay, contents, obey, statuses
 from tests.batch.test_command import nobody_left
 from tests.cli.commands import REPO

@@ -14,10 +14,10 @@ import pytest
 from pipelines import convert
 from pipelines.batch.batch import Wanted, run_batch
 from pipelines.batch.plan import Options, Plan
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from tests.batch.conftest import contents
 from tests.cli.commands import REPO, RRRID, rrrid
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 from tests.seeds import rarely
 
 

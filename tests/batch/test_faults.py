@@ -12,7 +12,7 @@ import pytest
 
 from pipelines.batch.plan import Options
 from pipelines.errors import EnvironmentFault, NothingMatched
-from pipelines.log.places import slug
+from pipelines.io.places import slug
 from tests.batch.conftest import Lay, contents, obey, statuses
 
 GOOD = {f"good-{i}": f"value {i} std 0.1" for i in range(6)}

@@ -16,10 +16,10 @@ from pipelines.batch.items import Item
 from pipelines.batch.parts import Part
 from pipelines.batch.plan import Options, Plan, plan_key, plan_text, read_plan
 from pipelines.batch.record import Ledger, Record
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from pipelines.stage import Request, run_stage
 from tests.batch.conftest import Lay, contents, obey
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 
 
 def _times(out: Path) -> dict[str, int]:

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.bench.machine import Machine
-from pipelines.bench.rigid import RigidDynamics
-from pipelines.bench.solid import Solid
+from bench.machine import Machine
+from bench.rigid import RigidDynamics
+from bench.solid import Solid
 
 __all__ = ["LinkModel"]
 

@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.bench.fault import Fault, Floats, Hooks, Parameters, Run
-from pipelines.bench.friction import CoulombViscous
-from pipelines.bench.machine import Machine, machine_of
-from pipelines.bench.reference import Reference, times
-from pipelines.log.experiment import Array
-from pipelines.log.robot import Joint, LinkParameters, RobotDescription
+from bench.fault import Fault, Floats, Hooks, Parameters, Run
+from bench.friction import CoulombViscous
+from bench.machine import Machine, machine_of
+from bench.reference import Reference, times
+from pipelines.io.experiment import Array
+from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 
 CENTRE = np.array([0.3, -1.4, 0.6])  # [rad]
 

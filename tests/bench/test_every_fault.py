@@ -8,11 +8,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.bench.controllers import Decentralised
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults import fault_names, find_fault, make
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.plant import Recording, run
+from bench.controllers import Decentralised
+from bench.fault import Fault
+from bench.faults import fault_names, find_fault, make
+from bench.machine import Machine, draw_machine
+from bench.plant import Recording, run
 from pipelines.errors import UsageError
 from tests.bench.machines import sway, unrounded
 from tests.seeds import usually

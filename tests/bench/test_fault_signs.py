@@ -16,15 +16,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.bench.controllers import Decentralised
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults import fault_names, find_fault, make
-from pipelines.bench.faults.contact import Contact
-from pipelines.bench.faults.link_length import LinkLength
-from pipelines.bench.friction import CoulombViscous
-from pipelines.bench.machine import SAMPLE_TIME, Machine, paper_machine, with_links
-from pipelines.bench.plant import Recording, run
-from pipelines.bench.solid import Solid
+from bench.controllers import Decentralised
+from bench.fault import Fault
+from bench.faults import fault_names, find_fault, make
+from bench.faults.contact import Contact
+from bench.faults.link_length import LinkLength
+from bench.friction import CoulombViscous
+from bench.machine import SAMPLE_TIME, Machine, paper_machine, with_links
+from bench.plant import Recording, run
+from bench.solid import Solid
 from tests.bench.machines import sway
 from tests.bench.test_rigid import standard_parameters
 from tests.model.rigid.serial_arms import Arm, by_hand

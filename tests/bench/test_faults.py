@@ -8,21 +8,21 @@ import numpy as np
 import pinocchio as pin
 from scipy.signal import lsim
 
-from pipelines.bench.controllers import Decentralised, OpenLoop
-from pipelines.bench.faults.backlash import Backlash
-from pipelines.bench.faults.base_resonance import BaseResonance
-from pipelines.bench.faults.cogging import Cogging
-from pipelines.bench.faults.drive_lag import DriveLag
-from pipelines.bench.faults.encoder_eccentricity import EncoderEccentricity
-from pipelines.bench.faults.gravity_tilt import GravityTilt
-from pipelines.bench.faults.joint_elasticity import JointElasticity
-from pipelines.bench.faults.payload import Payload
-from pipelines.bench.faults.time_delay import TimeDelay
-from pipelines.bench.faults.torque_lag import TorqueLag
-from pipelines.bench.faults.torque_saturation import TorqueSaturation
-from pipelines.bench.machine import Machine, paper_machine
-from pipelines.bench.plant import run
-from pipelines.bench.reference import at_rest
+from bench.controllers import Decentralised, OpenLoop
+from bench.faults.backlash import Backlash
+from bench.faults.base_resonance import BaseResonance
+from bench.faults.cogging import Cogging
+from bench.faults.drive_lag import DriveLag
+from bench.faults.encoder_eccentricity import EncoderEccentricity
+from bench.faults.gravity_tilt import GravityTilt
+from bench.faults.joint_elasticity import JointElasticity
+from bench.faults.payload import Payload
+from bench.faults.time_delay import TimeDelay
+from bench.faults.torque_lag import TorqueLag
+from bench.faults.torque_saturation import TorqueSaturation
+from bench.machine import Machine, paper_machine
+from bench.plant import run
+from bench.reference import at_rest
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable, unrounded
 from tests.bench.test_rigid import standard_parameters
 from tests.model.rigid.serial_arms import Arm, by_hand

@@ -9,19 +9,19 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipelines.bench.controllers import Decentralised, FeedForward, OpenLoop
-from pipelines.bench.faults import fault_names, find_fault
-from pipelines.bench.faults.cable_hysteresis import CableHysteresis
-from pipelines.bench.faults.hunting_drive import HuntingDrive
-from pipelines.bench.faults.leaking_counterbalance import LeakingCounterbalance
-from pipelines.bench.faults.rattling_mass import RattlingMass
-from pipelines.bench.faults.relative_damper import RelativeDamper
-from pipelines.bench.faults.self_heating import SelfHeating
-from pipelines.bench.faults.sloshing_load import SloshingLoad
-from pipelines.bench.faults.sticking_seal import StickingSeal
-from pipelines.bench.machine import paper_machine
-from pipelines.bench.plant import run
-from pipelines.bench.reference import Reference, at_rest, times
+from bench.controllers import Decentralised, FeedForward, OpenLoop
+from bench.faults import fault_names, find_fault
+from bench.faults.cable_hysteresis import CableHysteresis
+from bench.faults.hunting_drive import HuntingDrive
+from bench.faults.leaking_counterbalance import LeakingCounterbalance
+from bench.faults.rattling_mass import RattlingMass
+from bench.faults.relative_damper import RelativeDamper
+from bench.faults.self_heating import SelfHeating
+from bench.faults.sloshing_load import SloshingLoad
+from bench.faults.sticking_seal import StickingSeal
+from bench.machine import paper_machine
+from bench.plant import run
+from bench.reference import Reference, at_rest, times
 from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable
 from tests.bench.test_fault_signs import arm_of, measured, turned

@@ -9,15 +9,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.bench.controllers import Decentralised
-from pipelines.bench.fault import Fault, Parameters
-from pipelines.bench.faults import fault_names, find_fault, make
-from pipelines.bench.machine import Machine, machine_of, paper_machine
-from pipelines.bench.plant import Recording, run
-from pipelines.bench.reference import Reference
-from pipelines.bench.references import sweeps
+from bench.controllers import Decentralised
+from bench.fault import Fault, Parameters
+from bench.faults import fault_names, find_fault, make
+from bench.machine import Machine, machine_of, paper_machine
+from bench.plant import Recording, run
+from bench.reference import Reference
+from bench.references import sweeps
 from pipelines.errors import UsageError
-from pipelines.log.robot import Joint, RobotDescription
+from pipelines.io.robot import Joint, RobotDescription
 from tests.bench.machines import turntable
 
 S = (1.0, 0.7, 0.25)  # "joint factors 1, 0.7, 0.25 where s stands"
@@ -145,7 +145,7 @@ def faults_at(*names: str) -> list[Fault]:
 
 def test_one_joint_does_not_give_way_twice() -> None:
     """A spring and a gap at one joint would silently be one of them: it is refused, at two joints it is not."""
-    from pipelines.bench.plant import plan_with
+    from bench.plant import plan_with
 
     with pytest.raises(UsageError, match="joint 2 gives way twice"):
         plan_with(paper_machine(), faults_at("joint_elasticity", "backlash"))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from bench.faults.cogging import Cogging
+from bench.machine import Machine, draw_machine, machine_of
+from bench.nuisances.gain_ripple import GainRipple
 from benchmarks.hidden_effects.robots import ROBOTS
-from pipelines.bench.faults.cogging import Cogging
-from pipelines.bench.machine import Machine, draw_machine, machine_of
-from pipelines.bench.nuisances.gain_ripple import GainRipple
 
 
 def of_kind(machine: Machine, kind: type) -> list:

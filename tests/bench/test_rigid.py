@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.bench.controllers import OpenLoop
-from pipelines.bench.machine import SAMPLE_TIME, Machine, draw_machine, machine_of
-from pipelines.bench.plant import run
-from pipelines.bench.reference import at_rest
-from pipelines.bench.rigid import RigidDynamics
+from bench.controllers import OpenLoop
+from bench.machine import SAMPLE_TIME, Machine, draw_machine, machine_of
+from bench.plant import run
+from bench.reference import at_rest
+from bench.rigid import RigidDynamics
 from tests.bench.machines import frictionless
 from tests.model.rigid.serial_arms import ARMS, Arm, by_hand
 from tests.seeds import seeds
@@ -106,6 +106,6 @@ def test_the_papers_machine_has_the_printed_base_parameters() -> None:
 
 
 def draw_paper() -> Machine:
-    from pipelines.bench.machine import paper_machine
+    from bench.machine import paper_machine
 
     return paper_machine()

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.bench import experiments
-from pipelines.bench.experiments import Experiment
-from pipelines.bench.faults import fault_names, make
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.session import answer, peak_torque, record
-from pipelines.log.canonical import digest_of
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log, write_log
+from bench import experiments
+from bench.experiments import Experiment
+from bench.faults import fault_names, make
+from bench.machine import Machine, draw_machine
+from bench.session import answer, peak_torque, record
+from pipelines.io.canonical import digest_of
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log, write_log
 from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, sway
 

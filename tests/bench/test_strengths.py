@@ -8,13 +8,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.bench import experiments
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults import fault_names, find_fault, make
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.session import peak_torque, record
+from bench import experiments
+from bench.fault import Fault
+from bench.faults import fault_names, find_fault, make
+from bench.machine import Machine, draw_machine
+from bench.session import peak_torque, record
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.estimation.logs import Recipe, fit_logs, judge, motions_of
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.tuned import Reconstruction

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.log.files import write_log
-from tests.log.logs import small_log
+from pipelines.io.files import write_log
+from tests.io.logs import small_log
 
 
 @pytest.fixture

@@ -15,10 +15,10 @@ import h5py
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from tests.cli.commands import rrrid
 from tests.healthy import good_log
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 from tests.rows.commanded import Command, command
 
 __all__ = ["command"]

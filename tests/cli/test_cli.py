@@ -14,11 +14,11 @@ import h5py
 import numpy as np
 import pytest
 
-from pipelines.log.files import open_log, write_log
+from pipelines.io.files import open_log, write_log
 from pipelines.model.effects import all_effects
 from tests.cli.commands import REPO, rrrid
 from tests.healthy import good_log, with_signal
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 from tests.rows.commanded import Command, command
 
 __all__ = ["command"]

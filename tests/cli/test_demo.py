@@ -18,12 +18,12 @@ import pytest
 from pipelines import demo
 from pipelines.diagnosis.result import Diagnosis, Finding, NotIdentifiable, Value
 from pipelines.errors import InputRejected
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.simulation.example import FAULT, example_arm, example_session
 from pipelines.stage import Request
 from tests.cli.commands import REPO, rrrid
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 
 QUICK = ("--no-report", "--set", 'run.skip=["fit-friction", "estimate-bps", "validate-writing", "frf", "diagnose", "extend"]')
 

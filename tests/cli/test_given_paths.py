@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from tests.cli.commands import rrrid
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 
 
 @pytest.mark.parametrize(("words", "place"), [

@@ -13,10 +13,10 @@ from pathlib import Path
 import pytest
 
 from pipelines.errors import Interrupted, RrridError
-from pipelines.log.files import hash_file, write_log
-from pipelines.log.guard import Answer, guarded
+from pipelines.io.files import hash_file, write_log
+from pipelines.io.guard import Answer, guarded
 from tests.cli.commands import REPO, RRRID
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 
 RUNS = 3
 ENDED = "rrrid: RRID-P06 interrupted. Run the same command again; nothing was half written."

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.design import Effort, design
 from pipelines.model.excitation.task import Wishes, plan_task

@@ -18,11 +18,11 @@ import pytest
 
 from benchmarks.mutations import mutations, read_apart, warm_up
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.model_file import parse_model
-from pipelines.log.recording import filenames
-from pipelines.log.recording.filenames import matches
-from pipelines.log.shipped import shipped
-from pipelines.log.toml_text import TomlError, parse_toml
+from pipelines.importers import filenames
+from pipelines.importers.filenames import matches
+from pipelines.io.model_file import parse_model
+from pipelines.io.shipped import shipped
+from pipelines.io.toml_text import TomlError, parse_toml
 from tests.cli.commands import REPO, RRRID, rrrid
 
 SECONDS, MEGABYTES = 5.0, 500.0  # of CPU and of memory beyond the program's own
@@ -258,7 +258,7 @@ def test_a_short_log_says_by_how_much(tmp_path: Path) -> None:
     """50 samples at 1 kHz: that 100 are needed, 0.1 s, in inspect and in the stage that refuses it."""
     from dataclasses import replace
 
-    from pipelines.log.files import write_log
+    from pipelines.io.files import write_log
     from tests.healthy import good_log
 
     log = good_log()

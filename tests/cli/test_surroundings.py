@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from pipelines import convert
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from tests.cli.commands import REPO, RRRID, rrrid
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 from tests.seeds import rarely
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from tests.cli.commands import rrrid
 from tests.controlled import controlled_log
 

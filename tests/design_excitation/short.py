@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.design_excitation import STAGE, Settings
-from pipelines.log.robot import format_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot import format_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.stage import Outcome, Request, run_stage
 
 QUICK = replace(Settings(), robot="rrr", evaluations=150, harmonics=(15,), rehearse=False)

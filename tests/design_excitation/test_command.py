@@ -14,7 +14,7 @@ import pytest
 from pipelines.design_excitation import STAGE, Result
 from pipelines.errors import InputRejected, Interrupted, UsageError
 from pipelines.inspect import STAGE as DOCTOR
-from pipelines.log.files import open_log
+from pipelines.io.files import open_log
 from pipelines.stage import Outcome, Request, run_stage
 from tests.cli.commands import rrrid
 from tests.design_excitation.short import QUICK, designed

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.results import headed
-from pipelines.log.robot_files import load_robot
+from pipelines.io.results import headed
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
 from tests.design_excitation.short import QUICK, designed, without_links
 
@@ -57,7 +57,7 @@ def test_earlier_logs_count(tmp_path: Path, samples: Path) -> None:
 
 def testwithout_links_torque_is_not_claimed_to_be_checked(tmp_path: Path) -> None:
     robot = load_robot("rrr")
-    from pipelines.log.robot import format_robot
+    from pipelines.io.robot import format_robot
 
     text = format_robot(replace(robot, joints=tuple(replace(joint, link=None) for joint in robot.joints)))
     (tmp_path / "robot.toml").write_text(text)

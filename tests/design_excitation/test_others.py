@@ -10,8 +10,8 @@ import pytest
 
 from pipelines.errors import UsageError
 from pipelines.inspect import STAGE as DOCTOR
-from pipelines.log.files import open_log
-from pipelines.log.robot_files import load_robot
+from pipelines.io.files import open_log
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.base import BaseArm
 from pipelines.stage import Request, run_stage

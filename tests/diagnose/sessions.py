@@ -7,12 +7,12 @@ from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 
-from pipelines.bench import experiments
-from pipelines.bench.faults import make
-from pipelines.bench.machine import draw_machine
-from pipelines.bench.session import record
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
+from bench import experiments
+from bench.faults import make
+from bench.machine import draw_machine
+from bench.session import record
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
 from pipelines.model.effects import effect_names
 
 __all__ = ["but", "healthy_again", "session", "written"]

@@ -15,8 +15,8 @@ import pytest
 from pipelines import diagnose, import_log
 from pipelines.diagnosis import engine
 from pipelines.diagnosis.result import Diagnosis
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.results import encode
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.results import encode
 from pipelines.model.rows.prepare import Logs
 from pipelines.report.sections import CARD
 from pipelines.stage import Request, run_stage

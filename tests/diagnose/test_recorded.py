@@ -10,9 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.recorded_diagnosis import Judged, imported, judged_odrive, judged_tx40, nested_error, payoff, searched
+from benchmarks.recorded_diagnosis import (
+    Judged,
+    imported,
+    judged_odrive,
+    judged_tx40,
+    nested_error,
+    payoff,
+    searched,
+)
 from pipelines.diagnosis.selection import Selection
-from pipelines.log.hdf5 import read_parts
+from pipelines.io.hdf5 import read_parts
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.asking import answered

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipelines.bench import experiments
-from pipelines.bench.faults.cogging import Cogging
-from pipelines.bench.machine import draw_machine
-from pipelines.bench.session import record
+from bench import experiments
+from bench.faults.cogging import Cogging
+from bench.machine import draw_machine
+from bench.session import record
 from pipelines.diagnosis.result import Diagnosis
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered

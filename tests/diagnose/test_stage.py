@@ -12,9 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from bench.faults import make
+from bench.machine import draw_machine
 from pipelines import diagnose, run
-from pipelines.bench.faults import make
-from pipelines.bench.machine import draw_machine
 from pipelines.errors import UsageError
 from pipelines.stage import Outcome, Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.bench import experiments
-from pipelines.bench.machine import draw_machine
-from pipelines.bench.session import record
+from bench import experiments
+from bench.machine import draw_machine
+from bench.session import record
 from pipelines.diagnosis.findings import gain_of
-from pipelines.log import shared_work
+from pipelines.io import shared_work
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact

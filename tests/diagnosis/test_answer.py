@@ -14,7 +14,7 @@ from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.diagnosis.result import Diagnosis, Extended, Finding
-from pipelines.log.hdf5 import read_parts
+from pipelines.io.hdf5 import read_parts
 from pipelines.model.effects import find_effect
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

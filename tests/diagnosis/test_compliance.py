@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.compliance import Compliance, compliance, untold
-from pipelines.log.files import open_log
+from pipelines.io.files import open_log
 from sample_logs.make_model import synthetic_arm
 
 SAMPLES = Path(__file__).resolve().parents[2] / "sample_logs" / "rrr-healthy"

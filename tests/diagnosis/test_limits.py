@@ -7,14 +7,14 @@ from functools import lru_cache
 
 import pytest
 
-from pipelines.bench import experiments
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults import make
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.session import record
+from bench import experiments
+from bench.fault import Fault
+from bench.faults import make
+from bench.machine import Machine, draw_machine
+from bench.session import record
 from pipelines.diagnosis.limits import without_limit
 from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.two_sigmoid import TwoSigmoid

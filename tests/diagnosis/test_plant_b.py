@@ -12,8 +12,8 @@ import pytest
 
 from pipelines.diagnosis.engine import Diagnosis, diagnose
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.hdf5 import read_parts
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.hdf5 import read_parts
 from tests.healthy import with_signal
 
 # one cause, not to be mistaken

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from pipelines.bench.faults import make
-from pipelines.bench.machine import draw_machine
+from bench.faults import make
+from bench.machine import draw_machine
 from pipelines.diagnosis import engine, extension
 from pipelines.diagnosis.compliance import Compliance, new_causes
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base_resonance import BaseResonance
 from pipelines.model.rows.families import Wanted

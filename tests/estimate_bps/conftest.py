@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from tests.model.estimation.experiments import experiment
 
 

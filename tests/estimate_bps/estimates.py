@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from pipelines import estimate_bps
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
-from pipelines.log.results import read_series
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
+from pipelines.io.results import read_series
 from pipelines.stage import Outcome, Request, run_stage
 
 Result = estimate_bps.Result

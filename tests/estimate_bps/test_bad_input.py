@@ -15,10 +15,10 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.errors import InputRejected, NothingMatched, UsageError
-from pipelines.log.doctor.checks import check_log
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import Opened, write_log
-from pipelines.log.robot import format_robot
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import Opened, write_log
+from pipelines.io.robot import format_robot
+from pipelines.quality.checks import check_log
 from pipelines.stage import Inputs
 from tests.cli.commands import rrrid
 from tests.estimate_bps.estimates import SYMMETRIC, Settings, stage

@@ -11,10 +11,10 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import write_log
-from pipelines.log.model_file import model_text
-from pipelines.log.robot import format_robot
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import write_log
+from pipelines.io.model_file import model_text
+from pipelines.io.robot import format_robot
 from pipelines.model.estimation.compare import Compared
 from pipelines.report.bps_report import bps_report
 from pipelines.stage import Request, run_stage

@@ -10,9 +10,9 @@ import pytest
 
 from pipelines.errors import UsageError
 from pipelines.estimate_bps import Result, Settings, compute, report
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.files import Opened
-from pipelines.log.robot import format_robot
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.files import Opened
+from pipelines.io.robot import format_robot
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Inputs

@@ -11,9 +11,9 @@ import pytest
 
 from pipelines import estimate_bps, reconstruct
 from pipelines.estimate_bps import Result, compute
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.files import Opened
-from pipelines.log.results import decode, encode
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.files import Opened
+from pipelines.io.results import decode, encode
 from pipelines.model.estimation.floor import Beside
 from pipelines.report.bps_report import bps_report
 from pipelines.stage import Inputs, Request, run_stage

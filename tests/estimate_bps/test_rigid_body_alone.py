@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pipelines import estimate_bps
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from pipelines.model.simulation import example
 from pipelines.stage import Request, read_logs
 

@@ -14,7 +14,7 @@ import pytest
 from pipelines import diagnose, extend, run
 from pipelines.diagnosis.result import Rejected
 from pipelines.errors import NothingMatched, UsageError
-from pipelines.log.model_file import read_model
+from pipelines.io.model_file import read_model
 from pipelines.report.run_report import stage_lines
 from pipelines.stage import Request, run_stage
 from tests.diagnose.sessions import but, healthy_again, session, written

@@ -13,8 +13,8 @@ import pytest
 
 from pipelines import extend
 from pipelines.errors import UsageError
-from pipelines.log.files import open_log
-from pipelines.log.model_file import read_model
+from pipelines.io.files import open_log
+from pipelines.io.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.named_cause import wanted_cause
 from pipelines.model.simulation import Experiment, simulate

@@ -11,7 +11,16 @@ from pipelines.fit.covariance import robust_covariance
 from pipelines.fit.equations import Array
 from pipelines.fit.least_squares import fit, solve
 from pipelines.fit.statistics import gather
-from tests.fit.problems import CHANNELS, SIGMA, Problem, autoregressive, correlated, low_passed, problem, white
+from tests.fit.problems import (
+    CHANNELS,
+    SIGMA,
+    Problem,
+    autoregressive,
+    correlated,
+    low_passed,
+    problem,
+    white,
+)
 
 SEEDS = 80
 

@@ -10,7 +10,7 @@ import pytest
 
 from pipelines import fit_friction, import_log
 from pipelines.fit_friction import Settings
-from pipelines.log.files import Opened, open_log
+from pipelines.io.files import Opened, open_log
 from pipelines.model.friction.findings import misfits
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.result import Result

@@ -12,16 +12,27 @@ import pytest
 from pipelines import fit_friction
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.fit_friction import Settings
-from pipelines.log.experiment import Controller, ExperimentLog, Signal
-from pipelines.log.files import Opened, open_log, write_log
-from pipelines.log.model_file import read_model
-from pipelines.log.robot import format_robot
+from pipelines.io.experiment import Controller, ExperimentLog, Signal
+from pipelines.io.files import Opened, open_log, write_log
+from pipelines.io.model_file import read_model
+from pipelines.io.robot import format_robot
 from pipelines.model.arm import Arm
 from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from tests.cli.commands import rrrid
 from tests.healthy import begun
-from tests.model.friction.one_joint import COSINE, INERTIA, JOINT, SINE, STEP, TRUTHS, as_log, driven, recorded, relative
+from tests.model.friction.one_joint import (
+    COSINE,
+    INERTIA,
+    JOINT,
+    SINE,
+    STEP,
+    TRUTHS,
+    as_log,
+    driven,
+    recorded,
+    relative,
+)
 
 QUICK = Settings(law="coulomb+viscous")
 

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.bench import experiments
-from pipelines.bench.controllers import ComputedTorque
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults.base_resonance import BaseResonance
-from pipelines.bench.faults.joint_elasticity import JointElasticity
-from pipelines.bench.faults.time_delay import TimeDelay
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.rigid import motor_share, typical_inertia
-from pipelines.bench.session import record
-from pipelines.log.experiment import Array, ExperimentLog
+from bench import experiments
+from bench.controllers import ComputedTorque
+from bench.fault import Fault
+from bench.faults.base_resonance import BaseResonance
+from bench.faults.joint_elasticity import JointElasticity
+from bench.faults.time_delay import TimeDelay
+from bench.machine import Machine, draw_machine
+from bench.rigid import motor_share, typical_inertia
+from bench.session import record
+from pipelines.io.experiment import Array, ExperimentLog
 from sample_logs.bench_session import controllers_model
 from sample_logs.controller_model import ControllerModel
 from tests.frf.linearised import Truth, linearised

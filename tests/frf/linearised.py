@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, expm
 
-from pipelines.bench.fault import Fault
-from pipelines.bench.machine import SAMPLE_TIME, Machine
-from pipelines.bench.plant import plan_with
-from pipelines.bench.spec import build
-from pipelines.log.experiment import Array
+from bench.fault import Fault
+from bench.machine import SAMPLE_TIME, Machine
+from bench.plant import plan_with
+from bench.spec import build
+from pipelines.io.experiment import Array
 
 __all__ = ["Truth", "linearised"]
 

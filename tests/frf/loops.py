@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import cont2discrete, freqz, lfilter
 
-from pipelines.log import schema
-from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
-from pipelines.log.robot import format_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.robot import format_robot
 from tests.bench.machines import turntable
 
 __all__ = ["Loop", "T", "elastic", "rigid"]

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.files import open_log
+from pipelines.io.files import open_log
 from pipelines.model.frf.findings import Findings, frf_findings
 from pipelines.model.frf.responses import measured_responses
 from pipelines.model.frf.result import posture_of

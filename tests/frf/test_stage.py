@@ -14,8 +14,8 @@ from matplotlib.figure import Figure as Drawing
 from pipelines import frf
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.frf import Settings
-from pipelines.log.experiment import ExperimentLog, Signal
-from pipelines.log.files import Opened, open_log, write_log
+from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.files import Opened, open_log, write_log
 from pipelines.model.arm import Arm
 from pipelines.model.frf.result import Posture
 from pipelines.model.parameter import Parameter
@@ -98,7 +98,7 @@ def test_the_fields_of_the_contract(outcome: Outcome[frf.Result]) -> None:
 
 def test_the_rigid_body_is_expected_and_measured(outcome: Outcome[frf.Result]) -> None:
     """The controller's model is 5 % wrong at most: so is the level, and the measured inertia is the bench's within 1 %."""
-    from pipelines.bench.rigid import RigidDynamics
+    from bench.rigid import RigidDynamics
 
     true = RigidDynamics(machine().robot)
     for posture in outcome.result.postures:

@@ -8,10 +8,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from bench.faults import make
 from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.make import Sealed, answers_in, seal
 from benchmarks.hidden_effects.sessions import Session, machine_of_case
-from pipelines.bench.faults import make
 
 Engine = Callable[[Path, tuple[str, ...]], Mapping[str, Any]]
 FLOOR = 0.02  # [N m]

@@ -10,18 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bench import references
+from bench.controllers import Decentralised
+from bench.experiments import Experiment
+from bench.faults import find_fault
+from bench.machine import Machine
 from benchmarks.hidden_effects import make, sessions
 from benchmarks.hidden_effects.cases import FAMILIES, Hidden, SealedCase, campaign, in_part
 from benchmarks.hidden_effects.make import answers_in, make_cases
 from benchmarks.hidden_effects.sessions import machine_of_case, record_case
-from pipelines.bench import references
-from pipelines.bench.controllers import Decentralised
-from pipelines.bench.experiments import Experiment
-from pipelines.bench.faults import find_fault
-from pipelines.bench.machine import Machine
 from pipelines.errors import UsageError
-from pipelines.log.canonical import digest_of
-from pipelines.log.files import open_log
+from pipelines.io.canonical import digest_of
+from pipelines.io.files import open_log
 from tests.bench.machines import sway
 from tests.seeds import rarely
 

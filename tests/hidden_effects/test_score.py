@@ -16,7 +16,16 @@ from benchmarks.hidden_effects.score import score
 from benchmarks.hidden_effects.table import Row, confusion, rows, table, wilson
 from benchmarks.hidden_effects.verdict import read_verdict
 from pipelines.errors import InputRejected
-from tests.hidden_effects.answers import FLOOR, Engine, always, answer, finding, oracle, sealed, written
+from tests.hidden_effects.answers import (
+    FLOOR,
+    Engine,
+    always,
+    answer,
+    finding,
+    oracle,
+    sealed,
+    written,
+)
 
 
 def case(cause: str, joint: int | None = 2, family: str = "single", strength: float = 1.0) -> Sealed:

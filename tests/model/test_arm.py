@@ -10,11 +10,26 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.model_file import ModelFile, StoredEffect, StoredParameter, StoredValue, model_text, parse_model
-from pipelines.log.robot import Joint, LinkParameters, RobotDescription
-from pipelines.log.robot_files import load_robot
+from pipelines.io.model_file import (
+    ModelFile,
+    StoredEffect,
+    StoredParameter,
+    StoredValue,
+    model_text,
+    parse_model,
+)
+from pipelines.io.robot import Joint, LinkParameters, RobotDescription
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Parameters, Predict, Quantity, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    ArmModel,
+    Effect,
+    Parameters,
+    Predict,
+    Quantity,
+    Words,
+)
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.parameter import Parameter

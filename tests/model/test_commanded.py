@@ -8,16 +8,16 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.bench import experiments
-from pipelines.bench.faults import make
-from pipelines.bench.machine import draw_machine
-from pipelines.bench.session import record
+from bench import experiments
+from bench.faults import make
+from bench.machine import draw_machine
+from bench.session import record
 from pipelines.errors import InputRejected
 from pipelines.estimation.checks.gates import examined
-from pipelines.log.doctor.checks_subject import Subject
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.commanded import against_command, commanded
 from pipelines.model.plausibility import mismatches
+from pipelines.quality.checks_subject import Subject
 from tests.healthy import with_signal
 from tests.seeds import rarely
 

@@ -10,11 +10,22 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log.derive import derive
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.io.derive import derive
+from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.motion import METHODS, Reconstructed, Reconstruction, reconstruct
 from tests.fault_table import FAULTS
-from tests.healthy import ENCODER, TS, Path, changed, fourier, good_log, make_log, rest, rows, with_signal
+from tests.healthy import (
+    ENCODER,
+    TS,
+    Path,
+    changed,
+    fourier,
+    good_log,
+    make_log,
+    rest,
+    rows,
+    with_signal,
+)
 from tests.seeds import rarely, seeds, usually
 
 SMOOTHER = Reconstruction()

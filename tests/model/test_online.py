@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.log.model_file import parse_model
+from pipelines.io.model_file import parse_model
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.effects.base import Effect

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
-from pipelines.log.doctor.checks import NotTested, Subject
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.files import Opened, open_log
-from pipelines.log.robot import LinkParameters, format_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.files import Opened, open_log
+from pipelines.io.robot import LinkParameters, format_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model import plausibility as plausibility_module
 from pipelines.model.clock_offset import Offset, clock_offset
 from pipelines.model.evidence import Evidence
@@ -21,6 +20,7 @@ from pipelines.model.excited import excitation
 from pipelines.model.plausibility import plausibility, plausibility_findings
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import quick_residual, relative_residual, row_fits, sample_motion
+from pipelines.quality.checks import NotTested, Subject
 from pipelines.stage import Inputs
 from tests.faulty import drifting, healthy_without_reference
 from tests.healthy import (

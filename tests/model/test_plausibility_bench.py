@@ -7,12 +7,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.bench import experiments
-from pipelines.bench.machine import draw_machine
-from pipelines.bench.session import record
-from pipelines.log.doctor.checks import Subject
-from pipelines.log.experiment import ExperimentLog
+from bench import experiments
+from bench.machine import draw_machine
+from bench.session import record
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.plausibility import plausibility
+from pipelines.quality.checks import Subject
 from tests.healthy import with_signal
 from tests.seeds import seeds
 

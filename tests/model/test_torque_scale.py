@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.doctor.checks import Subject
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log
 from pipelines.model.evidence import Evidence
 from pipelines.model.plausibility import _against_the_others as against_the_others
 from pipelines.model.plausibility import plausibility
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
+from pipelines.quality.checks import Subject
 from tests.faulty import healthy_without_reference
 from tests.healthy import good_log, with_signal
 from tests.model.estimation.experiments import experiment

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from pipelines.errors import RrridError
-from pipelines.log.guard import die_with_parent
+from pipelines.io.guard import die_with_parent
 
 __all__ = ["Contained", "Outcome"]
 

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from pipelines import import_log, inspect, reconstruct, simulate
-from pipelines.log.files import open_log, write_log
-from pipelines.log.model_file import model_text, read_model
-from pipelines.log.robot_files import load_robot
+from pipelines.io.files import open_log, write_log
+from pipelines.io.model_file import model_text, read_model
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Motion
 from pipelines.model.named_cause import acting_cause
@@ -26,9 +26,9 @@ from pipelines.stage import Request, Stage
 from rrrid_cli.commands import STAGES
 from rrrid_cli.settings import make_settings
 from tests.healthy import fourier, make_log
-from tests.log.logs import small_log
-from tests.log.recording.good import RECIPE, good, text
-from tests.log.recording.test_matlab import mat73, signals
+from tests.importers.good import RECIPE, good, text
+from tests.importers.test_matlab import mat73, signals
+from tests.io.logs import small_log
 
 __all__ = ["READERS", "Reader"]
 
@@ -195,7 +195,9 @@ def _urdfs(folder: Path) -> list[bytes]:
 
 
 def _models(folder: Path) -> list[bytes]:
-    from tests.controlled import controlled_log  # and with it MuJoCo: every fork of this process would be dearer
+    from tests.controlled import (
+        controlled_log,  # and with it MuJoCo: every fork of this process would be dearer
+    )
 
     write_log(folder / "data/waving.h5", controlled_log(400))
     plain = read_model(SAMPLES / "models/rrr.json")

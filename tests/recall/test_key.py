@@ -57,7 +57,7 @@ def test_a_stage_consists_of_what_it_imports() -> None:
     """frf: its module, what that imports and the packages around; every effect, which are found by name; no drawing."""
     code = code_of("pipelines.frf", ("pipelines.report",))
     for module in ("pipelines", "pipelines.frf", "pipelines.stage", "pipelines.model.frf.result", "pipelines.fit.rational_search",
-                   "pipelines.model.effects.cogging", "pipelines.log.results"):
+                   "pipelines.model.effects.cogging", "pipelines.io.results"):
         assert module in code, module
     assert not [name for name in code if name.startswith("pipelines.report")]
     assert not {"pipelines.validate_writing", "pipelines.run", "pipelines.diagnosis.selection"} & set(code)

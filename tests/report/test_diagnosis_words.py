@@ -27,9 +27,23 @@ from pipelines.diagnosis.result import (
 )
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.rows.fit import TorqueGain
-from pipelines.report.diagnosis_finding import finding_section, gain_table, numbers_section, proof_figures
+from pipelines.report.diagnosis_finding import (
+    finding_section,
+    gain_table,
+    numbers_section,
+    proof_figures,
+)
 from pipelines.report.diagnosis_report import diagnosis_report, torque_errors
-from pipelines.report.words import at_places, format_values, in_order, meaning_of, named, spoken, together, without_keys
+from pipelines.report.words import (
+    at_places,
+    format_values,
+    in_order,
+    meaning_of,
+    named,
+    spoken,
+    together,
+    without_keys,
+)
 
 KEY = re.compile(r"[a-z]+_[a-z0-9]+|\b[a-z]+:\d")
 COMMAND = re.compile(r'"rrrid [^"]*"')

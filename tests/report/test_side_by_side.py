@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.log import shared_work
+from pipelines.io import shared_work
 from pipelines.report.render import Picture, drawn
 from pipelines.report.report import Figure
 

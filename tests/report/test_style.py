@@ -9,7 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipelines.report.style import figure_style, format_number, format_unit, log_ticks, printable, to_one_place, with_std
+from pipelines.report.style import (
+    figure_style,
+    format_number,
+    format_unit,
+    log_ticks,
+    printable,
+    to_one_place,
+    with_std,
+)
 
 
 @pytest.mark.parametrize(("value", "text"), [

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.log.files import open_log, write_log
+from pipelines.io.files import open_log, write_log
 from tests.healthy import good_log
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 from tests.rows.commanded import Command
 
 row = pytest.mark.row

@@ -11,12 +11,19 @@ from pathlib import Path
 import h5py
 import pytest
 
-from pipelines.log.files import write_log
-from tests.cli.test_bad_files import _attribute, _bytes, _flip_page, _flip_sample, _killed_writer, _manifest
-from tests.log.logs import small_log
-from tests.log.recording.good import RECIPE, good, lines, text
-from tests.log.recording.test_matlab import mat5, mat73, signals
-from tests.log.test_hostile import _foreign_filter, _replace_q
+from pipelines.io.files import write_log
+from tests.cli.test_bad_files import (
+    _attribute,
+    _bytes,
+    _flip_page,
+    _flip_sample,
+    _killed_writer,
+    _manifest,
+)
+from tests.importers.good import RECIPE, good, lines, text
+from tests.importers.test_matlab import mat5, mat73, signals
+from tests.io.logs import small_log
+from tests.io.test_hostile import _foreign_filter, _replace_q
 from tests.rows.commanded import Command, Done
 
 row = pytest.mark.row

@@ -19,11 +19,11 @@ from typing import Any
 import pytest
 
 from pipelines.errors import RrridError
-from pipelines.log.files import hash_file, open_log, write_log
+from pipelines.io.files import hash_file, open_log, write_log
 from pipelines.stage import Inputs, Request, Stage, run_stage
 from tests import test_every_stage
 from tests.cli.commands import REPO, RRRID
-from tests.log.logs import small_log
+from tests.io.logs import small_log
 from tests.rows.commanded import Command
 from tests.seeds import usually
 

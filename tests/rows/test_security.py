@@ -18,11 +18,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.log.files import hash_file, write_log
+from pipelines.io.files import hash_file, write_log
 from tests.healthy import good_log
-from tests.log.logs import small_log
-from tests.log.recording.good import RECIPE
-from tests.log.test_hostile import _replace_q
+from tests.importers.good import RECIPE
+from tests.io.logs import small_log
+from tests.io.test_hostile import _replace_q
 from tests.rows.commanded import Command
 
 REPO = Path(__file__).resolve().parents[2]

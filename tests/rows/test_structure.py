@@ -11,9 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.log.files import open_log, write_log
-from tests.log.logs import small_log
-from tests.log.test_hostile import _replace_q
+from pipelines.io.files import open_log, write_log
+from tests.io.logs import small_log
+from tests.io.test_hostile import _replace_q
 from tests.rows.commanded import Command
 
 row = pytest.mark.row

@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 from scipy.signal import butter, sosfiltfilt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.filters import centre_hold, centre_samples, choose_decimation, design_low_pass, zero_phase
+from pipelines.signal.filters import (
+    centre_hold,
+    centre_samples,
+    choose_decimation,
+    design_low_pass,
+    zero_phase,
+)
 
 
 @pytest.mark.parametrize("order", range(1, 9))

@@ -5,7 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.signal.fourier import FourierSeries, adjoint, degree_of, good_size, periodic_peak, synthesise
+from pipelines.signal.fourier import (
+    FourierSeries,
+    adjoint,
+    degree_of,
+    good_size,
+    periodic_peak,
+    synthesise,
+)
 
 
 @pytest.fixture

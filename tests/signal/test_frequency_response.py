@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 
 from pipelines.signal.cross_spectra import welch_responses
-from pipelines.signal.frequency_response import FrequencyResponse, bands_below, closed_loop, indirect
+from pipelines.signal.frequency_response import (
+    FrequencyResponse,
+    bands_below,
+    closed_loop,
+    indirect,
+)
 from tests.signal.loops import Plant, T, closed_loop_record, controller
 
 KP, KD = 400.0, 28.0

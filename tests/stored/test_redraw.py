@@ -10,7 +10,7 @@ import pytest
 
 from pipelines import inspect, run
 from pipelines.errors import InputRejected, RrridError, UsageError
-from pipelines.log.files import write_log
+from pipelines.io.files import write_log
 from pipelines.report import render
 from pipelines.report.report import Figure
 from pipelines.stage import Request, run_stage
@@ -63,7 +63,7 @@ def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path,
         return own(figure, name)
 
     monkeypatch.setattr(render, "_draw", noted)
-    monkeypatch.setattr("pipelines.log.shared_work.processors", lambda: 1)
+    monkeypatch.setattr("pipelines.io.shared_work.processors", lambda: 1)
     redraw(tmp_path / "a")
     assert (len(figures) > 4, names) == (True, [])
     (tmp_path / f"a/figures/{figures[0]}.svg").unlink()

@@ -14,12 +14,12 @@ from matplotlib.figure import Figure as Drawing
 
 from pipelines import validate_writing
 from pipelines.errors import InputRejected, NothingMatched, RrridError, UsageError
-from pipelines.log.canonical import digest_of
-from pipelines.log.derive import recording
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log, write_log
-from pipelines.log.model_file import Source, model_text, read_model, write_model
-from pipelines.log.robot import format_robot
+from pipelines.io.canonical import digest_of
+from pipelines.io.derive import recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log, write_log
+from pipelines.io.model_file import Source, model_text, read_model, write_model
+from pipelines.io.robot import format_robot
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct

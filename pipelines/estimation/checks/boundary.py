@@ -34,13 +34,13 @@ from pipelines.estimation.checks.torque_rows import (
     torque_rows,
 )
 from pipelines.estimation.checks.torque_sign import touches_of_zero
-from pipelines.log.doctor.checks_subject import Subject
-from pipelines.log.doctor.segments import Usable
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.robot import RobotDescription
-from pipelines.log.schema import joint_unit
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.robot import RobotDescription
+from pipelines.io.schema import joint_unit
 from pipelines.model.rigid.chain import standard_parameters
 from pipelines.model.row_fit import Sampled, sample_motion
+from pipelines.quality.checks_subject import Subject
+from pipelines.quality.segments import Usable
 
 __all__ = [
     "STANDARD_GRAVITY",

@@ -12,13 +12,13 @@ from functools import partial
 from pipelines.errors import Check, InputRejected, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
-from pipelines.log.derive import recording
-from pipelines.log.doctor.checks import Subject, check_log
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.shared_work import shared_out
+from pipelines.io.derive import recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.shared_work import shared_out
 from pipelines.model.commanded import against_command
 from pipelines.model.plausibility import mismatches
 from pipelines.model.rows.prepare import Logs
+from pipelines.quality.checks import Subject, check_log
 
 __all__ = ["examined", "logs_of_roles"]
 

@@ -21,8 +21,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.order_statistics import median
-from pipelines.log.robot import RobotDescription
+from pipelines.io.order_statistics import median
+from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.base import base_set
 from pipelines.model.rigid.chain import regressor
 from pipelines.model.rigid.geometry import SerialChain, serial_chain

@@ -13,8 +13,8 @@ import numpy as np
 
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.torque_rows import Array
-from pipelines.log.doctor.segments import Usable
-from pipelines.log.order_statistics import median
+from pipelines.io.order_statistics import median
+from pipelines.quality.segments import Usable
 
 __all__ = ["touches_of_zero"]
 

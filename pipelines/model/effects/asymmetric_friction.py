@@ -7,7 +7,17 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, SHARPNESSES, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    SHARPNESSES,
+    ArmModel,
+    Formula,
+    OwnLoad,
+    Parameters,
+    Quantity,
+    Values,
+    Words,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 

@@ -9,7 +9,15 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Quantity, Values, Words, friction_at
+from pipelines.model.effects.base import (
+    ArmModel,
+    Hooks,
+    Parameters,
+    Quantity,
+    Values,
+    Words,
+    friction_at,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart

@@ -9,10 +9,25 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Predict, Quantity, Values, Words, friction_at
+from pipelines.model.effects.base import (
+    ArmModel,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+    friction_at,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import deflection, oscillation, perturbed_by, rigid_slopes, shifted
+from pipelines.model.rigid.perturbation import (
+    deflection,
+    oscillation,
+    perturbed_by,
+    rigid_slopes,
+    shifted,
+)
 
 __all__ = ["BaseResonance"]
 

@@ -9,7 +9,16 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    ArmModel,
+    Formula,
+    OwnLoad,
+    Parameters,
+    Quantity,
+    Values,
+    Words,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.orders import NEARLY, orders_along

@@ -5,7 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
-from pipelines.model.effects.base import LARGE, SHARPNESSES, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    SHARPNESSES,
+    ArmModel,
+    Parameters,
+    Quantity,
+    SpeedCurve,
+    Values,
+    Words,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw, sign_curve
 from pipelines.model.rigid.body import Array, Motion

@@ -7,7 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
+from pipelines.model.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+)
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.perturbation import arm_slopes, perturbed_by, shifted
 

@@ -8,8 +8,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
-from pipelines.model.rigid.altered import carry_over, chain_of, gravity_torque, standard_of, with_gravity
+from pipelines.model.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+)
+from pipelines.model.rigid.altered import (
+    carry_over,
+    chain_of,
+    gravity_torque,
+    standard_of,
+    with_gravity,
+)
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["GravityTilt"]

@@ -9,11 +9,26 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Predict, Quantity, Values, Words, friction_at
+from pipelines.model.effects.base import (
+    ArmModel,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+    friction_at,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rigid.drive_apart import DriveApart
-from pipelines.model.rigid.perturbation import deflection, perturbed_by, rate_of, rigid_slopes, shifted
+from pipelines.model.rigid.perturbation import (
+    deflection,
+    perturbed_by,
+    rate_of,
+    rigid_slopes,
+    shifted,
+)
 
 __all__ = ["JointElasticity"]
 

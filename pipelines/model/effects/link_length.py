@@ -6,7 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
+from pipelines.model.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+)
 from pipelines.model.rigid.altered import carry_over, masses_beyond, with_longer_link
 from pipelines.model.rigid.body import Array, Motion
 

@@ -8,7 +8,16 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words
+from pipelines.model.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+)
 from pipelines.model.rigid.altered import tip_parameters
 from pipelines.model.rigid.body import Array, Motion
 

@@ -6,7 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Formula, OwnLoad, Parameters, Quantity, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    ArmModel,
+    Formula,
+    OwnLoad,
+    Parameters,
+    Quantity,
+    Values,
+    Words,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
 __all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "WRITTEN", "ArmModel", "Formula", "Hooks", "Numbered", "OwnLoad", "OwnMemory",

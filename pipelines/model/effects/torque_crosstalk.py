@@ -4,7 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
+from pipelines.model.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+    predicted,
+)
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueCrosstalk"]

@@ -8,7 +8,18 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import SAMPLED, ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Values, Words, predicted
+from pipelines.model.effects.base import (
+    SAMPLED,
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Values,
+    Words,
+    predicted,
+)
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import continuous, held_mean, lagging, later, rate_of_change
 

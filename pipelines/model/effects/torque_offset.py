@@ -6,7 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    ArmModel,
+    Parameters,
+    Quantity,
+    SpeedCurve,
+    Values,
+    Words,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
 

@@ -8,7 +8,16 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Effect, Hooks, Parameters, Quantity, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Quantity,
+    Values,
+    Words,
+)
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TransmissionCoupling"]

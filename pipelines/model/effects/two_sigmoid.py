@@ -9,7 +9,15 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import LARGE, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    ArmModel,
+    Parameters,
+    Quantity,
+    SpeedCurve,
+    Values,
+    Words,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion

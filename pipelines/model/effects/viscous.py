@@ -4,7 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipelines.model.effects.base import LARGE, ArmModel, Parameters, Quantity, SpeedCurve, Values, Words
+from pipelines.model.effects.base import (
+    LARGE,
+    ArmModel,
+    Parameters,
+    Quantity,
+    SpeedCurve,
+    Values,
+    Words,
+)
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rigid.body import Array, Motion

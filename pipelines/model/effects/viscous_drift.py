@@ -8,7 +8,16 @@ from typing import Self
 
 import numpy as np
 
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Quantity, Values, Words, predicted
+from pipelines.model.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Quantity,
+    Values,
+    Words,
+    predicted,
+)
 from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ViscousDrift"]

@@ -23,7 +23,7 @@ import numpy as np
 from pipelines.fit.equations import Array, Block, Indices
 from pipelines.fit.least_squares import Errors, solve
 from pipelines.fit.statistics import Gram, Triangles, gather, triangulate
-from pipelines.log.order_statistics import distinct
+from pipelines.io.order_statistics import distinct
 
 S = TypeVar("S", Gram, Triangles)
 

@@ -26,7 +26,15 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.fit.bootstrap import apart
 from pipelines.model.estimation.blocks import Stretches
-from pipelines.model.estimation.logs import Fitted, Judged, Motions, Recipe, equations_of, fit_logs, judge
+from pipelines.model.estimation.logs import (
+    Fitted,
+    Judged,
+    Motions,
+    Recipe,
+    equations_of,
+    fit_logs,
+    judge,
+)
 from pipelines.model.estimation.regression import Rows
 from pipelines.model.mean_period import alike
 from pipelines.model.motion import reconstruct

@@ -7,7 +7,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from pipelines.log.limits import GAP_TICKS
+from pipelines.io.limits import GAP_TICKS
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.filters import KEEP, LowPass, choose_decimation, choose_step, design_low_pass
 

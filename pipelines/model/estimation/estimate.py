@@ -22,7 +22,13 @@ from pipelines.fit.contrasts import Contrasted
 from pipelines.fit.convergence import Convergence, convergence
 from pipelines.fit.covariance import Robust, robust_covariance
 from pipelines.fit.equations import Block, split
-from pipelines.fit.identifiability import Unresolved, condition_number, typical_size, unresolved, visible
+from pipelines.fit.identifiability import (
+    Unresolved,
+    condition_number,
+    typical_size,
+    unresolved,
+    visible,
+)
 from pipelines.fit.least_squares import Fit, Solution, fit
 from pipelines.fit.statistics import Statistics, gather, gather_growing
 from pipelines.model.estimation.cycle import cycle_of

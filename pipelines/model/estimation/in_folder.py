@@ -11,10 +11,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.estimation.floor import averaged
-from pipelines.model.estimation.logs import Fitted, Motions, Recipe, fit_logs, motions_of, with_cutoff
+from pipelines.model.estimation.logs import (
+    Fitted,
+    Motions,
+    Recipe,
+    fit_logs,
+    motions_of,
+    with_cutoff,
+)
 from pipelines.model.estimation.nominal import fitted_arm, nominal_columns
 from pipelines.model.friction.joint import JointLogs, fit_joint, friction_of
 from pipelines.model.friction.laws import law_named

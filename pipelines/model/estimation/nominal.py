@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.errors import UsageError
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect, everywhere

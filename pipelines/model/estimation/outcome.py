@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.model_file import Validity
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.model_file import Validity
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Motions

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.doctor.segments import Usable
 from pipelines.model.rigid.body import Array
+from pipelines.quality.segments import Usable
 from pipelines.signal.filters import LowPass, zero_phase
 
 __all__ = ["bridged", "near_peaks"]

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from pipelines.fit.contrasts import of_mean
 from pipelines.fit.equations import Block
-from pipelines.log.order_statistics import median
+from pipelines.io.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.estimation.conditioning import Conditioning
 from pipelines.model.estimation.peaks import bridged, near_peaks

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 from pipelines.errors import Check
 from pipelines.estimation.checks.boundary import Boundary
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.model_file import ModelFile
-from pipelines.log.results import NOT_STORED
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.model_file import ModelFile
+from pipelines.io.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.balance import Balance
 from pipelines.model.estimation.checks import Consistent

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.excitation.chain_rows import ChainRows
 from pipelines.model.excitation.rrr_rows import RRRRows
 from pipelines.model.rigid.base import BaseArm

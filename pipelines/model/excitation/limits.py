@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.body import Array
 
 __all__ = ["Limit", "Limits", "limits_of", "middle_and_half"]

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.recording.controller_side import ControllerTable
-from pipelines.log.results import NOT_STORED
+from pipelines.importers.controller_side import ControllerTable
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.results import NOT_STORED
 from pipelines.model.excitation.apart import Apart
 from pipelines.model.excitation.others import Plan
 from pipelines.model.excitation.outcome import Compared, Course, ParameterStd

@@ -13,7 +13,7 @@ import numpy as np
 from pipelines.errors import UsageError
 from pipelines.fit.design.criteria import CRITERIA
 from pipelines.fit.design.goal import Goal
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.bounds import ParameterBounds
 from pipelines.model.excitation.columns import ArmColumns, arm_columns

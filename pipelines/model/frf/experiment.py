@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.log.doctor.segments import Usable, usable
-from pipelines.log.experiment import Array, Controller, ExperimentLog
-from pipelines.log.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
+from pipelines.io.experiment import Array, Controller, ExperimentLog
+from pipelines.io.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
+from pipelines.quality.segments import Usable, usable
 from pipelines.signal.resample import through
 
 __all__ = ["INPUT", "POSITION", "TORQUE", "Stretch", "Turned", "TurningConfig", "V", "excitation_period", "turned_joint"]

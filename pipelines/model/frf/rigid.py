@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from pipelines.errors import RrridError
-from pipelines.log.model_file import parse_model
+from pipelines.io.model_file import parse_model
 from pipelines.model.arm import Arm
 from pipelines.model.frf.experiment import Turned
 from pipelines.model.frf.responses import Measured

@@ -16,8 +16,8 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import with_block_covariance
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.robot import RobotDescription
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.breakaway import Event, break_away, held_at_least
@@ -28,9 +28,22 @@ from pipelines.model.friction.model_selection import Ladder, Missing, climb, no_
 from pipelines.model.friction.output_error import Simulated, polished, simulate_joint
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.ripple import Ripple, ripple_of, with_inertia
-from pipelines.model.friction.sliding import Sliding, SlidingConfig, drift_of, left_out, sliding_rows
+from pipelines.model.friction.sliding import (
+    Sliding,
+    SlidingConfig,
+    drift_of,
+    left_out,
+    sliding_rows,
+)
 from pipelines.model.friction.speed_map import Coverage, coverage, speed_map, unseen
-from pipelines.model.friction.weak_form import Course, Mask, Stretch, blocks_of_time, stretches_of, swaying
+from pipelines.model.friction.weak_form import (
+    Course,
+    Mask,
+    Stretch,
+    blocks_of_time,
+    stretches_of,
+    swaying,
+)
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.model.rigid.body import Array, Motion
 

@@ -23,7 +23,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from pipelines.log.robot import Joint, RobotDescription
+from pipelines.io.robot import Joint, RobotDescription
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve
 from pipelines.model.effects.fast import from_motion, own_memory, shape_slopes

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.model_file import ModelFile
-from pipelines.log.results import NOT_STORED
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.model_file import ModelFile
+from pipelines.io.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Fitted, Motions
 from pipelines.model.friction.breakaway import Event

@@ -15,7 +15,14 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.estimation.logs import Fitted, Motions, Recipe, equations_of, fit_logs, with_cutoff
+from pipelines.model.estimation.logs import (
+    Fitted,
+    Motions,
+    Recipe,
+    equations_of,
+    fit_logs,
+    with_cutoff,
+)
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns as RigidColumns
 from pipelines.model.estimation.regression import LogEquations

@@ -17,9 +17,14 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid import chain as serial
-from pipelines.model.rigid.body import BaseParameter, TorqueParts, refuse_other_length, refuse_other_shapes
+from pipelines.model.rigid.body import (
+    BaseParameter,
+    TorqueParts,
+    refuse_other_length,
+    refuse_other_shapes,
+)
 from pipelines.model.rigid.geometry import SerialChain, serial_chain
 from pipelines.model.rigid.kinematics import tip_position
 

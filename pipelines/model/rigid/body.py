@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 
 __all__ = ["Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "refuse_other_length", "refuse_other_shapes"]
 

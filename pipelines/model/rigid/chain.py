@@ -16,9 +16,17 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.robot import LinkParameters
+from pipelines.io.robot import LinkParameters
 from pipelines.model.rigid.geometry import SerialChain
-from pipelines.model.rigid.kinematics import LinkMotion, Turn, cross, link_motions, rows, turns, walking_memory
+from pipelines.model.rigid.kinematics import (
+    LinkMotion,
+    Turn,
+    cross,
+    link_motions,
+    rows,
+    turns,
+    walking_memory,
+)
 
 __all__ = ["BLOCK", "STANDARD", "inverse_dynamics", "mass_matrix", "regressor", "regressor_blocks",
            "standard_parameters"]

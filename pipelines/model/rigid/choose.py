@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid import rrr
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import RigidBody

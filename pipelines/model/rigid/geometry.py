@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.log.robot import Joint, RobotDescription
+from pipelines.io.robot import Joint, RobotDescription
 
 __all__ = ["Placement", "SerialChain", "serial_chain"]
 
@@ -109,7 +109,7 @@ def _modified(joint: Joint) -> tuple[Placement, Placement]:
 
 
 def _urdf(robot: RobotDescription) -> tuple[tuple[Placement, ...], tuple[Placement, ...], Placement]:
-    from pipelines.log.urdf import chain_from_urdf
+    from pipelines.io.urdf import chain_from_urdf
 
     arm = chain_from_urdf(robot.urdf_text or "", robot.tip_link)
     if len(arm.joints) != robot.n_joints:

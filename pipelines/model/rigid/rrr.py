@@ -13,10 +13,16 @@ from functools import cached_property
 
 import numpy as np
 
-from pipelines.log.robot import LinkParameters, RobotDescription
+from pipelines.io.robot import LinkParameters, RobotDescription
 from pipelines.model.rigid import rrr_kinematics
 from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.body import Array, BaseParameter, TorqueParts, refuse_other_length, refuse_other_shapes
+from pipelines.model.rigid.body import (
+    Array,
+    BaseParameter,
+    TorqueParts,
+    refuse_other_length,
+    refuse_other_shapes,
+)
 from pipelines.model.rigid.chain import regressor
 
 __all__ = ["ACTING", "RRR", "fits"]

@@ -16,7 +16,7 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.body import Array, refuse_other_shapes
 
 __all__ = ["BRANCHES", "Geometry", "InverseKinematics", "Reach", "inverse", "orientation", "rrr_geometry", "tip"]

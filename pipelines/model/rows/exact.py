@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
 from pipelines.model.effects.fast import from_motion
@@ -27,7 +27,15 @@ from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
-from pipelines.model.rows.nominal import Fit, effect_rows, law_rows, law_slopes, nominal_arm, rigid_rows, several_rows
+from pipelines.model.rows.nominal import (
+    Fit,
+    effect_rows,
+    law_rows,
+    law_slopes,
+    nominal_arm,
+    rigid_rows,
+    several_rows,
+)
 
 __all__ = ["Exact", "Named", "Which", "difference", "further_slopes", "law_of", "nominal_slopes", "number_moved", "recorded",
            "slopes_of"]

@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.shared_work import shared_out
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed

@@ -14,10 +14,10 @@ from typing import Final
 
 import numpy as np
 
-from pipelines.log import schema
-from pipelines.log.experiment import Array, Controller, ExperimentLog, Signal
-from pipelines.log.model_file import read_model
-from pipelines.log.robot import format_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.model_file import read_model
+from pipelines.io.robot import format_robot
 from pipelines.model.arm import Arm
 from pipelines.model.named_cause import acting_cause
 from pipelines.model.simulation.imitate import How, imitate

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array, Controller, ExperimentLog
-from pipelines.log.model_file import parse_model
+from pipelines.io.experiment import Array, Controller, ExperimentLog
+from pipelines.io.model_file import parse_model
 from pipelines.model.arm import Arm
 
 __all__ = ["Experiment"]

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.log import schema
-from pipelines.log.canonical import digest_of
-from pipelines.log.derive import created, recording
-from pipelines.log.experiment import Array, Derived, ExperimentLog, Signal
-from pipelines.log.results import NOT_STORED
+from pipelines.io import schema
+from pipelines.io.canonical import digest_of
+from pipelines.io.derive import created, recording
+from pipelines.io.experiment import Array, Derived, ExperimentLog, Signal
+from pipelines.io.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.simulation.accuracy import Step, choose_step

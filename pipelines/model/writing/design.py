@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import UsageError
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.robot import RobotDescription
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Arm
 from pipelines.model.rigid import rrr
 from pipelines.model.rigid.body import Motion

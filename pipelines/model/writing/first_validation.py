@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.schema import joint_unit
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import condition
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct

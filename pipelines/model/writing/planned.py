@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipelines.log import schema
-from pipelines.log.experiment import ExperimentLog, Signal
-from pipelines.log.robot import RobotDescription, format_robot
+from pipelines.io import schema
+from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.rigid.body import Motion
 
 __all__ = ["planned_log"]

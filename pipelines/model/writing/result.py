@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.log.experiment import Array, ExperimentLog
-from pipelines.log.recording.controller_side import ControllerTable
-from pipelines.log.results import NOT_STORED
+from pipelines.importers.controller_side import ControllerTable
+from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.results import NOT_STORED
 from pipelines.model.simulation.imitate import Imitation
 from pipelines.model.writing.cases import Case
 from pipelines.model.writing.design import Designed

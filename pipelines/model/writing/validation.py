@@ -9,18 +9,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipelines.errors import Check, RrridError
-from pipelines.log.derive import recording
-from pipelines.log.doctor.checks import Subject, check_log
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.places import slug
+from pipelines.io.derive import recording
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.places import slug
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.simulation.imitate import How, Imitation, imitate
 from pipelines.model.writing.cases import Case, case_of, measured_cases, one_task
-from pipelines.model.writing.first_validation import FirstValidation, first_validation, online_validation, residual
+from pipelines.model.writing.first_validation import (
+    FirstValidation,
+    first_validation,
+    online_validation,
+    residual,
+)
 from pipelines.model.writing.result import Gates, TorqueError, pooled
 from pipelines.model.writing.simulated_cases import Draws, possible, simulated_cases, why_not
+from pipelines.quality.checks import Subject, check_log
 
 __all__ = ["Effort", "Validated", "validate"]
 

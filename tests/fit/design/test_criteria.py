@@ -7,7 +7,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipelines.fit.design.criteria import Spectrum, a_optimal, condition, d_optimal, e_optimal, frobenius, spectrum
+from pipelines.fit.design.criteria import (
+    Spectrum,
+    a_optimal,
+    condition,
+    d_optimal,
+    e_optimal,
+    frobenius,
+    spectrum,
+)
 
 Criterion = Callable[[Spectrum], tuple[float, np.ndarray]]
 WEIGHTS = np.array([0.5, 2.0, 0.0, 1.0, 3.0, 0.1])

@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.bench.experiments import Experiment as Planned
-from pipelines.bench.experiments import excitation
-from pipelines.bench.fault import Fault
-from pipelines.bench.faults import make
-from pipelines.bench.friction import CoulombViscous
-from pipelines.bench.machine import SAMPLE_TIME, Machine, draw_machine
-from pipelines.bench.plant import Recording, run
-from pipelines.log.experiment import Array
+from bench.experiments import Experiment as Planned
+from bench.experiments import excitation
+from bench.fault import Fault
+from bench.faults import make
+from bench.friction import CoulombViscous
+from bench.machine import SAMPLE_TIME, Machine, draw_machine
+from bench.plant import Recording, run
+from pipelines.io.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect

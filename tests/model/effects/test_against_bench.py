@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.bench.session import as_log
-from pipelines.log.experiment import Array
+from bench.session import as_log
+from pipelines.io.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.contact import Contact

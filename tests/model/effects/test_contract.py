@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from pipelines.model.arm import Acting, Arm
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Predict, Quantity, Words
+from pipelines.model.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Predict,
+    Quantity,
+    Words,
+)
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_closed_form import Fourier
 from sample_logs.make_model import synthetic_arm

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.robot import Drive, Joint, LinkParameters, RobotDescription
-from pipelines.log.urdf import import_urdf
+from pipelines.io.robot import Drive, Joint, LinkParameters, RobotDescription
+from pipelines.io.urdf import import_urdf
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, everywhere

@@ -15,10 +15,10 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
-from pipelines.bench.machine import SAMPLE_TIME
-from pipelines.bench.plant import Recording
-from pipelines.bench.session import as_log
-from pipelines.log.experiment import Array, Controller
+from bench.machine import SAMPLE_TIME
+from bench.plant import Recording
+from bench.session import as_log
+from pipelines.io.experiment import Array, Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.backlash import Backlash

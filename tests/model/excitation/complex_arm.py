@@ -85,7 +85,7 @@ def _moments(body: RRR) -> np.ndarray:
     """K (15, 30) with p = K φ, from (A4) written with unit links: then R = Y K⁺, for K has full row rank."""
     from dataclasses import replace
 
-    from pipelines.log.robot import LinkParameters
+    from pipelines.io.robot import LinkParameters
 
     columns = []
     for index in range(30):

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.urdf import import_urdf
+from pipelines.io.urdf import import_urdf
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.design import Effort, design, landscape
 from pipelines.model.excitation.outcome import excitation

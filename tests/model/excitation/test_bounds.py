@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.bounds import ParameterBounds
 from pipelines.model.excitation.design import landscape

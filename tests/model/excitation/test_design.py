@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import Interrupted, UsageError
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.excitation.design import Design, Effort, design, landscape
 from pipelines.model.excitation.outcome import excitation
 from pipelines.model.excitation.problem import grams_of

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.design_excitation import STAGE
-from pipelines.log.results import decode, encode
+from pipelines.io.results import decode, encode
 from pipelines.model.excitation.doubts import doubts
 from pipelines.model.excitation.result import Result
 from pipelines.report.excitation_report import excitation_report

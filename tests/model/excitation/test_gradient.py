@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.excitation.columns import SHARPNESS, arm_columns
 from pipelines.model.excitation.problem import DesignProblem
 from pipelines.model.excitation.space import MotionSpace

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import Interrupted
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.excitation import rehearse as rehearsing
 from pipelines.model.excitation.design import Design, Effort, design
 from pipelines.model.excitation.rehearse import Rehearsal, rehearse, rehearsed_design

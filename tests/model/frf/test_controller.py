@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import freqz
 
-from pipelines.bench.observer import Observer, observer_gain
-from pipelines.log.experiment import Controller
+from bench.observer import Observer, observer_gain
+from pipelines.io.experiment import Controller
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.responses import double_integrator
 

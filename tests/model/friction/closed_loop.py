@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.log import schema
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.robot import Joint, RobotDescription, format_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.robot import Joint, RobotDescription, format_robot
 
 RATES = (250, 500, 1000, 2000)  # [Hz]
 KINDS = ("rests", "closed-loop", "vertical", "12-bit", "trend", "step", "stick-slip")

@@ -12,10 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipelines.log import schema
-from pipelines.log.experiment import Array, ExperimentLog, Signal
-from pipelines.log.robot import format_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.robot import format_robot
+from pipelines.io.robot_files import load_robot
 
 Friction = Callable[[float], float]
 

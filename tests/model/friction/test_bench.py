@@ -8,13 +8,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.bench.experiments import friction
-from pipelines.bench.faults import make
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.profiles import gravity_of
-from pipelines.bench.rigid import RigidDynamics
-from pipelines.bench.session import record
-from pipelines.log.experiment import Array
+from bench.experiments import friction
+from bench.faults import make
+from bench.machine import Machine, draw_machine
+from bench.profiles import gravity_of
+from bench.rigid import RigidDynamics
+from bench.session import record
+from pipelines.io.experiment import Array
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.model.friction.laws import law_named
 from pipelines.model.motion import Reconstruction, reconstruct

@@ -12,7 +12,17 @@ from pipelines.model.friction.laws import OneJoint, law_named
 from pipelines.model.friction.refine import refined
 from pipelines.model.friction.weak_form import Stretch, stretches_of
 from pipelines.model.motion import Reconstruction, reconstruct
-from tests.model.friction.one_joint import COSINE, ENCODER, INERTIA, JOINT, SINE, TRUTHS, driven_speeds, recorded, relative
+from tests.model.friction.one_joint import (
+    COSINE,
+    ENCODER,
+    INERTIA,
+    JOINT,
+    SINE,
+    TRUTHS,
+    driven_speeds,
+    recorded,
+    relative,
+)
 
 SEEDS = range(3)
 LAW = law_named("three_sigmoid")

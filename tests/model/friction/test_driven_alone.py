@@ -6,12 +6,22 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array
+from pipelines.io.experiment import Array
 from pipelines.model.friction.fit import LawFit
 from pipelines.model.friction.laws import OneJoint, law_named
 from pipelines.model.friction.refine import fit_driven_alone
 from pipelines.model.rigid.body import Motion
-from tests.model.friction.one_joint import COSINE, ENCODER, INERTIA, JOINT, SINE, TRUTHS, driven_speeds, recorded, relative
+from tests.model.friction.one_joint import (
+    COSINE,
+    ENCODER,
+    INERTIA,
+    JOINT,
+    SINE,
+    TRUTHS,
+    driven_speeds,
+    recorded,
+    relative,
+)
 from tests.seeds import rarely
 
 

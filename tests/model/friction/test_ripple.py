@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.experiment import ExperimentLog
+from pipelines.io.experiment import ExperimentLog
 from pipelines.model.friction.findings import misfits
 from pipelines.model.friction.fit import LawEquations, Value
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
@@ -17,7 +17,17 @@ from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.result import joint_result
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.report.friction_report import ripple_in_words
-from tests.model.friction.one_joint import ENCODER, INERTIA, JOINT, NOISE, TRUTHS, as_log, driven, recorded, torque_plan
+from tests.model.friction.one_joint import (
+    ENCODER,
+    INERTIA,
+    JOINT,
+    NOISE,
+    TRUTHS,
+    as_log,
+    driven,
+    recorded,
+    torque_plan,
+)
 
 _AMPLITUDE, _ORDER = 0.12, 12  # [N m], a tenth of Coulomb friction; waves a turn
 _FAST = ("stribeck", "coulomb+viscous")

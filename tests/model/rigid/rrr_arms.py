@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.log.robot import LinkParameters, RobotDescription
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot import LinkParameters, RobotDescription
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.body import Array
 
 

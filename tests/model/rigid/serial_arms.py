@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pipelines.log.robot import Joint, RobotDescription
-from pipelines.log.robot_files import load_robot
-from pipelines.log.urdf import import_urdf
+from pipelines.io.robot import Joint, RobotDescription
+from pipelines.io.robot_files import load_robot
+from pipelines.io.urdf import import_urdf
 
 HALF = math.pi / 2
 TX40 = Path("real") / "tx40" / "tx40.urdf"

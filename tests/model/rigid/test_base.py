@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.log.robot import LinkParameters, RobotDescription
-from pipelines.log.robot_files import load_robot
-from pipelines.log.urdf import import_urdf
+from pipelines.io.robot import LinkParameters, RobotDescription
+from pipelines.io.robot_files import load_robot
+from pipelines.io.urdf import import_urdf
 from pipelines.model.rigid import chain as serial
 from pipelines.model.rigid import rrr
 from pipelines.model.rigid.base import BaseArm, base_set

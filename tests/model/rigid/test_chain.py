@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid import chain as serial
 from pipelines.model.rigid.geometry import serial_chain
 from tests.model.rigid.serial_arms import ARMS, HALF, Arm, by_hand, physical_links, table

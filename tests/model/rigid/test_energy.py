@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import RigidBody
 from pipelines.model.rigid.choose import rigid_body

@@ -10,7 +10,7 @@ import pytest
 from pipelines.fit.equations import Array, Block
 from pipelines.fit.identifiability import _resolved, unresolved
 from pipelines.fit.least_squares import fit
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import RigidBody
 from pipelines.model.rigid.equations import RigidEquations

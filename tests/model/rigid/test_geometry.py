@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected
-from pipelines.log.robot import Joint, RobotDescription
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot import Joint, RobotDescription
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.geometry import Placement, _z_onto, serial_chain
 from pipelines.model.rigid.kinematics import forward_kinematics
 from tests.model.rigid.serial_arms import GANTRY, PUMA, SEVEN, STANFORD, table

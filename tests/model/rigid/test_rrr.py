@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio
 import pytest
 
-from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.rigid.rrr import RRR, fits

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipelines.fit.consistency import physical_consistency
-from pipelines.log.robot import LinkParameters
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot import LinkParameters
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.chain import standard_parameters
 from pipelines.model.rigid.rrr import RRR
 from pipelines.model.rigid.rrr_consistency import rrr_combine, rrr_inequalities

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.rrr_kinematics import (
     BRANCHES,

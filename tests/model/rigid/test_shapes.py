@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.rigid.rrr import RRR

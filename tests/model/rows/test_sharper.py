@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from pipelines.bench.experiments import excitation
-from pipelines.bench.machine import Machine, draw_machine
-from pipelines.bench.plant import Recording, run
-from pipelines.bench.session import as_log
-from pipelines.log.experiment import Array, ExperimentLog
+from bench.experiments import excitation
+from bench.machine import Machine, draw_machine
+from bench.plant import Recording, run
+from bench.session import as_log
+from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.estimation.conditioning import wanted_cutoff
 from pipelines.model.estimation.logs import Motions, Recipe, motions_of
 from pipelines.model.motion import Reconstruction

@@ -11,12 +11,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.bench.controllers import ComputedTorque, Decentralised, FeedForward, Law
-from pipelines.bench.experiments import Experiment as Planned
-from pipelines.bench.machine import Machine, paper_machine
-from pipelines.bench.reference import Reference
-from pipelines.bench.session import record
-from pipelines.log.experiment import Array
+from bench.controllers import ComputedTorque, Decentralised, FeedForward, Law
+from bench.experiments import Experiment as Planned
+from bench.machine import Machine, paper_machine
+from bench.reference import Reference
+from bench.session import record
+from pipelines.io.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.simulation import Experiment, Noise, simulate
 from sample_logs.bench_session import arm_of, controllers_model

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.log import schema
-from pipelines.log.experiment import Controller, ExperimentLog, Signal
-from pipelines.log.model_file import model_text
-from pipelines.log.robot import format_robot
-from pipelines.log.robot_files import load_robot
+from pipelines.io import schema
+from pipelines.io.experiment import Controller, ExperimentLog, Signal
+from pipelines.io.model_file import model_text
+from pipelines.io.robot import format_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.simulation import Experiment
 from tests.model.simulation.arms import GAIN, KD, KP, TS, rrr, waving
 

@@ -8,10 +8,19 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.log.experiment import Array, Controller
+from pipelines.io.experiment import Array, Controller
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.simulation import Noise, Plant, choose_step, choose_steps, run, runs_alone, simulate, simulate_together
+from pipelines.model.simulation import (
+    Noise,
+    Plant,
+    choose_step,
+    choose_steps,
+    run,
+    runs_alone,
+    simulate,
+    simulate_together,
+)
 from tests.model.simulation.arms import KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.model.simulation.pinocchio_loop import Friction, Loop
 from tests.seeds import rarely

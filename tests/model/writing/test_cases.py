@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.experiment import ExperimentLog
-from pipelines.log.files import open_log
-from pipelines.log.model_file import read_model
+from pipelines.io.experiment import ExperimentLog
+from pipelines.io.files import open_log
+from pipelines.io.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct

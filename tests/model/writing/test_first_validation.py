@@ -7,12 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.log.experiment import Array, ExperimentLog
+from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
-from pipelines.model.writing.first_validation import FirstValidation, first_validation, online_validation
+from pipelines.model.writing.first_validation import (
+    FirstValidation,
+    first_validation,
+    online_validation,
+)
 from pipelines.model.writing.marks import marks_of, reference_tip
 from pipelines.model.writing.reference import writing_task
 from sample_logs.make_model import synthetic_arm

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.log.robot import RobotDescription
+from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.rrr_kinematics import rrr_geometry
 from pipelines.model.writing.inverse import ClosedForm, Numerical

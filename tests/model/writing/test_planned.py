@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.log.doctor.checks import check_log
-from pipelines.log.files import open_log, write_log
-from pipelines.log.robot_files import load_robot
+from pipelines.io.files import open_log, write_log
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.body import Motion
 from pipelines.model.writing.planned import planned_log
 from pipelines.model.writing.reference import writing_task
 from pipelines.model.writing.via_points import via_point_motion
+from pipelines.quality.checks import check_log
 
 
 @pytest.fixture(scope="module")

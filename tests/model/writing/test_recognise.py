@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot_files import load_robot
 from pipelines.model.writing.letters import CHARACTERS
 from pipelines.model.writing.path import Page
 from pipelines.model.writing.profile import Pace

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.body import Array
 from pipelines.model.writing.inverse import Elbow
 from pipelines.model.writing.limits import demands

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.log.robot import RobotDescription
-from pipelines.log.robot_files import load_robot
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
 from pipelines.model.writing.limits import demands
 from pipelines.model.writing.via_points import ViaPoints, via_point_motion, via_points

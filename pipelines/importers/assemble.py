@@ -1,0 +1,432 @@
+"""Collect the robot and files of a recipe, and bring each recording's samples on one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import (
+    Check,
+    Gathering,
+    InputRejected,
+    NothingMatched,
+    UsageError,
+    did_you_mean,
+)
+from pipelines.importers import filenames
+from pipelines.importers.clock import time_of
+from pipelines.importers.joint_side import drive_of, si_of, unit_declared
+from pipelines.importers.raw import RawTable, expand
+from pipelines.importers.recipe import (
+    FileSpec,
+    Recipe,
+    TableSpec,
+    TimeSpec,
+    find_recipe,
+    parse_recipe,
+)
+from pipelines.importers.repair import Recording
+from pipelines.importers.sources import read_table
+from pipelines.io.experiment import Array
+from pipelines.io.files import RECORDINGS
+from pipelines.io.robot import Drive, RobotDescription, parse_robot
+from pipelines.io.robot_files import load_robot, split_tip
+from pipelines.io.shipped import shipped, shipped_names
+from pipelines.io.text import read_small_text
+
+__all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
+
+_BESIDE_USE = ("name", "gravity", "tip_link")
+
+Map = Mapping[str, Mapping[int, str]]
+Groups = dict[str, str]  # of a file's name, by the fields of the pattern
+Hits = dict[str, tuple[FileSpec, Groups]]
+Fits = list[tuple[TableSpec, dict[str, Groups]]]
+
+
+@dataclass(frozen=True, eq=False)
+class Source:
+    """One recording: the file that a pattern matched, and the files that go with it."""
+
+    case: FileSpec | None
+    groups: Mapping[str, str]
+    primary: str  # relative to the source folder
+    tables: Mapping[str, RawTable]  # the same, of every file
+
+
+@dataclass(frozen=True, eq=False)
+class Material:
+    """Everything `import` reads."""
+
+    recipe: Recipe
+    recipe_path: Path
+    folder: Path
+    robot: RobotDescription
+    drive: Drive | None
+    sources: tuple[Source, ...]
+    tables: tuple[tuple[TableSpec, Mapping[str, str], RawTable], ...] = ()
+    ignored: tuple[str, ...] = ()
+    paths: tuple[Path, ...] = ()
+    assume_units: bool = False
+    ending: str = "h5"  # of the logs to be written: "h5" | "parquet"
+    hashes: Mapping[Path, str] = field(default_factory=dict)  # SHA-256 of the bytes that were read
+
+
+def collect(
+    recipe_name: str, source: Path | None, robot: str | None, tell: Callable[[str], None]
+) -> Material:
+    """Read the recipe, its robot and every file it matches.
+
+    Raises:
+        NothingMatched: C06, no file fits.
+        UsageError, InputRejected, EnvironmentFault: as the readers say.
+    """
+    path = find_recipe(recipe_name)
+    text = read_small_text(path, what="a recipe, a TOML file")
+    recipe = replace(parse_recipe(text, path), where=str(path))
+    folder = _folder(path, source)
+    arm, described = _robot(recipe, folder, path, robot)
+    drive = drive_of(recipe.drive, arm, path)
+    names = filenames.files_below(folder)
+    read: dict[str, RawTable] = {}
+
+    def table_of(name: str) -> RawTable:
+        if name not in read:
+            tell(f"reading {name}")
+            read[name] = read_table(filenames.inside(folder, name, path), recipe.format, name)
+        return read[name]
+
+    hits, fits = _hits(recipe, names, path)
+    wanted = {n: _files_of(recipe, groups, n, path) for n, (_, groups) in hits.items()}
+    companions = {other for name, files in wanted.items() for other in files if other != name}
+    sources, problems = [], Gathering()
+    for name, (case, groups) in hits.items():
+        if name in companions:
+            continue
+        with problems.part():
+            files = dict.fromkeys([name, *wanted[name]])
+            for other in (other for other in files if other not in names):
+                belongs = f"'{other}' is missing, which belongs to '{name}'"
+                message = f"{belongs}{did_you_mean(other, names)}"
+                remedy = "copy it beside, or correct file = … in [signals]"
+                raise InputRejected("S01", message, where=path, remedy=remedy)
+            sources.append(Source(case, groups, name, {file: table_of(file) for file in files}))
+    problems.raise_all()
+    pairs = [(name, spec, fit) for name in names for spec, fit in fits if name in fit]
+    tables = tuple((spec, fit[name], table_of(name)) for name, spec, fit in pairs)
+    if not sources and not tables:
+        match = ", ".join(pattern for case in _cases(recipe) for pattern in _each(case.match))
+        message = f"no file matches {match}; {filenames.lying_there(names, RECORDINGS)}"
+        remedy = "correct match in the recipe"
+        remedy += "" if source else ", or give the folder of the recordings with --source"
+        raise NothingMatched("C06", message, where=folder, remedy=remedy)
+    recorded = [name for name in names if Path(name).suffix.lower() in RECORDINGS]
+    return Material(
+        recipe,
+        path,
+        folder,
+        replace(arm, drive=drive),
+        drive,
+        tuple(sources),
+        tables,
+        tuple(name for name in recorded if name not in read),
+        (path, *described, *(folder / name for name in read)),
+        hashes={folder / name: table.sha256 for name, table in read.items()},
+    )
+
+
+def _each(match: str | tuple[str, ...]) -> tuple[str, ...]:
+    return (match,) if isinstance(match, str) else match
+
+
+def _cases(recipe: Recipe) -> list[FileSpec]:
+    return [*recipe.file, *([FileSpec(recipe.log.match)] if recipe.log.match else [])]
+
+
+def _hits(recipe: Recipe, names: tuple[str, ...], path: Path) -> tuple[Hits, Fits]:
+    """Return the first case that each file fits, with its groups; and what fits each [[table]]."""
+    cases = _cases(recipe)
+    patterns = [case.match for case in cases] + [spec.match for spec in recipe.table]
+    fits = filenames.matches(patterns, names, path)
+    hits: Hits = {}
+    for case, fit in zip(cases, fits, strict=False):
+        for name, groups in fit.items():
+            hits.setdefault(name, (case, groups))
+    logs = {name: hits[name] for name in names if name in hits and not hits[name][0].skip}
+    return logs, list(zip(recipe.table, fits[len(cases) :], strict=True))
+
+
+def _folder(recipe: Path, source: Path | None) -> Path:
+    """Return the folder of the recordings: --source, or that of a recipe of one's own."""
+    if source is None:
+        names = shipped_names("recipes")
+        if recipe.stem in names and recipe == shipped("recipes", recipe.stem):
+            message = f"the shipped recipe '{recipe.stem}' does not say where the recordings lie"
+            remedy = "give their folder with --source FOLDER"
+            raise UsageError("C04", message, where="rrrid import", remedy=remedy)
+        return recipe.parent
+    if not source.is_dir():
+        message = "is not a folder" if source.exists() else "no such folder"
+        remedy = "give the folder of the recordings with --source"
+        raise UsageError("C04", message, where=source, remedy=remedy)
+    return source
+
+
+def _file_of(
+    recipe: Recipe, signal: str, groups: Mapping[str, str], primary: str, where: object
+) -> str:
+    template = recipe.signals[signal].file
+    if template is None:
+        return primary
+    return (Path(primary).parent / filenames.fill(template, groups, where)).as_posix()
+
+
+def _files_of(recipe: Recipe, groups: Mapping[str, str], primary: str, where: object) -> list[str]:
+    return [_file_of(recipe, signal, groups, primary, where) for signal in recipe.signals]
+
+
+def _robot(
+    recipe: Recipe, folder: Path, path: Path, override: str | None
+) -> tuple[RobotDescription, tuple[Path, ...]]:
+    """Return the robot of [robot], and its file.
+
+    It is a file with the data or the recipe, a shipped one, or written out in the recipe.
+    """
+    if override:
+        return load_robot(override), ()
+    table = dict(recipe.robot)
+    use = table.pop("use", None)
+    if use is None:
+        import tomli_w
+
+        return parse_robot(tomli_w.dumps(table), where=path), ()
+    for key in table:
+        if key not in _BESIDE_USE:
+            message = f"'robot.{key}' beside 'robot.use'{did_you_mean(key, _BESIDE_USE)}"
+            can = f"beside use, {', '.join(_BESIDE_USE)} can be given"
+            remedy = f"{can}; write the rest in the description"
+            raise UsageError("C01", message, where=path, remedy=remedy)
+    tip = table.get("tip_link")
+    if not isinstance(tip, str | None):
+        message, remedy = "'robot.tip_link' must name a link", 'write tip_link = "last link"'
+        raise UsageError("C02", message, where=path, remedy=remedy)
+    if not isinstance(use, str) or not use.strip():
+        message = "'robot.use' must name a robot description, a URDF, or a shipped robot"
+        raise UsageError("C02", message, where=path, remedy="fill it in")
+    robot, files = _used_robot(use, tip, folder, path)
+    if "name" in table:
+        robot = replace(robot, name=str(table["name"]))
+    if table.get("gravity") is not None:
+        robot = replace(robot, gravity=_gravity(table["gravity"], path))
+    return robot, files
+
+
+def _used_robot(
+    use: str, tip: str | None, folder: Path, path: Path
+) -> tuple[RobotDescription, tuple[Path, ...]]:
+    use, after_colon = split_tip(use)
+    places = dict.fromkeys((folder, path.parent))
+    found = next((place / use for place in places if (place / use).is_file()), None)
+    if found is None and Path(use).suffix and use not in shipped_names("robots"):
+        nowhere = " nor ".join(f"in {place}" for place in places)
+        lies = f"lies neither {nowhere}" if folder != path.parent else f"does not lie {nowhere}"
+        message = f"the robot '{use}' that the recipe names {lies}"
+        copy = "copy it to the recordings, give their folder with --source"
+        remedy = f"{copy}, or another robot with --robot"
+        raise UsageError("C04", message, where=path, remedy=remedy)
+    robot = load_robot(found if found is not None else use, tip or after_colon)
+    return robot, () if found is None else (found,)
+
+
+def _gravity(value: Any, path: Path) -> tuple[float, float, float]:
+    vector = isinstance(value, list | tuple) and len(value) == 3
+    if not vector or not all(isinstance(g, int | float) for g in value):
+        message = f"'robot.gravity' is {value}, must be three numbers [m/s^2]"
+        remedy = "write gravity = [0.0, 0.0, -9.81]"
+        raise UsageError("C02", message, where=path, remedy=remedy)
+    return float(value[0]), float(value[1]), float(value[2])
+
+
+def parse_map(entries: tuple[str, ...], recipe: Recipe, joints: int) -> Map:
+    """Return the columns of --map q_1=Joint_1, named differently from the recipe.
+
+    Raises:
+        UsageError: C02, not of that form, or of a joint that the robot does not have.
+    """
+    found: dict[str, dict[int, str]] = {}
+    for entry in entries:
+        left, _, column = entry.partition("=")
+        signal, _, joint = left.strip().rpartition("_")
+        if left.strip() == "t":
+            signal, joint = "t", "1"
+        elif not joint.isdecimal() or signal not in recipe.signals:
+            signal = ""
+        if not column.strip() or not signal:
+            known = ", ".join([*recipe.signals, "t"])
+            message = f"'{entry}' is not signal_joint=column"
+            remedy = f"write --map q_1=Joint_1; signals: {known}"
+            raise UsageError("C02", message, where="--map", remedy=remedy)
+        if not 1 <= int(joint) <= joints:
+            message = f"'{entry}' speaks of joint {joint}, the robot has joints 1 to {joints}"
+            raise UsageError("C02", message, where="--map", remedy="joints count from 1")
+        found.setdefault(signal, {})[int(joint)] = column.strip()
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class Assembled:
+    """A recording before any repair: one part a clock, units as declared, columns as used."""
+
+    recordings: tuple[Recording, ...]
+    units: Mapping[str, tuple[str, ...]]  # one a joint
+    columns: Mapping[str, tuple[str, ...]]
+    checks: tuple[Check, ...]
+    undeclared: tuple[str, ...] = ()  # units that the recipe leaves open and their source, in words
+
+
+def assemble(
+    source: Source, material: Material, mapped: Map, assume_units: bool = False
+) -> Assembled:
+    """Pick columns, units and time of every file of a recording, and join files of one clock.
+
+    Raises:
+        InputRejected: S01-S05, S08, S12, S16, T06.
+    """
+    recipe = material.recipe
+    time = replace(recipe.time, column=mapped["t"][1]) if "t" in mapped else recipe.time
+    checks = [check for table in source.tables.values() for check in table.checks]
+    units: dict[str, tuple[str, ...]] = {}
+    columns: dict[str, tuple[str, ...]] = {}
+    recordings: list[Recording] = []
+    undeclared: list[str] = []
+    problems = Gathering()
+    primary, where = source.primary, recipe.where
+    files = {s: _file_of(recipe, s, source.groups, primary, where) for s in recipe.signals}
+    for file, table in source.tables.items():
+        here = [signal for signal in recipe.signals if files[signal] == file]
+        for signal in here:
+            with problems.part():
+                spec, instead = recipe.signals[signal], mapped.get(signal)
+                names = expand(table, spec.where or 1, material.robot.n_joints, signal, instead)
+                columns[signal] = names
+                units[signal] = unit_declared(
+                    signal, spec, table, names, material.robot, assume_units, checks
+                )
+                if spec.unit is None:
+                    header = any(name in table.units for name in names)
+                    origin = "from the header" if header else "assumed, as --assume-units says"
+                    listed = ", ".join(dict.fromkeys(units[signal]))
+                    undeclared.append(f"{signal}: unit {listed} {origin}")
+        if not here and file != primary:
+            continue
+        has_clock = all(isinstance(c, int) or c in table.columns for c, _ in time.parts)
+        clock = time if file == primary or has_clock else None
+        with problems.part():
+            t = _time(table, clock, assume_units, undeclared, checks)
+        if not problems.found:
+            si = {s: si_of(units[s], recipe.signals[s]) for s in here}
+            of_file = {s: columns[s] for s in here}
+            recordings.append(_recording(table, t, of_file, si, clock))
+    problems.raise_all()
+    begin = recipe.log.begin
+    if source.case is not None and source.case.begin is not None:
+        begin = source.case.begin
+    clocked = time.column is not None
+    joined = _joined(recordings, list(source.tables.values()), clocked, checks)
+    joined = tuple(_begun(part, begin, checks) for part in joined)
+    if len(joined) > 1 and recipe.resample is None:
+        message, where = "the files have different time stamps", ", ".join(source.tables)
+        remedy = "add [resample] rate = … to bring them on one clock"
+        raise InputRejected("T06", message, where=where, remedy=remedy)
+    return Assembled(joined, units, columns, tuple(checks), tuple(undeclared))
+
+
+def _time(
+    table: RawTable,
+    clock: TimeSpec | None,
+    assume: bool,
+    undeclared: list[str],
+    checks: list[Check],
+) -> Array:
+    """Return the time stamps [s]; NaN where the file has no clock of its own."""
+    if clock is None:
+        return np.full(table.rows.size, np.nan)
+    if clock.unit is None and len(clock.parts) == 1:
+        header = table.units.get(table.name_of(clock.parts[0][0], "t"))
+        undeclared += [f"t: unit {header} from the header"] if header else []
+    t, said = time_of(table, clock, assume)
+    checks += said
+    return t
+
+
+def _recording(
+    table: RawTable,
+    t: Array,
+    columns: Mapping[str, tuple[str, ...]],
+    si: Mapping[str, float],
+    clock: TimeSpec | None,
+) -> Recording:
+    matrices = {}
+    for signal, names in columns.items():
+        matrices[signal] = np.column_stack([table.columns[name] for name in names])
+    places, word = (table.rows + 1, "row") if table.lines is None else (table.lines, "line")
+    clocked = clock is not None and clock.column is not None
+    breaks = table.breaks
+    return Recording(t, matrices, columns, places, table.source, clocked, word, breaks, si)
+
+
+def _begun(part: Recording, begin: float | None, checks: list[Check]) -> Recording:
+    """Leave out what was recorded before `begin` [s], as the recipe asks."""
+    if not begin:
+        return part
+    kept = ~(part.t < float(np.nanmin(part.t)) + begin)
+    first = f"the first {begin:g} s, {int(np.sum(~kept))} samples"
+    message = f"{first}, left out as the recipe says"
+    checks.append(Check.of("T04", "ok", message, where=part.where))
+    return part.take(kept)
+
+
+def _joined(
+    recordings: list[Recording], tables: list[RawTable], clocked: bool, checks: list[Check]
+) -> tuple[Recording, ...]:
+    """Return one recording of files whose rows belong together; others keep their own clocks."""
+    first, rows = recordings[0], tables[0].rows
+    separate: list[Recording] = []
+    for other, table in zip(recordings[1:], tables[1:], strict=True):
+        if clocked and other.clocked and not np.array_equal(other.t, first.t, equal_nan=True):
+            separate.append(other)
+            continue
+        lasts = int(rows[-1]), int(table.rows[-1])
+        _refuse_unequal(first, other, *lasts, clocked and not other.clocked, checks)
+        rows, a, b = np.intersect1d(rows, table.rows, assume_unique=True, return_indices=True)
+        signals = {name: values[a] for name, values in first.signals.items()}
+        signals |= {name: values[b] for name, values in other.signals.items()}
+        first = replace(
+            first,
+            t=first.t[a],
+            places=first.places[a],
+            columns={**first.columns, **other.columns},
+            breaks=tuple((np.flatnonzero(np.diff(rows) > 1) + 1).tolist()),
+            si={**first.si, **other.si},
+            signals=signals,
+        )
+    return tuple(part for part in (first, *separate) if part.signals)
+
+
+def _refuse_unequal(
+    first: Recording, other: Recording, a: int, b: int, one_clock: bool, checks: list[Check]
+) -> None:
+    """S16: files without clocks of their own belong together row by row: of one length."""
+    if a == b:
+        return
+    where, counts = f"{first.where}, {other.where}", f"{a + 1} and {b + 1} samples"
+    if one_clock or abs(a - b) > max(1, 1e-3 * max(a, b)):
+        remedy = "give files of the same run, or files with time stamps of their own and [resample]"
+        raise InputRejected("S16", f"{counts}: not of one recording", where=where, remedy=remedy)
+    message = f"{counts}; the rows both have are used, counted from the start"
+    remedy = "begin and end both recordings together"
+    checks.append(Check.of("T06", "warn", message, where=where, remedy=remedy))

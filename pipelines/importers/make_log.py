@@ -1,0 +1,277 @@
+"""Make the logs and tables of an import, by the recipe and the file's name.
+
+Maps and calibrations without a clock are no logs: their columns become a table in SI.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
+from pipelines.importers import filenames
+from pipelines.importers.assemble import Assembled, Material, Source
+from pipelines.importers.raw import RawTable
+from pipelines.importers.recipe import ColumnSpec, LogSpec, Recipe, TableSpec
+from pipelines.io import schema
+from pipelines.io.derive import created
+from pipelines.io.experiment import Array, Controller, Derived, ExperimentLog, Signal
+from pipelines.io.limits import FEWEST, recorded_span, shorter_than_period
+from pipelines.io.results import NOT_STORED
+from pipelines.io.robot import format_robot
+from pipelines.io.structure import refuse_unlike_format
+from pipelines.io.units import UNITS
+from pipelines.quality.checks import check_log
+from pipelines.quality.checks_motion import degrees_or_motor
+from pipelines.quality.checks_unit import TRUSTED, torque_in_recipe
+
+__all__ = ["ImportedTable", "SourceFile", "examine", "import_table", "make_log"]
+
+# A glitch was recorded as it is: what to do with it is for the user of the log to decide.
+_KEPT = "RRID-D06"
+_TIME = "RRID-S08"  # a recipe's unit of time can be wrong by a thousand and contradict nothing
+# What to do about it is in the recipe, and not in a file that is not written yet.
+_IN_RECIPE = {
+    "RRID-S05": torque_in_recipe(), "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf)),
+}  # fmt: skip
+_SI = {"time": "s", "position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2",
+       "torque": "N m", "current": "A", "temperature": "degC"}  # fmt: skip
+_METRES = {"m": "m", "mm": "m", "um": "m", "m/s": "m/s", "mm/s": "m/s", "m/s^2": "m/s^2",
+           "mm/s^2": "m/s^2", "N": "N", "mN": "N", "kN": "N"}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SourceFile:
+    """A recorded file, and the columns taken from it."""
+
+    name: str
+    sha256: str
+    columns: tuple[str, ...]
+
+
+def make_log(
+    source: Source,
+    material: Material,
+    assembled: Assembled,
+    t: Array,
+    signals: Mapping[str, Signal],
+    steps: tuple[str, ...],
+    altered: tuple[str, ...],
+    number: int | None,
+) -> tuple[ExperimentLog, tuple[SourceFile, ...], tuple[str, ...]]:
+    """Return one log of converted signals, its files, and `altered` with what was done here.
+
+    Raises:
+        InputRejected: T07 shorter than a period, T08 hardly a sample, S01 an frf log without
+            excitation.
+        UsageError: C02, name, experiment, role or joint cannot be read from the recipe and the
+            file's name.
+    """
+    recipe, robot = material.recipe, material.robot
+    about = _about(recipe.log, source, recipe.where)
+    name = clean(filenames.fill(about.name, source.groups, recipe.where), 200) or "log"
+    files = _files(source, assembled)
+    step = _sample_time(recipe, t)
+    if t.size < FEWEST:
+        message = f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}"
+        remedy = "record longer, or resample faster"
+        raise InputRejected("T08", message, where=source.primary, remedy=remedy)
+    if about.period is not None and shorter_than_period(t, step, about.period):
+        short = f"{recorded_span(t, step):.4g} s < {about.period:g} s period"
+        if number is None:
+            remedy = "record a whole period, or correct period"
+            raise InputRejected("T07", short, where=source.primary, remedy=remedy)
+        # A part of a log that had to be split need not hold a period; it is a log without one.
+        about, altered = replace(about, period=None), (*altered, f"period left out: {short}")
+    if about.experiment == "frf" and "v" not in signals:
+        message = "an frf log without its excitation v"
+        raise InputRejected("S01", message, where=source.primary, remedy="map signals.v")
+    ordered = {"t": Signal(t, "s", schema.SIGNALS["t"][1])}
+    ordered |= {key: signals[key] for key in schema.SIGNALS if key in signals}
+    log = ExperimentLog(
+        name=f"{name}-{number}" if number else name,
+        experiment=about.experiment,
+        role=about.role,
+        origin=about.origin,
+        torque=about.torque,
+        robot_name=robot.name,
+        sample_time=step,
+        robot_text=format_robot(robot),
+        signals=ordered,
+        recorded=about.recorded,
+        joint=about.joint,
+        period=about.period,
+        posture=None if about.posture is None else np.array(about.posture),
+        controller=_controller(material),
+        derived=_derived(files, material, steps, altered, about.recorded) if altered else None,
+    )
+    return log, files, altered
+
+
+def _files(source: Source, assembled: Assembled) -> tuple[SourceFile, ...]:
+    used = [column for columns in assembled.columns.values() for column in columns]
+    return tuple(
+        SourceFile(file, table.sha256, tuple(c for c in used if c in table.columns))
+        for file, table in source.tables.items()
+    )
+
+
+def _sample_time(recipe: Recipe, t: Array) -> float:
+    if recipe.resample:
+        return 1.0 / recipe.resample.rate
+    if recipe.time.column is not None:
+        return float(np.median(np.diff(t)))
+    return recipe.time.sample_time or 1.0 / (recipe.time.rate or 1.0)
+
+
+def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
+    """Return [log], overruled by groups of the file's name, these by its [[file]] case."""
+    groups = source.groups
+    found: dict[str, Any] = {}
+    for key, known in (("experiment", schema.EXPERIMENTS), ("role", schema.ROLES)):
+        if groups.get(key, known[0]) not in known:
+            gives = f"'{source.primary}' gives {key} '{groups[key]}'"
+            message = f"{gives}, must be one of {', '.join(known)}"
+            remedy = f"rename the file, or write {key} = … in a [[file]] case before it"
+            raise UsageError("C02", message, where=where, remedy=remedy)
+        found |= {key: groups[key]} if key in groups else {}
+    if "joint" in groups:
+        if not groups["joint"].isdigit():
+            message = f"'{source.primary}' gives joint '{groups['joint']}', must be a number"
+            remedy = "rename the file, or take digits alone: {joint:[0-9]+}"
+            raise UsageError("C02", message, where=where, remedy=remedy)
+        found["joint"] = int(groups["joint"])
+    for key in ("name", "experiment", "role", "joint", "period", "recorded", "posture"):
+        value = getattr(source.case, key, None)
+        found |= {} if value is None else {key: value}
+    about = replace(base, **found)
+    if about.experiment not in schema.ONE_JOINT:
+        return replace(about, joint=None)
+    if about.joint is None:
+        message = f"{about.experiment} log '{source.primary}' without its joint"
+        remedy = "write joint = … in its [[file]], or {joint} in the pattern"
+        raise UsageError("C02", message, where=where, remedy=remedy)
+    return about
+
+
+def _controller(material: Material) -> Controller | None:
+    spec = material.recipe.controller
+    if spec is None:
+        return None
+    keys = ("kp", "kd", "ki", "output_limit", "torque_resolution")
+    given = {key: getattr(spec, key) for key in keys}
+    arrays: dict[str, Any] = {k: np.array(x) for k, x in given.items() if x is not None}
+    return Controller(
+        law=spec.law,
+        feedforward=spec.feedforward,
+        velocity=spec.velocity,
+        delay=spec.delay,
+        **arrays,
+    )
+
+
+def _derived(
+    files: tuple[SourceFile, ...],
+    material: Material,
+    steps: tuple[str, ...],
+    altered: tuple[str, ...],
+    recorded: str | None,
+) -> Derived:
+    # `created` is the time of the recording where the recipe gives it. Where it does not, no honest
+    # time is left: the clock on the wall and the times of files differ from one import to the next,
+    # and equal inputs give equal bytes. It is then SOURCE_DATE_EPOCH, by default
+    # 1970-01-01T00:00:00Z: to be read as "not known". provenance.json has the hour.
+    hashes = {file.name: file.sha256 for file in files}
+    record = {"recipe": material.recipe_path.name, "files": hashes}
+    record |= {"converted": list(steps), "altered": list(altered)}
+    sha256 = files[0].sha256
+    if len(files) > 1:
+        sha256 = hashlib.sha256("\n".join(file.sha256 for file in files).encode()).hexdigest()
+    return Derived("import", json.dumps(record, sort_keys=True), sha256, created(recorded))
+
+
+def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Check, ...]:
+    """Return the warnings of the doctor about a new log, so that `inspect` passes on it.
+
+    They are glitches, which stay, and time in another unit; the import has said the others.
+
+    Raises:
+        InputRejected: S20 unlike the format, and what the doctor would reject or repair before
+            use: the import should have.
+    """
+    refuse_unlike_format(log)  # the doctor judges a log whose joint and gains are the robot's
+    found = []
+    for check in check_log(replace(log, source=recording), TRUSTED if trust_units else ()):
+        kept = check.code == _KEPT and check.level == "repair"
+        if check.level in ("reject", "repair") and not kept:
+            remedy = _IN_RECIPE.get(check.code, check.remedy)
+            raise replace(check, remedy=remedy).as_error()
+        if check.code == _TIME and check.level == "warn":
+            found.append(check)
+        if kept:
+            words = check.message.removesuffix("; left out")
+            message = clean(f"{words}; kept in the log, left out of fits")
+            found.append(replace(check, level="warn", message=message))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class ImportedTable:
+    """A table in SI."""
+
+    name: str
+    file: str
+    source: str
+    sha256: str
+    rows: int
+    units: Mapping[str, str]
+    data: Mapping[str, Array] = field(metadata=NOT_STORED, repr=False)
+
+
+def import_table(spec: TableSpec, name: str, file: str, table: RawTable) -> ImportedTable:
+    """Return the columns of a `[[table]]`, converted.
+
+    Raises:
+        InputRejected: S01, S04, S05, S12.
+    """
+    data: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    for key, column in spec.columns.items():
+        source = table.name_of(column.column)
+        where, header = f"{table.source}, column '{source}'", table.units.get(source)
+        values, units[key] = _column_in_si(table.columns[source], column, header, where)
+        if not np.isfinite(values).all():
+            row = table.place(int(np.flatnonzero(~np.isfinite(values))[0]))
+            message = f"no number in {row}"
+            raise InputRejected("D01", message, where=where, remedy="remove that row")
+        data[key] = values
+    return ImportedTable(name, file, table.source, table.sha256, table.rows.size, units, data)
+
+
+def _column_in_si(
+    values: Array, column: ColumnSpec, header: str | None, where: str
+) -> tuple[Array, str]:
+    unit = column.unit or header
+    if unit is None:
+        remedy = 'add unit = … to the column ("1" where it has none)'
+        raise InputRejected("S04", "no unit", where=where, remedy=remedy)
+    values = values * column.scale
+    if unit == "1":
+        return values, "1"
+    if unit == "counts":
+        if column.counts_per_rev is None:
+            message, remedy = "counts without counts_per_rev", "add counts_per_rev"
+            raise InputRejected("S05", message, where=where, remedy=remedy)
+        return values * (2.0 * math.pi / column.counts_per_rev), "rad"
+    known = UNITS.get(unit)
+    if known is None:
+        hint = f"{did_you_mean(unit, UNITS)}; known are {', '.join(UNITS)}"
+        message = f"unknown unit '{unit}'{hint}"
+        raise InputRejected("S05", message, where=where, remedy="declare its unit")
+    return known.factor * values + known.offset, _METRES.get(unit) or _SI[known.quantity]

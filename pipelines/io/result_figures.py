@@ -1,0 +1,158 @@
+"""Take out of a stage's result what can be followed from item to item: fitted figures with their std, and residuals.
+
+Any stage's result will do: a figure is what has `value`, `std` and `unit`; a residual is what bears one of a few names. Each
+gets a name in words from where it stands: "p1", "joint 2 viscous", "cogging joint 2 amplitude". What a diagnosis leaves before
+any extension and what it leaves with it are told apart: "nominal model residual rms …", "extended model residual rms …".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from pipelines.io.toml_text import TomlError, parse_toml
+
+__all__ = ["fitted", "name_in", "numbers_of", "residuals", "robot_of"]
+
+# What a result calls the error that is left, its words, and its unit; arrays are per joint.
+_RESIDUALS: Final = {"torque_rms": ("torque rms", "N m"), "residual_rms": ("nominal model residual rms", "N m"),
+                     "after_rms": ("extended model residual rms", "N m"), "relative_error": ("relative error", "1"),
+                     "reconstruction_error_max": ("reconstruction error max", "rad")}
+_SAID_BEFORE: Final = {"after_rms": "noise_floor"}  # it is no model's, and stands with the nominal one already
+_SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
+# Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
+_NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
+_SILENT: Final = ("parameters", "result", "torque")
+_PASSED_OVER: Final = ("balance", "comparison", "candidate_laws", "rejected", "detection_limits", "courses")
+_PICTURES: Final = "previews"  # whose units are of position and torque, not of joints
+_A_MODEL: Final = "model"  # whose "robot" is a whole description
+_MOST = 400  # figures of one item
+
+
+def fitted(result: Mapping[str, Any]) -> dict[str, tuple[float, float, str]]:
+    """Name -> (value, std, unit) of every figure of `result` whose std is known."""
+    found: dict[str, tuple[float, float, str]] = {}
+    for name, holder in _figures(result):
+        value, std = holder["value"], holder["std"]
+        if _number(value) and _number(std) and std > 0.0 and len(found) < _MOST:
+            found[_free(name, found)] = (float(value), float(std), str(holder["unit"]))
+    return found
+
+
+def numbers_of(result: Mapping[str, Any]) -> tuple[str, ...]:
+    """The name of every figure of `result`, whether anybody knows its std or not."""
+    return tuple(dict.fromkeys(name for name, _ in _figures(result)))
+
+
+def _figures(result: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    for name, holder in _walk(_single(result), ()):
+        if isinstance(holder, Mapping) and {"value", "std", "unit"} <= set(holder):
+            yield name, holder
+
+
+def residuals(result: Mapping[str, Any], turning: Sequence[bool] = ()) -> dict[str, tuple[float, str]]:
+    """Name -> (value, unit) of every residual of `result`.
+
+    Args:
+        turning: which joints turn, where the caller knows the robot; else what the result says of their units.
+    """
+    found: dict[str, tuple[float, str]] = {}
+    slides = {j + 1 for j, turns in enumerate(turning) if not turns} or _sliding(result)
+    for name, holder in _walk(_single(result), ()):
+        for key, (called, unit) in _RESIDUALS.items():
+            if isinstance(holder, Mapping) and key in holder:
+                for words, joint, value in _leaves(holder[key], but=_SAID_BEFORE.get(key)):
+                    if len(found) < _MOST:
+                        full = " ".join(filter(None, (name, called, words)))
+                        found[_free(full, found)] = value, _SLIDING.get(unit, unit) if joint in slides else unit
+    return found
+
+
+def _sliding(value: Any) -> set[int]:
+    """The joints, from 1, that slide by the units that a result gives of them."""
+    if isinstance(value, Mapping):
+        told = [unit for key in ("units", "torque_units") if isinstance(value.get(key), list) for unit in enumerate(value[key], 1)]
+        return {j for j, unit in told if unit in _SLIDING.values()}.union(
+            *(_sliding(item) for key, item in value.items() if key != _PICTURES))
+    return set[int]().union(*map(_sliding, value)) if isinstance(value, list) else set()
+
+
+def robot_of(result: Any) -> str:
+    """The name of the first robot that a result is of, however deep; "" where it says none."""
+    if isinstance(result, Mapping):
+        if "base_parameters" in result and isinstance(result.get("robot"), str):  # a model file, with a whole description
+            return name_in(result["robot"])
+        if isinstance(result.get("robot"), str):
+            return str(result["robot"])
+        return next(filter(None, (robot_of(item) for key, item in result.items() if key != _A_MODEL)), "")
+    return next(filter(None, map(robot_of, result)), "") if isinstance(result, list) else ""
+
+
+def name_in(robot: str) -> str:
+    """Return the name in a robot description, "" where it is none."""
+    try:
+        return str(parse_toml(robot).get("name", ""))
+    except TomlError:
+        return ""
+
+
+def _single(result: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Of a run its stages alone: what it repeats of them beside stands there as well."""
+    return {"stages": result["stages"]} if "stages" in result else result
+
+
+def _walk(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
+    """Every object below `value`, with the words that lead to it."""
+    if isinstance(value, Mapping):
+        yield " ".join(path), value
+        for key, item in value.items():
+            if key in _PASSED_OVER or key in _RESIDUALS:
+                continue
+            words = key.replace("_", " ")
+            if isinstance(item, list):
+                if key == "postures" and len(item) == 1 and not _words(item[0]):
+                    continue  # of its only posture a joint says the same without it
+                for number, one in enumerate(item, 1):
+                    yield from _walk(one, (*path, *(_words(one) or (words, str(number)))))
+            else:
+                yield from _walk(item, path if key in _SILENT else (*path, words))
+
+
+def _words(item: Any) -> list[str]:
+    """What tells one of a list from the others."""
+    if not isinstance(item, Mapping):
+        return []
+    said = []
+    for key in _NAMING:
+        value = item.get(key)
+        if isinstance(value, str) and value and len(value) < 40:
+            said.append(value)
+        elif isinstance(value, int) and not isinstance(value, bool):
+            said.append(f"{key} {value}")
+    return said
+
+
+def _leaves(value: Any, words: tuple[str, ...] = (), joint: int = 0, but: str | None = None) -> Iterator[tuple[str, int, float]]:
+    """Words, the joint they are of or 0, and the number; without what stands under the key `but`."""
+    if _number(value):
+        yield " ".join(words), joint, float(value)
+    elif isinstance(value, Mapping):
+        for key, item in value.items():
+            if key != but:
+                yield from _leaves(item, (*words, key.replace("_", " ")), joint)
+    elif isinstance(value, list):
+        for index, item in enumerate(value, 1):
+            yield from _leaves(item, (*words, f"joint {index}"), index)
+
+
+def _number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _free(name: str, taken: Mapping[str, Any]) -> str:
+    number, free = 1, name
+    while free in taken:
+        number += 1
+        free = f"{name} ({number})"
+    return free

@@ -1,0 +1,258 @@
+"""Text files are read for what they are; damage is counted and named; spreadsheet remains are refused."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipelines.errors import InputRejected
+from pipelines.importers.raw import RawTable, unstacked
+from pipelines.importers.tables import read_text
+from tests.importers.good import good, lines, text
+
+
+def parse(content: str | bytes) -> RawTable:
+    return read_text(content.encode() if isinstance(content, str) else content, "run.csv")
+
+
+def levels(table: RawTable) -> dict[str, str]:
+    return {check.code.removeprefix("RRID-"): check.level for check in table.checks}
+
+
+def equal(table: RawTable, rows: slice = slice(None)) -> bool:
+    return all(np.array_equal(table.columns[name], values[rows]) for name, values in good().items())
+
+
+def test_quotes_are_taken_off_in_pairs() -> None:
+    """npTDMS names a column /'Motion'/'q'."""
+    table = parse("'t';/'Motion'/'q'\n" + "\n".join(f"{k};'{k / 7:.5f}'" for k in range(50)))
+    assert list(table.columns) == ["t", "/'Motion'/'q'"]
+
+
+def test_a_table_of_one_row_a_joint_becomes_one_of_one_row_a_sample() -> None:
+    columns = good()
+    rows = [(t, name, columns[f"q_{j}"][k]) for k, t in enumerate(columns["t"]) for j, name in enumerate("cab", start=1)]
+    table = unstacked(parse("t,joint,q\n" + "".join(f"{t:.17g},{name},{q:.17g}\n" for t, name, q in rows)))
+    assert np.array_equal(table.columns["t"], columns["t"])
+    assert np.array_equal(table.columns["q[a]"], columns["q_2"])
+
+
+@pytest.mark.parametrize(("start", "refused"), [(1.7e9, True), (0.0, False)])
+def test_s11_series_below_each_other_are_refused_and_runs_are_not(start: float, refused: bool) -> None:
+    """A date comes once; a clock that starts from zero may do so with each run."""
+    columns = good()
+    table = parse(text({"t": np.tile(start + columns["t"], 3), "q": np.concatenate([columns[f"q_{j}"] for j in (1, 2, 3)])}))
+    if not refused:
+        assert unstacked(table) is table
+        return
+    with pytest.raises(InputRejected, match="RRID-S11 run.csv, column 't', line 1202: the same times come 3 times"):
+        unstacked(table)
+
+
+def test_brackets_round_bare_numbers_lose_none_of_them() -> None:
+    """As yarpdatadumper writes lists, without a label."""
+    rows = np.column_stack(list(good().values()))
+    written = "".join(f"{t:.17g} ({' '.join(f'{x:.17g}' for x in q)}) 1\n" for t, *q in rows)
+    assert np.array_equal(np.column_stack(list(parse(written).columns.values()))[:, :-1], rows)
+
+
+def test_a_unit_behind_every_number_may_be_a_sign() -> None:
+    """As Grafana formats cells."""
+    columns = good()
+    rows = zip(columns["t"], columns["q_1"], strict=True)
+    table = parse("t,q\n" + "".join(f"{t:.17g},{q:.17f}°\n" for t, q in rows))
+    assert np.allclose(table.columns["q"], columns["q_1"])
+    assert table.units == {"q": "deg"}
+
+
+def test_a_counter_that_starts_again_in_one_motion_is_no_joint() -> None:
+    columns = good() | {"frame": np.arange(1200.0) % 4, "bit": np.arange(1200.0) % 2}
+    assert list(unstacked(parse(text(columns))).columns) == list(columns)
+
+
+def test_every_digit_of_a_plain_file_is_read() -> None:
+    table = parse(text(good()))
+    assert equal(table)
+    assert not table.checks
+    assert table.place(0) == "line 2"
+
+
+def with_commas(content: str) -> str:
+    return content.replace(",", ";").replace(".", ",")
+
+
+DIALECTS: dict[str, Callable[[str], bytes]] = {
+    "semicolon and decimal comma": lambda s: with_commas(s).encode(),
+    "tab": lambda s: s.replace(",", "\t").encode(),
+    "tab and decimal comma": lambda s: s.replace(",", "\t").replace(".", ",").encode(),
+    "blanks": lambda s: s.replace(",", "   ").encode(),
+    "bar": lambda s: s.replace(",", "|").encode(),
+    "byte order mark": lambda s: b"\xef\xbb\xbf" + s.encode(),
+    "UTF-16 with mark": lambda s: s.encode("utf-16"),
+    "UTF-16 without mark": lambda s: s.encode("utf-16-le"),
+    "windows line ends": lambda s: s.replace("\n", "\r\n").encode(),
+    "old mac line ends": lambda s: s.replace("\n", "\r").encode(),
+    "quotes": lambda s: "\n".join(",".join(f'"{c}"' for c in line.split(",")) for line in s.splitlines()).encode() + b"\n",
+    "comments above": lambda s: b"# robot 7\n# 2024\n" + s.encode(),
+    "header in a comment": lambda s: b"# " + s.encode(),
+    "words above the table": lambda s: b"Exported by LoggerPro\n\n" + s.encode(),
+}
+
+
+@pytest.mark.parametrize("name", DIALECTS)
+def test_f16_a_dialect_is_found_out(name: str) -> None:
+    """F16: the same numbers in any dialect are the same samples."""
+    assert equal(parse(DIALECTS[name](text(good()))))
+
+
+@pytest.mark.parametrize("name", ["semicolon and decimal comma", "byte order mark", "UTF-16 with mark", "UTF-16 without mark",
+                                  "words above the table"])
+def test_f16_an_unusual_dialect_is_said(name: str) -> None:
+    assert levels(parse(DIALECTS[name](text(good())))).get("F16") == "warn"
+
+
+def test_f16_two_numbers_a_line_with_decimal_commas_are_two_columns() -> None:
+    """`0,001;1,5` is what pandas alone reads as one column."""
+    table = parse("t;q\n" + "".join(f"0,{i:03d};1,{i:03d}\n" for i in range(50)))
+    assert table.columns["t"][7] == 0.007
+    assert table.columns["q"][7] == 1.007
+
+
+def test_f16_comma_as_delimiter_and_decimal_is_refused() -> None:
+    with pytest.raises(InputRejected, match=r"RRID-F16.*line 2 has 4 cells under 2 names.*semicolon"):
+        parse("t,q\n" + "0,001,1,5\n" * 30)
+
+
+def test_f16_a_nul_byte_is_refused_with_its_line() -> None:
+    content = text(good()).encode()
+    with pytest.raises(InputRejected, match=r"RRID-F16.*NUL byte in line 2\b"):
+        parse(content[:100] + b"\0" + content[100:])
+
+
+def test_f09_nul_bytes_at_the_end_are_a_lost_power_supply() -> None:
+    table = parse(text(good()).encode() + b"\0" * 512)
+    assert equal(table)
+    assert levels(table) == {"F09": "repair"}
+
+
+@pytest.mark.parametrize("cell", ["#REF!", "#DIV/0!", "#N/A", "=A2+1", "@SUM(A1)"])
+def test_f16_a_spreadsheet_error_is_refused_with_its_line(cell: str) -> None:
+    rows = lines()
+    cells = rows[41].split(",")
+    rows[41] = ",".join([*cells[:2], cell, *cells[3:]])
+    with pytest.raises(InputRejected, match=r"RRID-F16.*line 42.*in column 'q_2'.*spreadsheet"):
+        parse("\n".join(rows) + "\n")
+
+
+def test_f09_a_cut_last_line_is_left_out() -> None:
+    content = text(good())
+    table = parse(content[:-60])
+    assert levels(table) == {"F09": "repair"}
+    assert "line 1201" in table.checks[0].message
+    assert equal(table, slice(0, -1))
+
+
+def test_f09_a_last_line_without_line_end_is_not_trusted() -> None:
+    """Cut inside the last number, the line still has all its cells: a wrong number must not come through."""
+    table = parse(text(good())[:-4])
+    assert levels(table) == {"F09": "warn"}
+    assert equal(table, slice(0, -1))
+
+
+@given(cut=st.integers(200, len(text(good())) - 1))
+@settings(max_examples=40, deadline=None)
+def test_f09_no_cut_gives_a_wrong_number(cut: int) -> None:
+    table = parse(text(good())[:cut])
+    assert equal(table, slice(0, table.rows.size))
+
+
+def test_f09_a_line_out_of_step_is_left_out_and_named() -> None:
+    rows = lines()
+    rows[500] = rows[500].rsplit(",", 2)[0]
+    table = parse("\n".join(rows) + "\n")
+    assert levels(table) == {"F09": "repair"}
+    assert "line 501 (5 cells, not 7)" in table.checks[0].message
+    assert table.rows.size == 1199
+    assert table.breaks == (499,)
+    assert table.rows[499] == 500
+
+
+def test_f09_a_garbled_number_is_a_damaged_line() -> None:
+    rows = lines()
+    rows[500] = rows[500].replace("0.", "0x.", 1)
+    assert "line 501" in parse("\n".join(rows) + "\n").checks[0].message
+
+
+def test_f09_much_damage_is_refused() -> None:
+    rows = lines()
+    for k in range(100, 130):
+        rows[k] = rows[k].rsplit(",", 1)[0]
+    with pytest.raises(InputRejected, match=r"RRID-F09.*30 of 1200 lines.*line 101 \(6 cells.*Export"):
+        parse("\n".join(rows) + "\n")
+
+
+@pytest.mark.parametrize("sign", [",", " "])
+def test_f09_messages_between_the_rows_are_left_out_and_named(sign: str) -> None:
+    """No sample is lost by them; a row that a message tore is damaged as before, and many messages are refused."""
+    said = "[WARN] [1714744933.305000]: control loop missed its rate of 200 Hz"
+    rows = "\n".join(lines()).replace(",", sign).split("\n")
+    table = parse("\n".join([*rows[:100], said, *rows[100:700], said, *rows[700:]]) + "\n")
+    assert "2 lines of text between the rows left out, the first is line 101: '[WARN]" in table.checks[-1].message
+    assert table.rows.size == 1200
+    assert table.breaks == ()
+    torn = parse("\n".join([*rows[:100], rows[100][:30] + said, *rows[101:]]) + "\n")
+    assert torn.breaks == (99,)
+    with pytest.raises(InputRejected, match="RRID-F09"):
+        parse("\n".join(part for k, row in enumerate(rows) for part in (row, said)[: 1 + (k % 5 == 4)]) + "\n")
+
+
+def test_f16_a_further_table_below_the_first_is_refused_with_its_line() -> None:
+    """Its numbers would go on under the names of the first."""
+    rows = lines()
+    names = ",".join(f"other_{k}" for k in range(7))
+    with pytest.raises(InputRejected, match=r"RRID-F16.*line 602.*a further table begins, of other_0.*file of its own"):
+        parse("\n".join([*rows[:601], names, *rows[601:]]) + "\n")
+
+
+def test_cells_that_julia_left_missing_are_no_numbers() -> None:
+    rows = lines()
+    for k in range(100, 130):
+        rows[k] = rows[k].rsplit(",", 1)[0] + ",missing"
+    assert int(np.isnan(parse("\n".join(rows) + "\n").columns["tau_3"]).sum()) == 30
+
+
+def test_s03_two_columns_of_one_name_are_both_named() -> None:
+    with pytest.raises(InputRejected, match=r"RRID-S03.*line 1.*columns 2, 3 are all named 'q_1'"):
+        parse(text(good()).replace("q_2", "q_1", 1))
+
+
+def test_a_column_of_words_is_kept_apart() -> None:
+    rows = lines()
+    table = parse("\n".join([rows[0] + ",state", *(row + ",RUN" for row in rows[1:])]) + "\n")
+    assert equal(table)
+    assert table.text == {"state": "RUN"}
+    with pytest.raises(InputRejected, match="RRID-S12.*'state'.*RUN"):
+        table.name_of("state")
+
+
+def test_units_in_the_header_are_found() -> None:
+    table = parse(text(good()).replace("t,q_1", "t [ms],q_1 (deg)", 1))
+    assert table.units == {"t": "ms", "q_1": "deg"}
+    below = lines()
+    table = parse("\n".join([below[0], "s,rad,rad,rad,Nm,Nm,Nm", *below[1:]]) + "\n")
+    assert table.units["tau_3"] == "Nm"
+    assert equal(table)
+
+
+def test_f01_nothing_in_it() -> None:
+    with pytest.raises(InputRejected, match="RRID-F01"):
+        parse("\n# only a comment\n\n")
+
+
+def test_t08_a_header_alone() -> None:
+    with pytest.raises(InputRejected, match="RRID-T08"):
+        parse("t,q_1\n")

@@ -1,0 +1,267 @@
+"""A log is the same log in either container, and the files are what the format says."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from pipelines.batch.items import find_items
+from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
+from pipelines.io.experiment import Controller, Derived, Signal
+from pipelines.io.files import find_logs, open_log, write_log
+from tests.io.logs import ROBOT_TEXT, random_log, small_log
+from tests.seeds import seeds
+
+BOTH = pytest.mark.parametrize("ending", [".h5", ".parquet"])
+
+
+@pytest.mark.parametrize("seed", seeds(40, 10))
+def test_there_and_back_is_bit_for_bit(tmp_path: Path, seed: int) -> None:
+    """HDF5 to Parquet and back keeps every sample's bits and every attribute, and the same bytes of HDF5 come out."""
+    log = random_log(np.random.default_rng(seed))
+    first, second, third = tmp_path / "a.h5", tmp_path / "b.parquet", tmp_path / "c.h5"
+    write_log(first, log)
+    write_log(second, open_log(first).log)
+    write_log(third, open_log(second).log)
+    assert open_log(third).log == log
+    assert open_log(second).log == log
+    assert first.read_bytes() == third.read_bytes()
+
+
+def test_equality_notices_one_bit_and_one_attribute() -> None:
+    """Equality is strict enough for the test above to be able to fail."""
+    log = small_log()
+    q = log.q.copy()
+    q[7, 1] = np.nextafter(q[7, 1], 9.0)
+    assert replace(log, signals={**log.signals, "q": Signal(q, "rad", log.signals["q"].long_name)}) != log
+    assert replace(log, torque=None) != log
+    assert replace(log, controller=replace(log.controller, delay=0)) != log
+    assert replace(log, controller=replace(log.controller, kp=np.array([1500, 1100, 140.0000001]))) != log
+
+
+def test_independent_checker_accepts_what_is_written(tmp_path: Path, shared: Path) -> None:
+    """The strict checker, written apart from the project, finds no fault."""
+    write_log(tmp_path / "small.h5", small_log())
+    done = subprocess.run([sys.executable, shared / "tools/check_log.py", tmp_path], capture_output=True, text=True, check=False)
+    assert done.stdout == "1 checked, 0 faulty\n"
+    assert done.returncode == 0
+
+
+def test_layout_is_the_formats(tmp_path: Path) -> None:
+    """Chunks of (65536, 1), gzip-1, shuffle, fletcher32; Parquet with zstd, byte-stream-split and no dictionary."""
+    log = small_log(samples=70_000)
+    write_log(tmp_path / "a.h5", log)
+    write_log(tmp_path / "a.parquet", log)
+    with h5py.File(tmp_path / "a.h5") as file:
+        q = file["signals/q"]
+        assert (q.chunks, q.compression, q.compression_opts, q.shuffle, q.fletcher32) == ((65536, 1), "gzip", 1, True, True)
+    column = pq.ParquetFile(tmp_path / "a.parquet").metadata.row_group(0).column(1)
+    assert column.compression == "ZSTD"
+    assert column.path_in_schema == "q_1"
+    assert "BYTE_STREAM_SPLIT" in column.encodings
+    assert not column.has_dictionary_page
+
+
+@BOTH
+def test_a_newer_version_is_refused_by_name(tmp_path: Path, ending: str) -> None:
+    """F11: the message names the version this program understands."""
+    path = tmp_path / f"a{ending}"
+    write_log(path, small_log())
+    if ending == ".h5":
+        with h5py.File(path, "a") as file:
+            file.attrs["format_version"] = 2
+    else:
+        table = pq.read_table(path)
+        text = table.schema.metadata[b"rrrid"].replace(b'"format_version":1', b'"format_version":2')
+        pq.write_table(table.replace_schema_metadata({b"rrrid": text}), path)
+    with pytest.raises(InputRejected, match=r"RRID-F11 .*format_version 2; this program understands version 1"):
+        open_log(path)
+
+
+def test_a_foreign_log_without_digest_is_read_with_one_warning(tmp_path: Path) -> None:
+    """F05: other programs' logs may lack the digest; that is said once, and the numbers are theirs."""
+    path = tmp_path / "a.h5"
+    write_log(path, small_log())
+    with h5py.File(path, "a") as file:
+        del file.attrs["digest"]
+    opened = open_log(path)
+    assert opened.log == small_log()
+    assert [(check.code, check.level) for check in opened.checks] == [("RRID-F05", "warn")]
+
+
+def test_matlab_style_attributes_are_understood(tmp_path: Path) -> None:
+    """Programs that know only doubles and fixed-length bytes write the same log."""
+    path, log = tmp_path / "a.h5", small_log(experiment="friction", joint=2)
+    write_log(path, log)
+    with h5py.File(path, "a") as file:
+        del file.attrs["digest"]
+        file.attrs["joint"] = 2.0
+        file.attrs["role"] = np.bytes_("identify")
+        file["controller"].attrs["delay"] = np.float32(1.0)
+    assert open_log(path).log == log
+
+
+@BOTH
+@pytest.mark.parametrize(("change", "code", "words"), [
+    ({"joint": 4, "experiment": "friction"}, "S20", "outside 1"),
+    ({"joint": 1}, "S20", "does not have"),
+    ({"experiment": "friction"}, "S20", "needs"),
+    ({"recorded": "yesterday"}, "S20", "ISO 8601"),
+    ({"posture": np.zeros(2)}, "S20", "posture has 2"),
+    ({"role": "bogus"}, "S20", "identify, validate, reference"),
+    ({"name": " "}, "S20", "not empty"),
+    ({"name": "a\0b"}, "S20", "without NUL"),
+    ({"robot_name": "\ud800"}, "S20", "UTF-8"),
+    ({"robot_text": ROBOT_TEXT + "# \0"}, "S20", "UTF-8 without NUL"),
+    ({"sample_time": float("nan")}, "S20", "positive number of seconds"),
+    ({"sample_time": -1e-3}, "S20", "positive number of seconds"),
+    ({"sample_time": 5e-324}, "S20", "positive number of seconds"),
+    ({"sample_time": 10**400}, "S20", "real number that a float can hold"),
+    ({"posture": np.array([0.0, np.nan, 0.0])}, "S20", "finite"),
+    ({"recorded": "2024-99-99T99:99:99Z"}, "S20", "ISO 8601"),
+    ({"controller": Controller("bogus")}, "S20", "law"),
+    ({"controller": Controller("pd", kp=[1, np.nan, 1], kd=[1, 1, 1])}, "S20", "kp.*finite"),
+    ({"controller": Controller("unknown", delay=2)}, "S20", "delay.*one of 0, 1"),
+    ({"controller": Controller("unknown", output_limit=[1, -1, 1])}, "S20", "output_limit"),
+    ({"derived": Derived("import", "no json", "0", "2024-01-01T00:00:00Z")}, "S20", "settings.*JSON"),
+    ({"derived": Derived("import", "{}", "0", "soon")}, "S20", "created.*ISO 8601"),
+    ({"origin": "planned"}, "S20", "references only, but there is q, tau"),
+])
+def test_a_writer_refuses_what_is_not_a_log(tmp_path: Path, ending: str, change: dict[str, object], code: str, words: str) -> None:
+    """Nothing reaches the disk that a reader would have to refuse."""
+    with pytest.raises(InputRejected, match=f"RRID-{code} .*{words}"):
+        write_log(tmp_path / f"a{ending}", small_log(**change))
+    assert list(tmp_path.iterdir()) == []
+
+
+@BOTH
+@pytest.mark.parametrize(("signal", "code", "words"), [
+    (Signal(small_log().tau, "furlong", "x"), "S05", "'furlong', the format wants 'N m'"),
+    (Signal(small_log().tau, "", "x"), "S05", "the format wants 'N m'"),
+    (Signal(small_log().tau, "N m", "\ud800"), "S20", "UTF-8"),
+])
+def test_a_writer_refuses_other_units(tmp_path: Path, ending: str, signal: Signal, code: str, words: str) -> None:
+    """Everything inside a log is SI: a writer converts nothing, and writes nothing else."""
+    log = small_log()
+    with pytest.raises(InputRejected, match=f"RRID-{code} .*{words}"):
+        write_log(tmp_path / f"a{ending}", replace(log, signals={**log.signals, "tau": signal}))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_another_spelling_of_si_is_read_as_si(tmp_path: Path) -> None:
+    """"Nm" is "N m": the log that comes of it can be written again."""
+    write_log(tmp_path / "a.h5", small_log())
+    with h5py.File(tmp_path / "a.h5", "a") as file:
+        del file.attrs["digest"]
+        file["signals/tau"].attrs["units"] = "Nm"
+    assert open_log(tmp_path / "a.h5").log == small_log()
+
+
+@pytest.mark.parametrize(("key", "value"), [("sample_time", 10**400), ("joint", 10**400), ("period", 5e-324), ("name", "\ud800"),
+                                            ("posture", [10**400] * 3)])
+def test_numbers_and_texts_beyond_all_bounds_in_parquet(tmp_path: Path, key: str, value: object) -> None:
+    """S20, not a traceback: JSON holds integers and texts that nothing else can."""
+    write_log(tmp_path / "a.parquet", small_log())
+    table = pq.read_table(tmp_path / "a.parquet")
+    about = json.loads(table.schema.metadata[b"rrrid"]) | {key: value}
+    pq.write_table(table.replace_schema_metadata({b"rrrid": json.dumps(about).encode()}), tmp_path / "a.parquet")
+    with pytest.raises(InputRejected, match=f"RRID-S20 .*{key}"):
+        open_log(tmp_path / "a.parquet")
+
+
+def test_unknown_ending_is_a_usage_error(tmp_path: Path) -> None:
+    """The ending chooses the container; another one is refused with the two that are."""
+    with pytest.raises(UsageError, match=r"RRID-C02 .*\.h5 or \.parquet"):
+        write_log(tmp_path / "a.mat", small_log())
+
+
+def test_find_logs_passes_over_what_is_not_meant(tmp_path: Path) -> None:
+    """Hidden files, temporary files, rrrid's own output, links to folders and circles of links are no inputs; a linked log is."""
+    for name in ("a.h5", "deep/b.parquet", ".rrrid-tmp-1-x.h5", "own/logs/c.h5", "outside/d.h5"):
+        (tmp_path / "in" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "in" / name).write_bytes(b"x")
+    (tmp_path / "in/outside").rename(tmp_path / "outside")
+    (tmp_path / "in/own/provenance.json").write_text("{}")
+    (tmp_path / "in/link.h5").symlink_to(tmp_path / "outside/d.h5")
+    (tmp_path / "in/loop").symlink_to(tmp_path / "in")
+    (tmp_path / "in/x.h5").symlink_to("y.h5")
+    (tmp_path / "in/y.h5").symlink_to("x.h5")
+    paths, checks = find_logs([tmp_path / "in"])
+    assert [p.relative_to(tmp_path / "in").as_posix() for p in paths] == ["a.h5", "deep/b.parquet", "link.h5"]
+    assert {(c.code, Path(c.where).name) for c in checks} == {("RRID-X11", name) for name in ("loop", "x.h5", "y.h5")}
+    assert [p.name for p in find_logs([tmp_path / "in/own"])[0]] == ["c.h5"]
+
+
+def test_nothing_there_is_said(tmp_path: Path) -> None:
+    """C06 and C04: an empty folder matches nothing (5); a path that does not exist is a wrong call (2)."""
+    with pytest.raises(NothingMatched, match="RRID-C06"):
+        find_logs([tmp_path])
+    with pytest.raises(UsageError, match="RRID-C04"):
+        find_logs([tmp_path / "nowhere"])
+
+
+def test_where_nothing_is_but_links_and_results_they_are_named(tmp_path: Path) -> None:
+    """X11: a folder of links to logs, or of results, is not empty: the error names what was passed over, and what to give."""
+    (tmp_path / "two").mkdir()
+    for name in "ab":
+        (tmp_path / "logs" / name).mkdir(parents=True)
+        (tmp_path / "two" / name).symlink_to(tmp_path / "logs" / name)
+    with pytest.raises(NothingMatched, match=r"RRID-C06 .*no log there; .* here 2\. Give what .*: \S*two/a \S*two/b\."):
+        find_logs([tmp_path / "two"])
+    (tmp_path / "two/b").unlink()
+    write_log(tmp_path / "two/c/logs/c.h5", small_log())
+    (tmp_path / "two/c/provenance.json").write_text('{"tool": "rrrid"}')
+    with pytest.raises(NothingMatched, match=r"here 2\. .*: \S*two/a \S*two/c\."):
+        find_items(tmp_path / "two")
+    assert find_logs([tmp_path / "two/c"])[0]
+
+
+def test_recordings_and_results_are_sought_two_levels_below(tmp_path: Path) -> None:
+    """Not farther, nor in hidden folders; a path with a blank is quoted."""
+    for place in ("x/y/z/r", ".hidden/r"):
+        (tmp_path / place / "logs").mkdir(parents=True)
+        (tmp_path / place / "provenance.json").write_text('{"tool": "rrrid"}')
+        (tmp_path / place / "run.csv").write_text("t,q")
+    with pytest.raises(NothingMatched, match=r"no log there\. Logs end"):
+        find_logs([tmp_path])
+    (tmp_path / "x/run 1.csv").write_text("t,q")
+    with pytest.raises(NothingMatched, match=r"import --guess '\S*x/run 1\.csv'"):
+        find_logs([tmp_path])
+    (tmp_path / "a result/logs").mkdir(parents=True)
+    (tmp_path / "a result/provenance.json").write_text('{"tool": "rrrid"}')
+    with pytest.raises(NothingMatched, match=r"here 1\. .*: '\S*a result'"):
+        find_logs([tmp_path])
+
+
+def test_no_permission_is_the_environment(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """F13: exit 6. (Root may read everything, so the operating system's answer is set here.)"""
+    path = tmp_path / "a.h5"
+    write_log(path, small_log())
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(EnvironmentFault, match="RRID-F13 .*permission denied"):
+        open_log(path)
+
+
+@BOTH
+def test_a_part_of_a_log_is_the_part(tmp_path: Path, ending: str) -> None:
+    """Only the named signals are read, t, q and tau always among them; their samples are those of the whole."""
+    log = small_log()
+    write_log(tmp_path / f"a{ending}", log)
+    part = open_log(tmp_path / f"a{ending}", only=("q_ref",)).log
+    assert list(part.signals) == ["t", "q", "tau", "q_ref"]
+    assert all(part.signals[name] == log.signals[name] for name in part.signals)
+
+
+def test_a_path_may_be_a_text(tmp_path: Path) -> None:
+    """From Python, as anywhere: open_log("x.h5") and write_log("x.h5", log)."""
+    for name in ("a.h5", "a.parquet"):
+        write_log(str(tmp_path / name), small_log())
+        assert open_log(str(tmp_path / name)).log == small_log()

@@ -1,0 +1,119 @@
+"""model.json: its schema, its canonical text, and what is refused."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.io.model_file import ModelFile, model_schema, model_text, parse_model, read_model
+from sample_logs.make_model import example_text
+
+
+@pytest.fixture(scope="module")
+def example(samples: Path) -> Path:
+    return samples / "models" / "rrr.json"
+
+
+def test_the_example_is_what_its_script_makes(example: Path) -> None:
+    """models/rrr.json is rebuilt to the same bytes."""
+    assert example.read_text(encoding="utf-8") == example_text()
+
+
+def test_the_example_fits_the_schema(example: Path) -> None:
+    """The schema is a valid one, and the example keeps it."""
+    schema = model_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(json.loads(example.read_text(encoding="utf-8")), schema)
+
+
+def test_there_and_back_byte_for_byte(example: Path) -> None:
+    """Reading and writing changes nothing."""
+    model = read_model(example)
+    text = example.read_text(encoding="utf-8")
+    assert model_text(model) == text
+    assert parse_model(text) == model
+
+
+def test_what_is_not_finite_is_written_as_null(example: Path) -> None:
+    """Infinity is no JSON."""
+    model = read_model(example)
+    unsure = replace(model.base_parameters[0], std=float("inf"))
+    wide = replace(model, base_parameters=(unsure, *model.base_parameters[1:]))
+    assert json.loads(model_text(wide))["base_parameters"][0]["std"] is None
+    assert parse_model(model_text(wide)).base_parameters[0].std is None
+
+
+def changed(change: Callable[[dict[str, Any]], object]) -> Callable[[str], str]:
+    def edit(text: str) -> str:
+        table = json.loads(text)
+        change(table)
+        return json.dumps(table)
+    return edit
+
+
+@pytest.mark.parametrize(("edit", "code", "message"), [
+    (lambda text: text[:200], "S18", "JSON is broken"),
+    (lambda text: "[" * 100_000, "S18", "not a model file"),
+    (lambda text: "[]", "S18", "rrrid-model"),
+    (lambda text: text.replace("0.2921", "NaN"), "S18", "NaN is not JSON"),
+    (lambda text: text.replace("0.2921", "1e999"), "S18", "finite"),
+    (lambda text: text.replace('"name": "p1"', '"name": "p1", "name": "p2"'), "S18", "stands twice"),
+    (changed(lambda t: t.update(format="rrrid-log")), "S18", "format"),
+    (changed(lambda t: t.update(format_version=2)), "F11", "understands up to 1"),
+    (changed(lambda t: t.update(format_version=0)), "S18", "format_version"),
+    (changed(lambda t: t.update(format_version=True)), "S18", "format_version"),
+    (changed(lambda t: t.pop("robot")), "S18", "robot is missing"),
+    (changed(lambda t: t.update(efects=[])), "S18", "did you mean 'effects'"),
+    (changed(lambda t: t["base_parameters"][2].update(vale=1.0)), "S18", r"base_parameters\[2\].vale .* 'value'"),
+    (changed(lambda t: t["base_parameters"][2].update(value="0.1")), "S18", r"base_parameters\[2\].value"),
+    (changed(lambda t: t["base_parameters"][2].update(origin="guessed")), "S18", "origin"),
+    (changed(lambda t: t["friction"][0]["parameters"]["f1"].pop("unit")), "S18", "f1.unit is missing"),
+    (changed(lambda t: t["validity"].update(speed=[[0.0]])), "S18", "validity.speed"),
+    (changed(lambda t: t["validity"].update(speed=[[1.0, -1.0]])), "S18", "validity.speed runs"),
+    (changed(lambda t: t["base_parameters"][2].update(std=-0.1)), "S18", "std of p3 is -0.1"),
+    (changed(lambda t: t["base_parameters"].append(t["base_parameters"][0])), "S18", "p1 stands twice"),
+])
+def test_what_is_no_model_is_refused(example: Path, edit: Callable[[str], str], code: str, message: str) -> None:
+    """Broken, foreign, newer or mistyped: one error that names the place."""
+    with pytest.raises(InputRejected, match=message) as caught:
+        parse_model(edit(example.read_text(encoding="utf-8")), where="model.json")
+    assert caught.value.code == f"RRID-{code}"
+    assert caught.value.where == "model.json"
+
+
+def test_files_that_cannot_be_models(tmp_path: Path) -> None:
+    """Missing is wrong usage; bytes that are no text are rejected input."""
+    with pytest.raises(UsageError, match="RRID-C04") as caught:
+        read_model(tmp_path / "model.json")
+    assert caught.value.exit_code == 2
+    (tmp_path / "bytes.json").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(InputRejected, match="RRID-S18"):
+        read_model(tmp_path / "bytes.json")
+    with pytest.raises(InputRejected, match="RRID-F12"):
+        read_model(tmp_path)
+
+
+def test_the_example_is_found_by_its_name(example: Path) -> None:
+    """As robots and recipes are."""
+    assert read_model("rrr") == read_model(example)
+
+
+def test_defaults_may_be_left_out() -> None:
+    """A model without effects, sources or notes needs no empty lists; format and version always stand."""
+    least = {"format": "rrrid-model", "format_version": 1, "name": "a", "robot": "", "base_parameters": []}
+    assert parse_model(json.dumps(least)) == ModelFile("a", "", ())
+
+
+def test_pydantic_is_not_imported_until_a_model_is_read() -> None:
+    """Help and logs do not pay for it."""
+    script = "import sys, pipelines.io.model_file, pipelines.model.arm; sys.exit('pydantic' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0

@@ -1,0 +1,154 @@
+"""Which logs go together: one robot and one day, what was before, and what the user named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from pipelines.io.files import Opened
+from pipelines.io.inputs import Inputs
+from pipelines.io.mixed import SeveralSessions, check_alike, of_one_session, refuse_mixed
+from pipelines.io.sessions import apart, called
+from tests.io.logs import ROBOT_TEXT, small_log
+
+DAY, NEXT, LATER = "2026-03-02T09:00:00Z", "2026-03-03T09:00:00Z", "2026-05-18T09:00:00Z"
+
+
+def opened(name: str, folder: str = "logs", **about: object) -> Opened:
+    """A log of 20 samples in a file of its name; files of equal names in two folders differ."""
+    path = Path(folder) / f"{name}.h5"
+    return Opened(path, str(path), small_log(20, name=name, **about), ())
+
+
+def together(*logs: Opened, named: tuple[Opened, ...] = ()) -> dict[str, set[str]]:
+    """The names of the logs of every session."""
+    return {one.name: {o.log.name for o in one.logs} for one in apart((*logs, *named), [o.path for o in named])}
+
+
+def test_one_description_is_two_robots_where_they_have_two_names() -> None:
+    """Two arms of one make are told apart by `robot_name` alone, and two descriptions of one name by the description."""
+    found = together(opened("a", robot_name="arm-a", recorded=DAY), opened("b", robot_name="arm-b", recorded=None))
+    assert found == {"arm-a 2026-03-02": {"a"}, "arm-b": {"b"}}
+    other = ROBOT_TEXT.replace("9.8062", "9.81")
+    assert list(together(opened("a", recorded=DAY), opened("b", recorded=DAY, robot_text=other)).values()) == [{"a"}, {"b"}]
+
+
+def test_what_the_user_named_for_a_role_goes_with_every_day() -> None:
+    """Fitted on one day and judged on another: that is asked for. What nobody named is still told apart."""
+    first, second, third = opened("a", recorded=DAY), opened("b", recorded=NEXT), opened("c", recorded=LATER)
+    assert list(together(named=(first, second)).values()) == [{"a", "b"}]
+    assert list(together(first, named=(third,)).values()) == [{"a", "c"}]
+    assert list(together(first, second, named=(third,)).values()) == [{"a", "c"}, {"b", "c"}]
+
+
+def test_a_day_that_only_judges_goes_with_the_day_it_judges() -> None:
+    """Fitted on Monday and judged on Tuesday: by itself Tuesday says nothing. Whoever fits on both days has two sessions."""
+    monday, tuesday = opened("a", recorded=DAY), opened("b", recorded=NEXT, role="validate")
+    assert list(together(monday, tuesday).values()) == [{"a", "b"}]
+    assert list(together(tuesday, opened("c", recorded=LATER)).values()) == [{"b", "c"}]
+    both = together(monday, tuesday, opened("c", recorded=LATER), opened("d", recorded=LATER, role="validate"))
+    assert list(both.values()) == [{"a", "b"}, {"c", "d"}]
+    assert list(together(tuesday, opened("d", recorded=LATER, role="validate")).values()) == [{"b"}, {"d"}]
+
+
+def test_another_day_that_judges_is_said() -> None:
+    """A year later, and told as an error of the model otherwise. One that the user named to judge is no news."""
+    monday, tuesday = opened("a", recorded=DAY), opened("b", recorded=LATER, role="validate")
+    (said,) = check_alike(Inputs((monday, tuesday)))
+    assert (said.code, said.level, said.where) == ("RRID-S21", "warn", "rrr-tue 2026-03-02")
+    assert "2026-05-18" in said.message
+    assert not check_alike(Inputs((monday, tuesday), named=frozenset([tuesday.path])))
+    assert not check_alike(Inputs((monday, opened("c", recorded=DAY, role="validate"))))
+
+
+@pytest.mark.parametrize("role", ["identify", "validate"])
+def test_a_log_that_tells_no_day_is_of_no_other(role: str) -> None:
+    """Beside one day it is of that; beside two nobody knows of which."""
+    undated, first, second = opened("a", recorded=None, role=role), opened("b", recorded=DAY), opened("c", recorded=NEXT)
+    assert list(together(undated, first).values()) == [{"b", "a"}]
+    assert list(together(undated, first, second).values()) == [{"a"}, {"b"}, {"c"}]
+
+
+def test_a_robot_of_one_day_is_called_by_its_name() -> None:
+    """Without its date, as long as it has no other."""
+    a, b, later = (opened("a", robot_name="arm-a", recorded=DAY), opened("b", robot_name="arm-b", recorded=DAY),
+                   opened("c", robot_name="arm-a", recorded=NEXT))
+    one = called("arm-a", apart((a, b)))
+    assert one is not None
+    assert one.logs == (a,)
+    assert called("arm-a", apart((a, b, later))) is None
+
+
+def test_a_named_log_of_another_robot_stays_apart() -> None:
+    assert len(together(opened("a"), named=(opened("b", robot_name="arm-b"),))) == 2
+
+
+def test_a_plan_is_no_day_of_its_own() -> None:
+    """A trajectory beside the logs that were recorded along it was never recorded."""
+    assert list(together(opened("a", recorded=DAY), opened("plan", origin="planned", recorded=None)).values()) == [{"a", "plan"}]
+
+
+@pytest.mark.parametrize(("times", "sessions"), [
+    (("2026-03-02T22:30:00Z", "2026-03-02T23:50:00Z", "2026-03-03T00:20:00Z"), 1),  # an afternoon on the west coast
+    (("2026-03-02T22:30:00Z", "2026-03-03T02:00:00Z"), 2),  # a pause of more than three hours
+    (("2026-03-02T10:00:00Z", "2026-03-02T23:50:00Z", "2026-03-03T00:20:00Z"), 2),  # fourteen hours in all
+    (("2026-03-02T23:50:00Z", "2026-03-03"), 2),  # nobody told the hour
+    (("2026-03-02T23:50:00Z", "2026-03-04T00:10:00Z"), 2),
+])
+def test_midnight_alone_ends_no_session(times: tuple[str, ...], sessions: int) -> None:
+    """Days are UTC: a session may begin on one and end on the next. A machine that logs every hour still has its days."""
+    logs = [opened(str(i), recorded=time) for i, time in enumerate(times)]
+    assert len(together(*logs)) == sessions
+    hourly = [opened(str(i), recorded=f"2026-03-{2 + i // 24:02d}T{i % 24:02d}:00:00Z") for i in range(72)]
+    assert len(together(*hourly)) == 3
+
+
+def test_several_robots_are_refused_with_the_names_of_all() -> None:
+    """The error says what is whose."""
+    a, b = opened("a", robot_name="arm-a"), opened("b", "other", robot_name="arm-b")
+    with pytest.raises(SeveralSessions, match=r"several robots: arm-a.* \(1 log in logs\); arm-b.* \(1 log in other\)") as refused:
+        of_one_session(Inputs((a, b)))
+    assert [name.split()[0] for name in refused.value.names] == ["arm-a", "arm-b"]
+    assert refused.value.exit_code == 2
+    assert refused.value.as_dict()["sessions"] == list(refused.value.names)
+    assert of_one_session(Inputs((b,))).logs == (b,)
+
+
+def test_the_list_of_many_days_is_complete() -> None:
+    logs = [opened(str(i), recorded=f"2026-03-{i:02d}T09:00:00Z") for i in range(1, 29)]
+    with pytest.raises(SeveralSessions) as refused:
+        of_one_session(Inputs(tuple(logs)))
+    assert all(f"rrr-tue 2026-03-{i:02d}" in str(refused.value) for i in range(1, 29))
+
+
+def test_each_of_several_folders_is_of_one_session_by_itself() -> None:
+    """Commands that take each log by itself accept the folders of two days, and logs that were named one by one."""
+    monday, tuesday = opened("a", "monday", recorded=DAY), opened("b", "tuesday", recorded=NEXT)
+    refuse_mixed(Inputs((monday, tuesday)), (Path("monday"), Path("tuesday")))
+    refuse_mixed(Inputs((monday, tuesday)), ())
+    with pytest.raises(SeveralSessions):
+        refuse_mixed(Inputs((monday, opened("c", "monday", recorded=NEXT))), (Path("monday"),))
+
+
+def test_reference_logs_are_of_both_days_and_none_by_themselves() -> None:
+    """Of two later days each is compared with what was before; that is no third session."""
+    before = opened("r", recorded=DAY, role="reference")
+    with pytest.raises(SeveralSessions) as refused:
+        of_one_session(Inputs((before, opened("a", recorded=NEXT), opened("b", recorded=LATER))))
+    assert refused.value.names == ("rrr-tue 2026-03-03", "rrr-tue 2026-05-18")
+    later = (before, opened("a", recorded=LATER))
+    assert of_one_session(Inputs(later)).logs == later
+
+
+def test_two_folders_that_nothing_tells_apart_are_said() -> None:
+    """Two imports of one recipe have logs of the same names: they may be of two machines, and nothing in them says so."""
+    (said,) = check_alike(Inputs((opened("run", "left"), opened("run", "right"), opened("more", "right"))))
+    assert (said.code, said.level) == ("RRID-S21", "warn")
+    assert "left, right" in said.message
+
+
+@pytest.mark.parametrize("other", [{"robot_name": "arm-b"}, {"recorded": NEXT}, {"role": "reference"}, {"name": "walk"}])
+def test_folders_of_one_session_are_no_news(other: dict[str, object]) -> None:
+    """Folders by kind, by day, by robot, before and after: all in order, and nothing is said."""
+    assert not check_alike(Inputs((opened("run", "left"), opened(**({"name": "run", "folder": "right"} | other)))))  # type: ignore[arg-type]

@@ -1,0 +1,304 @@
+"""URDFs: kinematics, limits and links as Pinocchio reads them; everything dangerous or malformed refused by name."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.io.robot import RobotDescription, format_robot, parse_robot
+from pipelines.io.robot_files import load_robot
+from pipelines.io.urdf import chain_from_urdf, import_urdf
+
+_LIMIT = '<limit lower="-1" upper="2" effort="5" velocity="3"/>'
+
+
+def _joint(name: str, parent: str, child: str, kind: str = "revolute", inside: str = '<axis xyz="0 0 1"/>') -> str:
+    return f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>{inside}</joint>'
+
+
+def _robot(*parts: str, links: str = "abc") -> str:
+    return f'<robot name="r">{"".join(f"<link name={chr(34)}{k}{chr(34)}/>" for k in links)}{"".join(parts)}</robot>'
+
+
+def _import(tmp_path: Path, text: str | bytes, tip_link: str | None = None) -> RobotDescription:
+    path = tmp_path / "arm.urdf"
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return import_urdf(path, tip_link)
+
+
+def _refused(tmp_path: Path, text: str | bytes, tip_link: str | None = None) -> UsageError:
+    with pytest.raises(UsageError) as caught:
+        _import(tmp_path, text, tip_link)
+    assert "arm.urdf" in str(caught.value)
+    return caught.value
+
+
+TWO = _robot(_joint("j1", "a", "b", inside='<axis xyz="0 0 2"/>' + _LIMIT), _joint("j2", "b", "c", "continuous"))
+
+
+# what is read
+
+def test_tx40_is_read_as_pinocchio_reads_it(shared: Path) -> None:
+    """Names, limits and link parameters of the real TX40 are Pinocchio's; its own copy of the text gives them again."""
+    path = shared / "real" / "tx40" / "tx40.urdf"
+    robot, model = import_urdf(path), pin.buildModelFromUrdf(str(path))
+    assert [joint.name for joint in robot.joints] == list(model.names)[1:]
+    np.testing.assert_array_equal([j.position for j in robot.joints],
+                                  np.stack([model.lowerPositionLimit, model.upperPositionLimit], axis=1))
+    np.testing.assert_array_equal([j.velocity for j in robot.joints], model.velocityLimit)
+    np.testing.assert_array_equal([j.torque for j in robot.joints], model.effortLimit)
+    assert robot.gravity == (0.0, 0.0, -9.81)
+    assert robot.tip_link == "tool0"
+    _assert_links_equal(robot, model)
+    again = pin.buildModelFromXML(robot.urdf_text)
+    for mine, theirs in zip(again.jointPlacements, model.jointPlacements, strict=True):
+        assert mine.isApprox(theirs, 1e-15)
+
+
+def _assert_links_equal(robot: RobotDescription, model: object) -> None:
+    for joint, inertia in zip(robot.joints, list(model.inertias)[1:], strict=True):  # type: ignore[attr-defined]
+        m, mx, my, mz, xx, xy, yy, xz, yz, zz = inertia.toDynamicParameters()
+        assert joint.link is not None
+        np.testing.assert_allclose(joint.link.mass, m, rtol=1e-15)
+        np.testing.assert_allclose(np.array(joint.link.com) * m, [mx, my, mz], atol=1e-15)
+        np.testing.assert_allclose(joint.link.inertia, [xx, yy, zz, -xy, -xz, -yz], atol=1e-15)
+
+
+def test_links_fixed_to_a_moving_one_are_merged_into_it(tmp_path: Path) -> None:
+    """A motor bolted on askew, with its own inertial axes, moves as part of its link: Pinocchio's merged inertia."""
+    from tests.model.rigid.serial_arms import SKEW_URDF, skew
+
+    arm = skew(tmp_path)
+    _assert_links_equal(arm.robot, arm.model)
+    assert [j.type for j in arm.robot.joints] == ["revolute", "prismatic", "revolute", "revolute"]
+    assert "inertial" in SKEW_URDF
+    assert "inertial" not in str(arm.robot.urdf_text)
+
+
+def test_text_travels_in_the_description(tmp_path: Path) -> None:
+    """The description written and read is equal, and the reduced text gives the same description of the chain."""
+    robot = _import(tmp_path, TWO)
+    assert parse_robot(format_robot(robot)) == robot
+    again = _import(tmp_path, str(robot.urdf_text))
+    assert (again.joints, again.urdf_text, again.tip_link) == (robot.joints, robot.urdf_text, robot.tip_link)
+
+
+def test_toml_beside_a_urdf_embeds_it(tmp_path: Path, shared: Path) -> None:
+    """`urdf = "…"` in a TOML file brings joints, limits and links of the URDF, and keeps what the TOML says itself."""
+    path = tmp_path / "tx40.toml"
+    where = os.path.relpath(shared / "real" / "tx40" / "tx40.urdf", tmp_path)
+    path.write_text(f'name = "mine"\ngravity = [0.0, 1.0, -9.7]\n[kinematics]\nconvention = "urdf"\nurdf = "{where}"\n')
+    robot, plain = load_robot(path), import_urdf(shared / "real" / "tx40" / "tx40.urdf")
+    assert (robot.name, robot.gravity) == ("mine", (0.0, 1.0, -9.7))
+    assert robot.joints == plain.joints
+    assert robot.urdf_text == plain.urdf_text
+    assert load_robot(shared / "real" / "tx40" / "tx40.urdf") == plain
+
+
+def test_missing_and_zero_limits_are_no_limits(tmp_path: Path) -> None:
+    """A joint without limits, or with the zeros that drawing programs write, may turn without end."""
+    zero = '<axis xyz="0 0 1"/><limit lower="0" upper="0" effort="0" velocity="0"/>'
+    robot = _import(tmp_path, _robot(_joint("j1", "a", "b", inside=zero), _joint("j2", "b", "c")))
+    for joint in robot.joints:
+        assert joint.position == (-math.inf, math.inf)
+        assert (joint.velocity, joint.torque) == (math.inf, math.inf)
+    assert robot.joints[0].link is None
+
+
+def test_axis_is_a_direction_and_x_by_default(tmp_path: Path) -> None:
+    """The length of an axis says nothing; without one it is x, as the format defines."""
+    text = _robot(_joint("j1", "a", "b", inside='<axis xyz="0 3 4"/>'), _joint("j2", "b", "c", inside=""))
+    first, second = chain_from_urdf(text).joints
+    np.testing.assert_allclose(first.axis, [0.0, 0.6, 0.8])
+    np.testing.assert_array_equal(second.axis, [1.0, 0.0, 0.0])
+
+
+@given(st.tuples(*3 * [st.floats(-4.0, 4.0)]))
+def test_roll_pitch_yaw_turn_about_fixed_axes(rpy: tuple[float, float, float]) -> None:
+    """R = Rz(yaw) Ry(pitch) Rx(roll), as Pinocchio has it."""
+    origin = f'<origin rpy="{rpy[0]!r} {rpy[1]!r} {rpy[2]!r}" xyz="1 2 3"/>'
+    placed = chain_from_urdf(_robot(_joint("j", "a", "b", inside=origin), links="ab")).joints[0]
+    np.testing.assert_allclose(placed.rotation, pin.rpy.rpyToMatrix(*rpy), atol=1e-15)
+    np.testing.assert_array_equal(placed.position, [1.0, 2.0, 3.0])
+
+
+def test_a_branch_needs_a_tip_and_is_then_carried_along(tmp_path: Path) -> None:
+    """Two fingers: refused without tip_link; with it the fingers' mass rides on the hand, held at zero."""
+    finger = '<link name="{0}"><inertial><mass value="0.5"/><origin xyz="0.1 0 0"/></inertial></link>'
+    text = _robot(_joint("j1", "a", "b"), _joint("f1", "b", "left", "prismatic"), _joint("f2", "b", "right", "prismatic"),
+                  _joint("weld", "b", "c", "fixed"), finger.format("left"), finger.format("right"))
+    problem = _refused(tmp_path, text)
+    assert "'f1', 'f2'" in problem.message
+    assert "tip_link" in problem.remedy
+    robot = _import(tmp_path, text, "c")
+    assert [joint.name for joint in robot.joints] == ["j1"]
+    assert robot.joints[0].link is not None
+    assert robot.joints[0].link.mass == 1.0
+    np.testing.assert_allclose(robot.joints[0].link.com, [0.1, 0.0, 0.0])
+
+
+def test_fixed_branches_do_not_make_an_arm_branch(tmp_path: Path) -> None:
+    """A camera and a flange on the last link are no second arm: the tip is then the link that carries both."""
+    text = _robot(_joint("j1", "a", "b"), _joint("w1", "b", "c", "fixed"), _joint("w2", "b", "d", "fixed"), links="abcd")
+    assert _import(tmp_path, text).tip_link == "b"
+
+
+def test_the_tip_lies_behind_fixed_joints() -> None:
+    """The placement of the tip collects every fixed joint after the last moving one."""
+    shift = '<origin xyz="0 0 1" rpy="0 1.5707963267948966 0"/>'
+    text = _robot(_joint("j", "a", "b"), _joint("w1", "b", "c", "fixed", shift), _joint("w2", "c", "d", "fixed", shift),
+                  links="abcd")
+    chain = chain_from_urdf(text)
+    assert chain.tip_link == "d"
+    np.testing.assert_allclose(chain.tip_position, [1.0, 0.0, 1.0], atol=1e-15)
+
+
+def test_names_with_quotes_and_brackets_survive(tmp_path: Path) -> None:
+    """Text from outside is escaped in the reduced URDF."""
+    text = TWO.replace('"j1"', "\"&lt;j&quot;1'&amp;\"")
+    robot = _import(tmp_path, text)
+    assert robot.joints[0].name == "<j\"1'&"
+    assert chain_from_urdf(str(robot.urdf_text)).joints[0].name == robot.joints[0].name
+
+
+# what is dangerous
+
+BILLION = ('<!DOCTYPE r [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;"><!ENTITY c "&b;&b;&b;&b;&b;">]>'
+           '<robot name="&c;"><link name="a"/></robot>')
+EXTERNAL = '<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"><link name="a"/></robot>'
+
+
+@pytest.mark.parametrize("text", [
+    BILLION, EXTERNAL, BILLION.encode("utf-16"), '<!DOCTYPE robot SYSTEM "http://example.invalid/a.dtd">' + TWO,
+    '<!DOCTYPE r [<!ENTITY % p SYSTEM "file:///etc/passwd"> %p;]>' + TWO, "<!DOCTYPE robot>" + TWO,
+], ids=["bomb", "external", "bomb-utf16", "dtd", "parameter-entity", "plain-doctype"])
+def test_every_document_type_is_refused(tmp_path: Path, text: str | bytes) -> None:
+    """No entity is declared, expanded or fetched: the document type alone is refused, in any encoding."""
+    problem = _refused(tmp_path, text)
+    assert problem.code == "RRID-X13"
+    assert "DOCTYPE" in problem.message
+
+
+@pytest.mark.parametrize("text", [
+    '<robot name="r" xmlns:xacro="http://ros.org/wiki/xacro"><xacro:include filename="/etc/passwd"/></robot>',
+    _robot(_joint("j", "a", "b", inside='<origin xyz="${length} 0 0"/>'), links="ab"),
+    _robot(_joint("j", "a", "b", inside='<origin xyz="$(arg x) 0 0"/>'), links="ab"),
+    _robot(_joint("j", "a", "b", inside='<limit lower="${-pi}" upper="1"/>'), links="ab"),
+])
+def test_xacro_is_refused_with_the_way_out(tmp_path: Path, text: str) -> None:
+    """A macro file is never run; the message says how to expand it."""
+    problem = _refused(tmp_path, text)
+    assert problem.code == "RRID-X13"
+    assert "xacro arm.urdf.xacro > arm.urdf" in problem.remedy
+
+
+def test_a_xacro_file_is_refused_by_its_name(tmp_path: Path) -> None:
+    """arm.urdf.xacro is not opened at all."""
+    path = tmp_path / "arm.urdf.xacro"
+    path.write_text("")
+    for load in (import_urdf, load_robot):
+        with pytest.raises(UsageError, match="X13"):
+            load(path)
+
+
+def test_expanded_xacro_is_welcome(tmp_path: Path) -> None:
+    """The namespace that xacro leaves behind on <robot> does no harm."""
+    assert _import(tmp_path, TWO.replace("<robot", '<robot xmlns:xacro="http://ros.org/wiki/xacro"')).n_joints == 2
+
+
+def test_meshes_are_never_opened_nor_kept(tmp_path: Path) -> None:
+    """A mesh that would hang whoever opens it, or lies outside the tree, is passed over and not embedded."""
+    os.mkfifo(tmp_path / "pipe.stl")
+    mesh = ('<link name="a"><visual><geometry><mesh filename="{}"/></geometry></visual><collision><geometry>'
+            '<mesh filename="../../../../etc/passwd"/></geometry></collision></link>').format(tmp_path / "pipe.stl")
+    robot = _import(tmp_path, _robot(mesh, _joint("j", "a", "b"), links="b"))
+    assert "mesh" not in str(robot.urdf_text)
+    assert "passwd" not in str(robot.urdf_text)
+
+
+def test_huge_and_deep_files_are_refused(tmp_path: Path) -> None:
+    """More than 16 MB, or elements nested without end, are refused before they cost memory."""
+    assert _refused(tmp_path, TWO + " " * 17_000_000).code == "RRID-X13"
+    assert _refused(tmp_path, "<robot>" + "<a>" * 100_000).code == "RRID-X13"
+
+
+def test_only_regular_files_are_read(tmp_path: Path) -> None:
+    """A pipe, a folder and a missing file are named, none of them hangs."""
+    os.mkfifo(tmp_path / "pipe.urdf")
+    for path in (tmp_path / "pipe.urdf", tmp_path, tmp_path / "missing.urdf", Path("nul\0.urdf")):
+        with pytest.raises(UsageError) as caught:
+            import_urdf(path)
+        assert caught.value.code == "RRID-C04"
+
+
+# what is malformed
+
+_CYCLE = _robot(_joint("j0", "d", "a"), _joint("j1", "a", "b"), _joint("j2", "b", "c"), _joint("j3", "c", "b"), links="abcd")
+
+
+@pytest.mark.parametrize(("text", "words"), [
+    ("<robot", "not well-formed"), ("", "not well-formed"), (b"\xff\xfe\x00", "not well-formed"),
+    ('<?xml version="1.0" encoding="no-such"?><robot/>', "not well-formed"), ("<sdf/>", "an SDF model"),
+    ("<arm/>", "<arm>, not <robot>"),
+    ("<robot/>", "hangs"), (_robot(links="ab"), "a, b hang on nothing"), (_robot(links="a"), "no joint moves"),
+    (_robot(_joint("j", "a", "nope"), links="ab"), "'nope', which is not defined"),
+    (_robot(_joint("j", "a", "b"), _joint("j", "b", "c")), "two joints are called 'j'"),
+    (_robot(links="aa"), "two links are called 'a'"), (_CYCLE, "closed loop"),
+    (_robot(_joint("j", "a", "a"), _joint("k", "b", "c")), "closed loop"),
+    (_robot(_joint("j", "a", "b"), _joint("k", "b", "a"), links="ab"), "every link hangs on another"),
+    (_robot(_joint("j", "a", "b", "ball"), links="ab"), "type 'ball'"),
+    (_robot(_joint("j", "a", "b", "floating"), links="ab"), "is floating"),
+    (_robot(_joint("j", "a", "b", "planar"), links="ab"), "is planar"),
+    (_robot(_joint("j", "a", "b", inside='<mimic joint="k"/>'), links="ab"), "is a mimic"),
+    (_robot(_joint("j", "a", "b", "fixed"), links="ab"), "no joint moves"),
+    (_robot(_joint("j", "a", "b", inside='<axis xyz="0 0 0"/>'), links="ab"), "axis without direction"),
+    (_robot(_joint("j", "a", "b", inside='<axis xyz="0 1"/>'), links="ab"), "three numbers, not 2"),
+    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 nan 0"/>'), links="ab"), "not finite"),
+    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 1e300 0"/>'), links="ab"), "absurdly large"),
+    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 1_0 0"/>'), links="ab"), "not a number"),
+    (_robot(_joint("j", "a", "b", inside='<origin xyz="0 0,1 0"/>'), links="ab"), "'0,1', which is not a number"),
+    (_robot(_joint("j", "a", "b", inside='<limit lower="2" upper="1"/>'), links="ab"), "lower above upper"),
+    (_robot(_joint("j", "a", "b", inside='<limit velocity="-1"/>'), links="ab"), "negative velocity"),
+    (_robot('<joint name="j" type="revolute"><parent link="a"/></joint>'), "lacks its parent or child"),
+    (_robot('<joint type="revolute"/>'), "<joint> has no name"),
+    (_robot('<link name="d"><inertial><mass value="-1"/></inertial></link>', _joint("j", "a", "d"), links="a"),
+     "negative mass"),
+])
+def test_malformed_urdfs_are_refused_in_words(tmp_path: Path, text: str | bytes, words: str) -> None:
+    """Each fault is named, with the element it is in; no traceback, and inside a log it rejects the log."""
+    problem = _refused(tmp_path, text)
+    assert problem.code == "RRID-S17"
+    assert words in problem.message
+    if isinstance(text, str) and "mass" not in text:  # a log's kinematics hold no inertials
+        with pytest.raises(InputRejected):
+            chain_from_urdf(text)
+
+
+def test_broken_characters_in_a_log_are_rejected() -> None:
+    """Half a surrogate pair, which no file can hold but a text in memory can, rejects the log."""
+    with pytest.raises(InputRejected, match="S17"):
+        chain_from_urdf(TWO.replace("j1", "\ud800"))
+
+
+def test_an_unknown_tip_is_named_with_the_nearest(tmp_path: Path) -> None:
+    """A slip in tip_link is answered with the link that was meant."""
+    problem = _refused(tmp_path, TWO.replace('"c"', '"flange"'), "flnge")
+    assert problem.code == "RRID-C02"
+    assert "did you mean 'flange'" in problem.message
+
+
+@given(st.integers(0, len(TWO) - 1), st.binary(min_size=1, max_size=3))
+def test_damaged_text_never_raises_anything_else(at: int, junk: bytes) -> None:
+    """Whatever bytes land in the text, the answer is a chain or a rejection."""
+    damaged = (TWO[:at].encode() + junk + TWO[at + len(junk):].encode()).decode("utf-8", "replace")
+    with contextlib.suppress(InputRejected):  # anything else is an error of ours
+        assert len(chain_from_urdf(damaged).joints) >= 1
