@@ -54,9 +54,8 @@ def answer(
     causes, worth, worse = _worth(prepared, found, blocks, whole)
     own = {id(one.cause): alternatives_of(one) for one in look.selection.rounds}
     named = [(one.probability[one.key], own[id(one)]) for one in causes]
-    findings = findings_of(
-        worth, look.later, look.reported, look.covariance, named, found.responses
-    )
+    reported, spread = look.reported, look.covariance
+    findings = findings_of(worth, look.later, reported, spread, named, found.responses)
     verdict = "unknown" if worse and not causes else found.decision.verdict
     reason = "; ".join(one for one in (worse, found.decision.reason) if one)
     limits = _limits(found, findings, exclude) if whole else Limits((), ())

@@ -61,9 +61,7 @@ def baseline(
                 largest[family] = one
             bound = chi2_bound(config.alpha / families, one.freedom)
             excess.setdefault(family, []).append((one.gain - bound) / rows)
-    bias = {
-        family: max(0.0, upper_point(values, config.alpha)) for family, values in excess.items()
-    }
+    bias = {name: max(0.0, upper_point(values, config.alpha)) for name, values in excess.items()}
     if dataset.reference is None:
         bias = _unlike(bias, largest, parts, dictionary.known)
     return Baseline(

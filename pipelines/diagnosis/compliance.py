@@ -65,12 +65,11 @@ def compliance(
     return Compliance(named, left, found.seen, shown)
 
 
-def new_causes(now: Compliance, before: Compliance) -> tuple[Acting, ...]:
+def new_causes(now: Compliance | None, before: Compliance | None) -> tuple[Acting, ...]:
     """Return the causes that the reference does not name, or not with these numbers."""
-    there = {one.place: one for one in before.named}
-    return tuple(
-        one for one in now.named if one.place not in there or _moved(one, there[one.place])
-    )
+    named, there = (() if one is None else one.named for one in (now, before))
+    known = {one.place: one for one in there}
+    return tuple(x for x in named if x.place not in known or _moved(x, known[x.place]))
 
 
 def _moved(now: Acting, before: Acting) -> bool:

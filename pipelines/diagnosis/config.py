@@ -22,17 +22,15 @@ class DiagnosisConfig:
     block: float = 1.0  # [s] blocks of the predictive score, longer than the low-pass remembers
     blocks_together: int = 3  # length of the moving blocks of the bootstrap, in blocks
     friction_drift: float = 0.3  # relative std of friction between sessions
-    healthy_share: float = (
-        0.001  # of a joint's torque, whitened as its noise, in which a healthy machine differs from
-        # any model: every drive ripples by a thousandth
-    )
+    # of a joint's torque, whitened as its noise, in which a healthy machine differs from any
+    # model: every drive ripples by a thousandth
+    healthy_share: float = 0.001
     relevance: float = 0.02  # share of a cause's effect to which no law is exact
     variance_prior: float = 2.0  # pseudo-observations by which a variance is shrunk to its family's
     refits: int = 4  # candidates that are refitted exactly in a round
-    promising: float = (
-        0.3  # of the best gain, without or with what standing numbers have taken of it, from which
-        # a candidate is refitted
-    )
+    # of the best gain, without or with what standing numbers have taken of it, from which a
+    # candidate is refitted
+    promising: float = 0.3
     causes: int = 4  # most causes in one session, at least 1
     ripple_orders: int = 24  # [1/rev] of torque-proportional ripple in the standing dictionary
     form_widths: int = 7  # sigmoids that make the form of a friction law
@@ -40,17 +38,14 @@ class DiagnosisConfig:
     noise_bins: int = 8  # of speed, in each of which the noise of a joint has its own level
     knots: int = 10  # of the splines without a name
     event_candidates: int = 600  # windows that a search for a contact compares
-    share: float = (
-        0.5  # of the excess residual, that causes have to explain where the rest does not fit; of
-        # what a cause gains, that is left beside a shape without a name that explains another thing
-    )
+    # of the excess residual, that causes have to explain where the rest does not fit; of what a
+    # cause gains, that is left beside a shape without a name that explains another thing
+    share: float = 0.5
     deviations: float = 2.0  # by which a number may lie outside its range and be taken for possible
-    excess: float = (
-        2.0  # mean square residual of a joint over the baseline's, from which it is too large
-    )
-    misfit: float = (
-        0.01  # share of a joint's torque that repeats or wanders, and no cause explains: a fault
-    )
+    # mean square residual of a joint over the baseline's, from which it is too large
+    excess: float = 2.0
+    # share of a joint's torque that repeats, wanders or oscillates with no cause: a fault
+    misfit: float = 0.01
 
     def recipe(
         self, decimation: int | None = None, min_speed: tuple[float, ...] = (0.0,)

@@ -50,9 +50,8 @@ class NoiseLevel:
                 continue
             inner = np.quantile(speed[own], np.arange(1, bins) / bins)
             at = np.searchsorted(inner, speed[own])
-            power = np.bincount(at, noise[own] ** 2, bins) / np.maximum(
-                np.bincount(at, None, bins), 1
-            )
+            rows = np.maximum(np.bincount(at, None, bins), 1)
+            power = np.bincount(at, noise[own] ** 2, bins) / rows
             edges.append(inner)
             std.append(np.sqrt(np.where(power > 0.0, power, power.max())))
         return cls(np.array(edges), np.array(std))

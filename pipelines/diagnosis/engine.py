@@ -169,7 +169,8 @@ def diagnose_prepared(
     rough = load(prepared, prepared.logs.frf)
     every = Dictionary.of(rough, config, exclude)
     responses = compliance(rough.frf, rough.model.nominal, exclude)
-    named = _new(responses, rough, prepared, exclude)
+    reference = compliance(prepared.logs.frf_before, rough.model.nominal, exclude)
+    named = new_causes(responses, reference)
     dataset, columns = settle(rough, every, config)
     last, known = Look.of(dataset, columns(), named, config), 0
     for _ in range(_LOOKS):  # what the causes leave tells the noise, and what is typical
@@ -188,13 +189,3 @@ def diagnose_prepared(
         last = replace(last, selection=last.selection.without(last.later, place))
     decision = decide(last.later, last.selection, last.baseline)
     return Diagnosis(decision, last, responses)
-
-
-def _new(
-    now: Compliance | None, rough: Dataset, prepared: Prepared, exclude: Sequence[str]
-) -> tuple[Acting, ...]:
-    """Return what frequency responses name, and those of the reference did not."""
-    if now is None:
-        return ()
-    before = compliance(prepared.logs.frf_before, rough.model.nominal, exclude)
-    return now.named if before is None else new_causes(now, before)

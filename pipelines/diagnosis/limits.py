@@ -176,9 +176,8 @@ def _hiding(later: Later, one: _Shape) -> str:
     """Return the names of the nominal parameters that imitate a shape."""
     names = [column.name for column in later.dataset.model.columns.names]
     share = one.cross[: len(names)].max(axis=1)
-    return ", ".join(n for n, x in zip(names, share, strict=True) if x > _MAIN) or (
-        "all base parameters together"
-    )
+    most = [n for n, x in zip(names, share, strict=True) if x > _MAIN]
+    return ", ".join(most) or "all base parameters together"
 
 
 _NOMINAL = "it is part of the nominal model, whose friction is fitted to these logs"

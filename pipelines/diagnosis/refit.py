@@ -90,9 +90,8 @@ class Later:
     def block_rows(self) -> Array:
         """(blocks,) rows of each, of all joints."""
         count = 1 + max(int(b.max()) for b in self.block if len(b))
-        return np.asarray(
-            sum(np.bincount(b, minlength=count) for b in self.block), dtype=np.float64
-        )
+        rows = [np.bincount(b, minlength=count) for b in self.block]
+        return np.asarray(np.sum(rows, axis=0), float)
 
     @cached_property
     def belief(self) -> Belief:
@@ -398,10 +397,8 @@ class Later:
 
     def again(self, key: Key) -> bool:
         """Return whether a cause may act more than once at its place."""
-        motion = self.rows.data.logs[0].motion
-        return self.waves(key) and self.dictionary.families[key].shapes[0].goes_round(
-            motion, NEARLY
-        )
+        motion, families = self.rows.data.logs[0].motion, self.dictionary.families
+        return self.waves(key) and families[key].shapes[0].goes_round(motion, NEARLY)
 
     @cached_property
     def shares(self) -> Array:

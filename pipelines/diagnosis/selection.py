@@ -114,9 +114,8 @@ class Selection:
         """Return the selection without a cause whose size may be none, the others fitted anew."""
         gone, model = self.causes[place], self.end.model.without(place)
         why = f"the size of {in_words(gone.key)} may be none by its standard deviation"
-        rounds = (
-            replace(r, cause=None, stopped=why) if r.cause is gone else r for r in self.rounds
-        )
+        was = self.rounds
+        rounds = (replace(r, cause=None, stopped=why) if r.cause is gone else r for r in was)
         end = later.fit(model, self.end.theta, later.belief_of(model))
         causes = tuple(one for one in self.causes if one is not gone)
         return replace(self, causes=causes, end=end, rounds=tuple(rounds))
@@ -196,10 +195,29 @@ class _Step:
         if pick is None:  # perhaps by another law of the same cause
             tried = [best_law(later, self.state, one) for one in tried]
             pick, cause, stopped = self._contest(tried, others, apart)
+        if pick is None and (two := self._completed_by_another(tried)) is not None:
+            scores = {one.key: one.scores(later) for one in tried}
+            pick, cause = two, Cause(two.key, (), probabilities(scores, later.config))
         if pick is None:
             return replace(seen, stopped=stopped), None
         chosen = best_law(later, self.state, pick).state
         return replace(seen, cause=cause, after=chosen.fit), chosen
+
+    def _completed_by_another(self, tried: Sequence[Candidate]) -> Candidate | None:
+        """Return the best cause if one more leaves nothing that a shape without a name explains.
+
+        A free curve predicts better than one of two causes that act alike.
+        """
+        first = min(tried, key=lambda one: float(one.scores(self.later).sum()))
+        step = self._after(first)
+        seconds = (one for one in step._refitted((), None) if step._relevant(one))
+        complete = any(not step._after(one)._unnamed(False) for one in seconds)
+        return first if complete else None
+
+    def _after(self, one: Candidate) -> _Step:
+        """Return the round that follows the selection of a cause."""
+        later, causes = self.later.composed(one.state.model), [*self.causes, Cause(one.key, (), {})]
+        return replace(self, later=later, state=one.state, causes=causes)
 
     @cached_property
     def significant(self) -> dict[Key, Screened]:

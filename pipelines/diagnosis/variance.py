@@ -159,13 +159,11 @@ def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tupl
     return tuple(one.group for one in best.values())
 
 
-def _less_events(
-    rows: Rows, dictionary: Dictionary, arm: Arm, left: Sequence[Array]
-) -> list[Array]:
+def _less_events(rows: Rows, dictionary: Dictionary, arm: Arm, y: Sequence[Array]) -> list[Array]:
     """Return a residual (rows of each joint) less the push that explains most of each log."""
-    out = [r.copy() for r in left]
+    out = [r.copy() for r in y]
     for log in range(len(rows.data.logs)):
-        windows = windows_of(rows, dictionary, arm, left, log)
+        windows = windows_of(rows, dictionary, arm, y, log)
         if not windows:
             continue
         best = max(windows, key=lambda window: window.gain)

@@ -50,9 +50,8 @@ def summary_of(found: Diagnosis) -> str:
 
 
 def _alternative(first: Finding, other: Alternative) -> str:
-    like = replace(
-        first, cause=other.cause, joint=other.joint, parameters=other.parameters, log=None
-    )
+    like = replace(first, cause=other.cause, joint=other.joint, log=None)
+    like = replace(like, parameters=other.parameters)
     return f"{within(find_effect(other.cause).words.title)}{how_much(like)}{where(like)}"
 
 
