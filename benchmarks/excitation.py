@@ -32,11 +32,12 @@ from pathlib import Path
 import numpy as np
 
 from bench import experiments
-from bench.controllers import Decentralised
+from bench.control import Decentralised
+from bench.draw import paper_machine
 from bench.experiments import Experiment
-from bench.machine import Machine, paper_machine
-from bench.reference import Reference
-from bench.session import record
+from bench.machine import Machine
+from bench.motions import Reference
+from bench.plant import record
 from pipelines import fit_friction
 from pipelines.io.files import open_log, write_log
 from pipelines.io.robot import format_robot

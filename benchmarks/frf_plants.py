@@ -21,19 +21,15 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from bench.controllers import ComputedTorque, Decentralised, FeedForward, Step
+from bench.control import ComputedTorque, Decentralised, FeedForward, Observer, Step
+from bench.draw import draw_machine
+from bench.dynamics import RigidDynamics, motor_share, typical_inertia
 from bench.experiments import Experiment, frf_postures
-from bench.fault import Case as FaultCase
-from bench.fault import Fault
-from bench.faults.backlash import Backlash
-from bench.faults.base_resonance import BaseResonance
-from bench.faults.joint_elasticity import JointElasticity
-from bench.machine import Machine, draw_machine
-from bench.observer import Observer
-from bench.reference import Reference
-from bench.references import turning
-from bench.rigid import RigidDynamics, motor_share, typical_inertia
-from bench.session import record
+from bench.faults.structure import Backlash, BaseResonance, JointElasticity
+from bench.machine import Case as FaultCase
+from bench.machine import Fault, Machine
+from bench.motions import Reference, turning
+from bench.plant import record
 from benchmarks.other_plants.arms import ARMS, Arm
 from benchmarks.other_plants.friction import Friction
 from pipelines.io import schema
@@ -442,17 +438,14 @@ class _Injected:
     def describe(self, machine: Machine) -> Controller:
         return self.law.describe(machine)
 
-    def start(self, machine: Machine, reference: Reference, sample_time: float) -> Step:
-        return _InjectedStep(self.law.start(machine, reference, sample_time), self.v)
+    def start(self, machine: Machine, reference: Reference) -> tuple[Step, dict[str, Array]]:
+        inner, extras = self.law.start(machine, reference)
+        v = self.v.tolist()
 
+        def step(k: int, q: list[float], observer: Observer) -> list[float]:
+            return [a + b for a, b in zip(inner(k, q, observer), v[k], strict=True)]
 
-class _InjectedStep:
-    def __init__(self, inner: Step, v: Array) -> None:
-        self._inner, self._v = inner, v.tolist()
-        self.extras = {**inner.extras, "v": v}
-
-    def __call__(self, k: int, q: list[float], observer: Observer) -> list[float]:
-        return [a + b for a, b in zip(self._inner(k, q, observer), self._v[k], strict=True)]
+        return step, {**extras, "v": self.v}
 
 
 def _bench(s: Session) -> list[ExperimentLog]:

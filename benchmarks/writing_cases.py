@@ -17,9 +17,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench import experiments
-from bench.machine import SAMPLE_TIME, Machine, draw_machine
-from bench.reference import Reference
-from bench.session import record
+from bench.config import SAMPLE_TIME
+from bench.draw import draw_machine
+from bench.machine import Machine
+from bench.motions import Reference
+from bench.plant import record
 from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.in_folder import fitted_in_folder

@@ -12,14 +12,13 @@ from datetime import datetime, timedelta
 
 import numpy as np
 
+from bench.draw import draw_machine, with_links
 from bench.experiments import Experiment
-from bench.fault import Fault
-from bench.faults.base_resonance import BaseResonance
-from bench.friction import ThreeSigmoid as TrueFriction
-from bench.machine import Machine, draw_machine, with_links
-from bench.reference import Reference
-from bench.session import record
-from bench.solid import Solid
+from bench.faults.structure import BaseResonance
+from bench.machine import Fault, Friction, Machine
+from bench.motions import Reference
+from bench.plan import Solid
+from bench.plant import record
 from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
@@ -45,7 +44,7 @@ def machine() -> Machine:
     return replace(drawn, standing=(*drawn.standing, _TABLE))
 
 
-def arm_of(robot: RobotDescription, friction: Iterable[TrueFriction], name: str = "rrr") -> Arm:
+def arm_of(robot: RobotDescription, friction: Iterable[Friction], name: str = "rrr") -> Arm:
     """The arm whose links `robot` describes, with this friction."""
     arm = Arm.from_links(robot)
     base = tuple(replace(one, value=_digits(one.value)) for one in arm.base)
@@ -57,7 +56,7 @@ def _digits(value: float) -> float:
     return float(f"{value:.7g}")
 
 
-def _acting(joint: int, law: TrueFriction) -> Acting:
+def _acting(joint: int, law: Friction) -> Acting:
     values = {"b": _digits(law.viscous)}
     ordered = sorted(zip(law.sharpnesses, law.heights, strict=True), reverse=True)
     for k, (sharpness, height) in enumerate(ordered, start=1):
@@ -69,7 +68,7 @@ def controllers_model(machine: Machine) -> ControllerModel:
     """What an earlier, hasty identification left: links within 5 % and friction within 8 % of the truth."""
     rng = np.random.default_rng([24, _SEED])
     links = [Solid.of_link(joint.link).drawn(rng, _LINK_ERROR).as_link() for joint in machine.robot.joints if joint.link]
-    friction = [law.drawn(rng, _FRICTION_ERROR) for law in machine.friction if isinstance(law, TrueFriction)]
+    friction = [law.drawn(rng, _FRICTION_ERROR) for law in machine.friction]
     return controller_model(arm_of(with_links(machine.described, links), friction, "rrr-earlier"))
 
 

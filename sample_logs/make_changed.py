@@ -10,9 +10,8 @@ from datetime import datetime
 
 from bench import experiments
 from bench.experiments import FEEDFORWARD, Experiment
-from bench.fault import Fault
-from bench.faults.cogging import Cogging
-from bench.machine import Machine
+from bench.faults.drive import Cogging
+from bench.machine import Fault, Machine
 from pipelines.io.experiment import ExperimentLog
 from sample_logs.bench_session import controllers_model, machine, recorded
 from sample_logs.make_healthy import WRITING_STIFFNESS, text

@@ -8,9 +8,10 @@ from datetime import datetime
 import numpy as np
 
 from bench import experiments
+from bench.config import SAMPLE_TIME
 from bench.experiments import Experiment
-from bench.machine import SAMPLE_TIME, Machine
-from bench.reference import Reference
+from bench.machine import Machine
+from bench.motions import Reference
 from pipelines.io.experiment import ExperimentLog
 from pipelines.model.writing.reference import writing_task
 from sample_logs.bench_session import controllers_model, machine, recorded

@@ -12,9 +12,9 @@ import sys
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
 
-from bench.machine import SAMPLE_TIME
+from bench.config import SAMPLE_TIME
+from bench.dynamics import build
 from bench.plan import plan_of
-from bench.spec import build
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
 from sample_logs.bench_session import machine

@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from bench.controllers import Decentralised
-from bench.machine import paper_machine
+from bench.control import Decentralised
+from bench.draw import paper_machine
+from bench.motions import Reference
 from bench.plant import run
-from bench.reference import Reference
 from pipelines.io import schema
 from pipelines.io.experiment import ExperimentLog, Signal
 from pipelines.io.robot import format_robot

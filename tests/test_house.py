@@ -23,7 +23,7 @@ CONSTANTS = {
 
 
 @pytest.mark.parametrize("area", sorted(
-    str(path.relative_to(REPO)) for path in (*(REPO / "pipelines").iterdir(), REPO / "rrrid_cli")
+    str(path.relative_to(REPO)) for path in (*(REPO / "pipelines").iterdir(), REPO / "rrrid_cli", REPO / "bench")
     if path.suffix == ".py" or (path / "__init__.py").exists()))
 def test_numbers_that_decide_stand_in_a_config(area: str, shared: Path) -> None:
     """No module has a number of its own but in config.py and where it is marked `# numerics`."""

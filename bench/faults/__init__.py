@@ -1,52 +1,98 @@
-"""Find every fault in this folder. A new file is a new fault: nothing has to be registered.
+"""Every fault of the bench by its name, grouped in files by where it is: a new one is a class in
+its file and here.
 
-    fault_names()                          ("backlash", "cogging", …), without importing any
-    find_fault(name)                       the class of one
-    make(name, machine, joint, seed)       one at the strength of causes.md times `strength`
+fault_names()                          ("asymmetric_friction", "backlash", …)
+find_fault(name)                       the class of one
+make(name, machine, joint, seed)       one at the strength of causes.md times `strength`
 """
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
-from functools import lru_cache
-
 import numpy as np
 
-from bench.fault import Case, Fault
-from bench.machine import Machine
+from bench.faults import drive, friction, load, sensor, structure
+from bench.machine import Case, Fault, Machine
 from pipelines.errors import UsageError, did_you_mean
 
-__all__ = ["fault_names", "find_fault", "make"]
+FAULTS: tuple[type[Fault], ...] = (
+    drive.Cogging,
+    drive.DriveLag,
+    drive.HuntingDrive,
+    drive.TorqueCrosstalk,
+    drive.TorqueGain,
+    drive.TorqueOffset,
+    drive.TorqueSaturation,
+    friction.AsymmetricFriction,
+    friction.CableHysteresis,
+    friction.ConcaveFriction,
+    friction.LoadFriction,
+    friction.PositionFriction,
+    friction.Presliding,
+    friction.QuadraticDrag,
+    friction.RelativeDamper,
+    friction.SelfHeating,
+    friction.StickingSeal,
+    friction.Stribeck,
+    friction.ViscousDrift,
+    load.Contact,
+    load.LeakingCounterbalance,
+    load.Payload,
+    load.RattlingMass,
+    load.SloshingLoad,
+    load.Spring,
+    sensor.EncoderCrosstalk,
+    sensor.EncoderEccentricity,
+    sensor.TimeDelay,
+    sensor.TorqueLag,
+    structure.Backlash,
+    structure.BaseResonance,
+    structure.GravityTilt,
+    structure.JointElasticity,
+    structure.LinkLength,
+    structure.RotorInertia,
+    structure.TransmissionCoupling,
+)
 
 
-@lru_cache(maxsize=1)
 def fault_names() -> tuple[str, ...]:
-    """Identifiers of all faults, sorted."""
-    return tuple(sorted(module.name for module in pkgutil.iter_modules(__path__)))
+    """Return the identifiers of all faults, sorted."""
+    return tuple(sorted(kind.name for kind in FAULTS))
 
 
 def find_fault(name: str) -> type[Fault]:
-    """The fault whose file and identifier is `name`.
+    """Return the fault with this identifier.
 
     Raises:
         UsageError: there is no such fault.
     """
-    if name not in fault_names():
-        raise UsageError("C02", f"'{name}' is not a fault{did_you_mean(name, fault_names())}",
-                         remedy=f"the faults are {', '.join(fault_names())}")
-    module = importlib.import_module(f"{__name__}.{name}")
-    found: type[Fault] = next(member for member in vars(module).values() if getattr(member, "name", None) == name)
-    return found
+    for kind in FAULTS:
+        if kind.name == name:
+            return kind
+    names = fault_names()
+    raise UsageError(
+        "C02",
+        f"'{name}' is not a fault{did_you_mean(name, names)}",
+        remedy=f"the faults are {', '.join(names)}",
+    )
 
 
-def make(name: str, machine: Machine, joint: int | None = None, seed: int = 0, strength: float = 1.0,
-         peak_torque: tuple[float, ...] | None = None, duration: float = 10.0) -> Fault:
-    """The fault `name` at `strength` times the figure of causes.md.
+def make(
+    name: str,
+    machine: Machine,
+    joint: int | None = None,
+    seed: int = 0,
+    strength: float = 1.0,
+    peak_torque: tuple[float, ...] | None = None,
+    duration: float = 10.0,
+) -> Fault:
+    """Return the fault `name` at `strength` times the figure of causes.md.
 
     Args:
-        joint: 1-based; ignored where the fault belongs to the whole arm.
+        name: its identifier.
+        machine: that it is for.
+        joint: 1-based; ignored where the fault is of the whole arm.
         seed: of what is drawn in it: phases, directions, frequencies.
+        strength: 1 for that of causes.md.
         peak_torque: (n,) [N m] over the healthy logs; default: 60 % of the limits.
         duration: [s] of the logs to be recorded.
     """

@@ -15,7 +15,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from bench.session import answer
+from bench.plant import answer
 from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.sessions import Session, record_case
 from pipelines.errors import UsageError

@@ -20,13 +20,13 @@ from datetime import datetime, timedelta
 import numpy as np
 
 from bench import experiments
-from bench.controllers import Decentralised, FeedForward
+from bench.control import Decentralised, FeedForward
+from bench.draw import draw_machine, machine_of, with_links
 from bench.experiments import Experiment
-from bench.fault import Fault
 from bench.faults import make
-from bench.machine import Machine, draw_machine, machine_of, with_links
-from bench.session import peak_torque
-from bench.solid import Solid
+from bench.machine import Fault, Machine
+from bench.plan import Solid
+from bench.plant import peak_torque
 from benchmarks.hidden_effects.cases import Hidden, SealedCase
 from benchmarks.hidden_effects.robots import ROBOTS
 from pipelines.errors import UsageError

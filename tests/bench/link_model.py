@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from bench.dynamics import RigidDynamics
 from bench.machine import Machine
-from bench.rigid import RigidDynamics
-from bench.solid import Solid
+from bench.plan import Solid
 
 __all__ = ["LinkModel"]
 

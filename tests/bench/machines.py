@@ -7,10 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from bench.fault import Fault, Floats, Hooks, Parameters, Run
-from bench.friction import CoulombViscous
-from bench.machine import Machine, machine_of
-from bench.reference import Reference, times
+from bench.draw import machine_of
+from bench.machine import Fault, Floats, Hooks, Machine, Parameters, Run, coulomb_viscous
+from bench.motions import Reference, times
 from pipelines.io.experiment import Array
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 
@@ -26,7 +25,7 @@ def sway(duration: float = 1.0, centre: Array = CENTRE, hz: float = 1.0, amplitu
 
 
 def frictionless(machine: Machine) -> Machine:
-    return machine.with_friction(*(CoulombViscous() for _ in range(machine.n)))
+    return replace(machine, friction=(coulomb_viscous(),) * machine.n)
 
 
 def unrounded(machine: Machine) -> Machine:

@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from bench.controllers import Decentralised
-from bench.fault import Fault
+from bench.control import Decentralised
+from bench.draw import draw_machine
 from bench.faults import fault_names, find_fault, make
-from bench.machine import Machine, draw_machine
+from bench.machine import Fault, Machine
 from bench.plant import Recording, run
 from pipelines.errors import UsageError
 from tests.bench.machines import sway, unrounded

@@ -16,15 +16,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bench.controllers import Decentralised
-from bench.fault import Fault
+from bench.config import SAMPLE_TIME
+from bench.control import Decentralised
+from bench.draw import paper_machine, with_links
 from bench.faults import fault_names, find_fault, make
-from bench.faults.contact import Contact
-from bench.faults.link_length import LinkLength
-from bench.friction import CoulombViscous
-from bench.machine import SAMPLE_TIME, Machine, paper_machine, with_links
+from bench.faults.load import Contact
+from bench.faults.structure import LinkLength
+from bench.machine import Fault, Machine, coulomb_viscous
+from bench.plan import Solid
 from bench.plant import Recording, run
-from bench.solid import Solid
 from tests.bench.machines import sway
 from tests.bench.test_rigid import standard_parameters
 from tests.model.rigid.serial_arms import Arm, by_hand
@@ -37,7 +37,8 @@ FC, FV = (4.5, 2.4, 0.9), (0.6, 0.3, 0.12)
 @lru_cache
 def machine() -> Machine:
     """Coulomb and viscous friction, neither noise nor quantisation."""
-    return paper_machine().with_friction(*(CoulombViscous(c, v, SHARPNESS) for c, v in zip(FC, FV, strict=True))).ideal
+    friction = tuple(coulomb_viscous(c, v, SHARPNESS) for c, v in zip(FC, FV, strict=True))
+    return replace(paper_machine(), friction=friction).ideal
 
 
 @dataclass(frozen=True, eq=False)

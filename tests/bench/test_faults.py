@@ -8,21 +8,15 @@ import numpy as np
 import pinocchio as pin
 from scipy.signal import lsim
 
-from bench.controllers import Decentralised, OpenLoop
-from bench.faults.backlash import Backlash
-from bench.faults.base_resonance import BaseResonance
-from bench.faults.cogging import Cogging
-from bench.faults.drive_lag import DriveLag
-from bench.faults.encoder_eccentricity import EncoderEccentricity
-from bench.faults.gravity_tilt import GravityTilt
-from bench.faults.joint_elasticity import JointElasticity
-from bench.faults.payload import Payload
-from bench.faults.time_delay import TimeDelay
-from bench.faults.torque_lag import TorqueLag
-from bench.faults.torque_saturation import TorqueSaturation
-from bench.machine import Machine, paper_machine
+from bench.control import Decentralised, OpenLoop
+from bench.draw import paper_machine
+from bench.faults.drive import Cogging, DriveLag, TorqueSaturation
+from bench.faults.load import Payload
+from bench.faults.sensor import EncoderEccentricity, TimeDelay, TorqueLag
+from bench.faults.structure import Backlash, BaseResonance, GravityTilt, JointElasticity
+from bench.machine import Machine
+from bench.motions import at_rest
 from bench.plant import run
-from bench.reference import at_rest
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable, unrounded
 from tests.bench.test_rigid import standard_parameters
 from tests.model.rigid.serial_arms import Arm, by_hand

@@ -9,19 +9,14 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
-from bench.controllers import Decentralised, FeedForward, OpenLoop
+from bench.control import Decentralised, FeedForward, OpenLoop
+from bench.draw import paper_machine
 from bench.faults import fault_names, find_fault
-from bench.faults.cable_hysteresis import CableHysteresis
-from bench.faults.hunting_drive import HuntingDrive
-from bench.faults.leaking_counterbalance import LeakingCounterbalance
-from bench.faults.rattling_mass import RattlingMass
-from bench.faults.relative_damper import RelativeDamper
-from bench.faults.self_heating import SelfHeating
-from bench.faults.sloshing_load import SloshingLoad
-from bench.faults.sticking_seal import StickingSeal
-from bench.machine import paper_machine
+from bench.faults.drive import HuntingDrive
+from bench.faults.friction import CableHysteresis, RelativeDamper, SelfHeating, StickingSeal
+from bench.faults.load import LeakingCounterbalance, RattlingMass, SloshingLoad
+from bench.motions import Reference, at_rest, times
 from bench.plant import run
-from bench.reference import Reference, at_rest, times
 from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable
 from tests.bench.test_fault_signs import arm_of, measured, turned

@@ -9,13 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.controllers import Decentralised
-from bench.fault import Fault, Parameters
+from bench.control import Decentralised
+from bench.draw import machine_of, paper_machine
 from bench.faults import fault_names, find_fault, make
-from bench.machine import Machine, machine_of, paper_machine
+from bench.machine import Fault, Machine, Parameters
+from bench.motions import Reference, sweeps
 from bench.plant import Recording, run
-from bench.reference import Reference
-from bench.references import sweeps
 from pipelines.errors import UsageError
 from pipelines.io.robot import Joint, RobotDescription
 from tests.bench.machines import turntable

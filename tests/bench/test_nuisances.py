@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.faults.cogging import Cogging
-from bench.machine import Machine, draw_machine, machine_of
-from bench.nuisances.gain_ripple import GainRipple
+from bench.draw import draw_machine, machine_of
+from bench.faults.drive import Cogging, GainRipple
+from bench.machine import Machine
 from benchmarks.hidden_effects.robots import ROBOTS
 
 

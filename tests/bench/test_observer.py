@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from bench.observer import Observer, observer_gain
+from bench.control import Observer, observer_gain
 
 T, NOISE, JERK = 1e-3, 3e-6, 4000.0
 

@@ -9,13 +9,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from bench.controllers import ComputedTorque, Decentralised, FeedForward, OpenLoop
-from bench.fault import Floats, Hooks, Run
+from bench.control import ComputedTorque, Decentralised, FeedForward, OpenLoop
+from bench.draw import draw_machine, paper_machine
 from bench.faults import make
-from bench.faults.base_resonance import BaseResonance
-from bench.machine import draw_machine, paper_machine
+from bench.faults.structure import BaseResonance
+from bench.machine import Floats, Hooks, Run
+from bench.motions import at_rest
 from bench.plant import run
-from bench.reference import at_rest
 from pipelines.errors import UsageError
 from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable

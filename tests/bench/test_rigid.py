@@ -9,11 +9,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bench.controllers import OpenLoop
-from bench.machine import SAMPLE_TIME, Machine, draw_machine, machine_of
+from bench.config import SAMPLE_TIME
+from bench.control import OpenLoop
+from bench.draw import draw_machine, machine_of
+from bench.dynamics import RigidDynamics
+from bench.machine import Machine
+from bench.motions import at_rest
 from bench.plant import run
-from bench.reference import at_rest
-from bench.rigid import RigidDynamics
 from tests.bench.machines import frictionless
 from tests.model.rigid.serial_arms import ARMS, Arm, by_hand
 from tests.seeds import seeds
@@ -106,6 +108,6 @@ def test_the_papers_machine_has_the_printed_base_parameters() -> None:
 
 
 def draw_paper() -> Machine:
-    from bench.machine import paper_machine
+    from bench.draw import paper_machine
 
     return paper_machine()

@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from bench import experiments
+from bench.draw import draw_machine
 from bench.experiments import Experiment
 from bench.faults import fault_names, make
-from bench.machine import Machine, draw_machine
-from bench.session import answer, peak_torque, record
+from bench.machine import Machine
+from bench.plant import answer, peak_torque, record
 from pipelines.io.canonical import digest_of
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bench import experiments
-from bench.fault import Fault
+from bench.draw import draw_machine
 from bench.faults import fault_names, find_fault, make
-from bench.machine import Machine, draw_machine
-from bench.session import peak_torque, record
+from bench.machine import Fault, Machine
+from bench.plant import peak_torque, record
 from pipelines.errors import InputRejected
 from pipelines.io.experiment import ExperimentLog
 from pipelines.model.estimation.logs import Recipe, fit_logs, judge, motions_of

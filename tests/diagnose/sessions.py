@@ -8,9 +8,9 @@ from functools import lru_cache
 from pathlib import Path
 
 from bench import experiments
+from bench.draw import draw_machine
 from bench.faults import make
-from bench.machine import draw_machine
-from bench.session import record
+from bench.plant import record
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
 from pipelines.model.effects import effect_names

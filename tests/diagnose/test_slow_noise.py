@@ -9,9 +9,9 @@ import pytest
 from scipy.signal import lfilter
 
 from bench import experiments
-from bench.faults.cogging import Cogging
-from bench.machine import draw_machine
-from bench.session import record
+from bench.draw import draw_machine
+from bench.faults.drive import Cogging
+from bench.plant import record
 from pipelines.diagnosis.result import Diagnosis
 from pipelines.io.experiment import ExperimentLog
 from pipelines.model.rows.prepare import Logs

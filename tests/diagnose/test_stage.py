@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from bench.draw import draw_machine
 from bench.faults import make
-from bench.machine import draw_machine
 from pipelines import diagnose, run
 from pipelines.errors import UsageError
 from pipelines.stage import Outcome, Request, run_stage

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from bench import experiments
-from bench.machine import draw_machine
-from bench.session import record
+from bench.draw import draw_machine
+from bench.plant import record
 from pipelines.diagnosis.findings import gain_of
 from pipelines.io import shared_work
 from pipelines.model.estimation.logs import Recipe

@@ -8,10 +8,10 @@ from functools import lru_cache
 import pytest
 
 from bench import experiments
-from bench.fault import Fault
+from bench.draw import draw_machine
 from bench.faults import make
-from bench.machine import Machine, draw_machine
-from bench.session import record
+from bench.machine import Fault, Machine
+from bench.plant import record
 from pipelines.diagnosis.limits import without_limit
 from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
 from pipelines.io.experiment import ExperimentLog

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from bench.draw import draw_machine
 from bench.faults import make
-from bench.machine import draw_machine
 from pipelines.diagnosis import engine, extension
 from pipelines.diagnosis.compliance import Compliance, new_causes
 from pipelines.io.experiment import ExperimentLog

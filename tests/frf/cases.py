@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bench import experiments
-from bench.controllers import ComputedTorque
-from bench.fault import Fault
-from bench.faults.base_resonance import BaseResonance
-from bench.faults.joint_elasticity import JointElasticity
-from bench.faults.time_delay import TimeDelay
-from bench.machine import Machine, draw_machine
-from bench.rigid import motor_share, typical_inertia
-from bench.session import record
+from bench.control import ComputedTorque
+from bench.draw import draw_machine
+from bench.dynamics import motor_share, typical_inertia
+from bench.faults.sensor import TimeDelay
+from bench.faults.structure import BaseResonance, JointElasticity
+from bench.machine import Fault, Machine
+from bench.plant import record
 from pipelines.io.experiment import Array, ExperimentLog
 from sample_logs.bench_session import controllers_model
 from sample_logs.controller_model import ControllerModel

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eig, expm
 
-from bench.fault import Fault
-from bench.machine import SAMPLE_TIME, Machine
+from bench.config import SAMPLE_TIME
+from bench.dynamics import build
+from bench.machine import Fault, Machine
 from bench.plant import plan_with
-from bench.spec import build
 from pipelines.io.experiment import Array
 
 __all__ = ["Truth", "linearised"]

@@ -98,7 +98,7 @@ def test_the_fields_of_the_contract(outcome: Outcome[frf.Result]) -> None:
 
 def test_the_rigid_body_is_expected_and_measured(outcome: Outcome[frf.Result]) -> None:
     """The controller's model is 5 % wrong at most: so is the level, and the measured inertia is the bench's within 1 %."""
-    from bench.rigid import RigidDynamics
+    from bench.dynamics import RigidDynamics
 
     true = RigidDynamics(machine().robot)
     for posture in outcome.result.postures:

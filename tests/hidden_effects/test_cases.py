@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench import references
-from bench.controllers import Decentralised
+from bench import motions
+from bench.control import Decentralised
 from bench.experiments import Experiment
 from bench.faults import find_fault
 from bench.machine import Machine
@@ -192,7 +192,7 @@ def test_more_noise_is_ten_times_as_much() -> None:
 @pytest.mark.slow
 def test_sessions_last_52_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each with logs to fit and logs to judge."""
-    monkeypatch.setattr(references, "within_torque", lambda machine, reference, centre: reference)  # it takes long
+    monkeypatch.setattr(motions, "within_torque", lambda machine, reference, centre: reference)  # it takes long
     machine = machine_of_case(CASE)
     for name, plans in sessions._SETS.items():
         made = plans(machine, [1, 2, 3, 4])

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from bench import experiments
+from bench.draw import draw_machine
 from bench.faults import make
-from bench.machine import draw_machine
-from bench.session import record
+from bench.plant import record
 from pipelines.errors import InputRejected
 from pipelines.estimation.checks.gates import examined
 from pipelines.io.experiment import Array, ExperimentLog

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from bench import experiments
-from bench.machine import draw_machine
-from bench.session import record
+from bench.draw import draw_machine
+from bench.plant import record
 from pipelines.io.experiment import ExperimentLog
 from pipelines.model.plausibility import plausibility
 from pipelines.quality.checks import Subject

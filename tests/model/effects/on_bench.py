@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from bench.config import SAMPLE_TIME
+from bench.draw import draw_machine
 from bench.experiments import Experiment as Planned
 from bench.experiments import excitation
-from bench.fault import Fault
 from bench.faults import make
-from bench.friction import CoulombViscous
-from bench.machine import SAMPLE_TIME, Machine, draw_machine
+from bench.machine import Fault, Machine
 from bench.plant import Recording, run
 from pipelines.io.experiment import Array
 from pipelines.model.arm import Acting, Arm
@@ -40,7 +40,7 @@ def arm() -> Arm:
     """The machine's own links and friction."""
     rigid, laws = Arm.from_links(machine().robot), []
     for joint, law in enumerate(machine().friction, start=1):
-        assert isinstance(law, CoulombViscous)
+        assert len(law.heights) == 1
         laws += [Acting.of(Coulomb(joint), {"level": law.coulomb, "sharpness": law.sharpness}),
                  Acting.of(Viscous(joint), {"coefficient": law.viscous})]
     return replace(rigid, friction=tuple(laws))

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bench.session import as_log
+from bench.plant import as_log
 from pipelines.io.experiment import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect

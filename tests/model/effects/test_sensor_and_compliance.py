@@ -15,9 +15,8 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 
-from bench.machine import SAMPLE_TIME
-from bench.plant import Recording
-from bench.session import as_log
+from bench.config import SAMPLE_TIME
+from bench.plant import Recording, as_log
 from pipelines.io.experiment import Array, Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect

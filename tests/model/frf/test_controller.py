@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import freqz
 
-from bench.observer import Observer, observer_gain
+from bench.control import Observer, observer_gain
 from pipelines.io.experiment import Controller
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.responses import double_integrator

@@ -8,12 +8,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from bench.draw import draw_machine
+from bench.dynamics import RigidDynamics
 from bench.experiments import friction
 from bench.faults import make
-from bench.machine import Machine, draw_machine
-from bench.profiles import gravity_of
-from bench.rigid import RigidDynamics
-from bench.session import record
+from bench.machine import Machine
+from bench.motions import gravity_of
+from bench.plant import record
 from pipelines.io.experiment import Array
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.model.friction.laws import law_named

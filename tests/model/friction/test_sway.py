@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bench.machine import paper_machine
-from bench.rigid import RigidDynamics
+from bench.draw import paper_machine
+from bench.dynamics import RigidDynamics
 from pipelines.model.friction.weak_form import Sway, sway_columns
 
 HELD = np.array([0.4, -1.1, 0.7])  # [rad]

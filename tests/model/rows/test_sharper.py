@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from bench.draw import draw_machine
 from bench.experiments import excitation
-from bench.machine import Machine, draw_machine
-from bench.plant import Recording, run
-from bench.session import as_log
+from bench.machine import Machine
+from bench.plant import Recording, as_log, run
 from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.estimation.conditioning import wanted_cutoff
 from pipelines.model.estimation.logs import Motions, Recipe, motions_of

@@ -11,11 +11,12 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from bench.controllers import ComputedTorque, Decentralised, FeedForward, Law
+from bench.control import ComputedTorque, Decentralised, FeedForward, Law
+from bench.draw import paper_machine
 from bench.experiments import Experiment as Planned
-from bench.machine import Machine, paper_machine
-from bench.reference import Reference
-from bench.session import record
+from bench.machine import Machine
+from bench.motions import Reference
+from bench.plant import record
 from pipelines.io.experiment import Array
 from pipelines.model.arm import Arm
 from pipelines.model.simulation import Experiment, Noise, simulate
