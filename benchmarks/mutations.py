@@ -27,7 +27,7 @@ from pipelines.errors import RrridError
 from pipelines.importers.guess import guess_recipe
 from pipelines.importers.recipe import parse_recipe
 from pipelines.io.robot_files import load_robot
-from rrrid_cli.settings import make_settings
+from rrrid_cli.options import make_settings
 
 __all__ = ["Reading", "mutations", "read_apart", "warm_up"]
 

@@ -20,6 +20,7 @@ from typing import Any
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
 from pipelines.io.compared import called, label_of, of_other_commands
+from pipelines.io.option import option
 from pipelines.io.result_figures import fitted, numbers_of, residuals, robot_of
 from pipelines.io.result_models import less_findings, modelled
 from pipelines.io.run_results import read_any_result
@@ -43,7 +44,7 @@ _Figures = Mapping[str, tuple[float, float, str]]  # name -> value, std, unit
 class Settings:
     """`alpha`: how often two results of one and the same arm may be said to differ."""
 
-    alpha: float = 0.01
+    alpha: float = option(0.01, "How often two results of one arm may be said to differ.")
 
 
 def read(request: Request, settings: Settings) -> Inputs:

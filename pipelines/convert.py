@@ -14,6 +14,7 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.io.canonical import digest_of
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
 from pipelines.io.table import write_csv
 from pipelines.report.report import Report, Section, Table
@@ -28,7 +29,7 @@ _OTHER = {"hdf5": "parquet", "parquet": "h5"}
 class Settings:
     """`to`: "h5", "parquet" or "csv"; empty: the container that the log is not in."""
 
-    to: str = ""
+    to: str = option("", "h5, parquet or csv; goes before --format. [what the log is not in]")
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Record logs to try things on: the shipped arm in simulation, with something wrong at one of its joints.
+"""Simulate an arm with something wrong at a joint, and run the whole workflow on its logs.
 
 Reads    nothing
 Writes   logs/, result.json with what was hidden in them, report.html
@@ -17,6 +17,7 @@ from pipelines.diagnosis.result import Diagnosis, NotIdentifiable
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
 from pipelines.model.effects import find_effect
 from pipelines.model.simulation.example import FAULT, example_session
@@ -34,8 +35,8 @@ _NUMBERS = 3  # of a finding whose numbers nobody has chosen
 class Settings:
     """What is hidden, and which motions and which noise there are."""
 
-    fault: tuple[str, ...] = (FAULT,)  # CAUSE:JOINT:NAME=VALUE,…; none: the arm is in order
-    seed: int = 1
+    fault: tuple[str, ...] = option((FAULT,), "What to hide: CAUSE:JOINT:NAME=VALUE,…, or none. Repeatable. [cogging at joint 2]", causes=True)
+    seed: int = option(1, "Seed of motions and noise.")
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from pipelines.importers.recipe import Recipe
 from pipelines.io.atomic import write_file
 from pipelines.io.files import write_log
 from pipelines.io.model_file import read_model
+from pipelines.io.option import option
 from pipelines.io.results import json_text, stored_result
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
@@ -56,34 +57,34 @@ _APART_HARMONICS = (20,)  # a search without gradients wants fewer
 class Settings:
     """What to design for which robot, and how long to search."""
 
-    robot: str | None = None  # a description, a URDF or a shipped name; None: robot.toml here, else the shipped rrr
-    experiment: str = "excitation"
-    criterion: str = "default"  # A-optimal with a condition number of 3 at most; or condition, frobenius, E, D, A
-    cond_max: float | None = None
-    harmonics: tuple[int, ...] | None = None  # one, or one a joint
-    frequency: tuple[float, ...] = (0.1,)  # [Hz] fundamental: one, or one a joint
-    stop_band: tuple[float, ...] = ()  # [Hz] bands without harmonics: from, to, from, to, …
-    time_limit: float = 30.0  # of computing
-    evaluations: int | None = None  # instead of seconds: the same number and seed give the same design again
-    seed: int = 1
-    symmetric: bool = False  # p4 = p15 = 0
-    model: str | None = None  # predicts torque and friction
-    bounds: str | None = None  # a file of bounds on the parameters, where no model and no links are known
-    home: tuple[float, ...] | None = None  # [rad]
-    rest: bool = True
-    periods: int = 1
-    random: bool = False  # of "frf": noise in the place of multisines
+    robot: str | None = option(None, "Description, URDF, log or shipped name. [robot.toml here, else rrr]", "ROBOT")
+    experiment: str = option("excitation", "excitation, friction, frf or hold.")
+    criterion: str = option("default", "default (A with condition 3), condition, frobenius, E, D or A.")
+    cond_max: float | None = option(None, "Ceiling on the condition number. [default: 3]")
+    harmonics: tuple[int, ...] | None = option(None, "Harmonics: one number, or one a joint.")
+    frequency: tuple[float, ...] = option((0.1,), "Fundamental [Hz]: one, or one a joint.")
+    stop_band: tuple[float, ...] = option((), "Bands without harmonics [Hz]: 4,6 or 4,6,11,13.")
+    time_limit: float = option(30.0, "Time to search, in seconds of computing.")
+    evaluations: int | None = option(None, "Search so many evaluations instead: repeatable exactly.")
+    seed: int = option(1, "Seed of the search.")
+    symmetric: bool = option(False, "Mirror-symmetric links: p4 = p15 = 0.")
+    model: str | None = option(None, "Model that predicts torque and friction. [the described links]")
+    bounds: str | None = option(None, "Bounds on the parameters (TOML), where no model is known.")
+    home: tuple[float, ...] | None = option(None, "Posture to start from [rad], one a joint: 0,-1.57,0.")
+    rest: bool = option(True, "In motion at both ends, with run-in and run-out.", "--no-rest")
+    periods: int = option(1, "How often the period is repeated.")
+    random: bool = option(False, "frf: random noise in the place of odd multisines.")
     sample_time: float = 1e-3  # [s]
-    friction: bool | None = None  # count columns of friction; None: on every arm but the paper's, which has tests of its own
+    friction: bool | None = option(None, "Count columns of friction as well. [on every arm but the RRR arm]", "--friction/--no-friction")
     noise: tuple[float, ...] | None = None  # [N m] std of the torque; None: 1 % of its limit
     torque_share: float = 0.9  # of the torque limit that the plan may use
     speed_share: float = 0.95  # of the speed limit: a loop without feed-forward overshoots by up to 4 %
-    tip_speed: float | None = None  # [m/s]
-    tip_box: tuple[float, ...] | None = None  # [m]
-    recipe: str | None = None  # whose inverse writes controller.csv
+    tip_speed: float | None = option(None, "Limit on the speed of the tip [m/s].")
+    tip_box: tuple[float, ...] | None = option(None, "Box for the tip [m]: x from,to, y from,to, z from,to.")
+    recipe: str | None = option(None, "Recipe of import: controller.csv in its order, units and rate.")
     mode_factor: float = 3.0  # the top harmonic stays so many times below the first mode that --prior-logs knows
     rehearse: bool = True
-    discriminate: tuple[str, ...] = ()  # two causes, CAUSE[:JOINT[:NAME=VALUE]], that the motion shall tell apart
+    discriminate: tuple[str, ...] = option((), "Two causes that the motion shall separate: spring:2 cogging:2:order=1.", pair=True, causes=True)
 
     @property
     def wishes(self) -> Wishes:

@@ -21,6 +21,7 @@ from pipelines.io.derive import derive, recording
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
 from pipelines.io.model_file import Source, read_model, write_model
+from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.io.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
@@ -63,26 +64,21 @@ _COURSES = 3  # logs drawn
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Reconstruction):
     """How motion is reconstructed (as `reconstruct`), what is done alike to torque and columns, and what is estimated."""
 
-    method: str = Reconstruction.method
-    order: int = Reconstruction.order
-    jerk_std: tuple[float, ...] | None = None  # [rad/s^order]
-    bandwidth: tuple[float, ...] | None = None  # [Hz]
-    average: bool = True  # periods of periodic logs, where they differ by noise alone
-    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: the band of motion and dry friction
-    decimate: int | None = None  # every Nth sample; None: four a period of the filter
-    min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
-    symmetric: bool = False  # p4 = p15 = 0
-    weighted: bool = True  # joints by their own residual; False: all alike
+    cutoff_hz: float | None = option(None, "Low-pass over torque and columns [Hz]. [from the motion]")
+    decimate: int | None = option(None, "Keep every Nth sample. [four a period of the low-pass]")
+    min_speed: tuple[float, ...] = option((0.0,), "Leave slower samples out [rad/s]: one, or one a joint.")
+    symmetric: bool = option(False, "RRR arm, mirror-symmetric links: p4 = p15 = 0.")
+    weighted: bool = option(True, "Weigh all joints alike, as Kostić et al. 2004.", "--unweighted")
     offset: bool = True
     rotor_inertia: bool | None = None  # None: on geared arms
-    blocks: int = 10  # held out in turn where no log is
+    blocks: int = option(10, "Blocks held out in turn where no log is validate.")
     compare: bool = True  # the four ways to reconstruct, side by side
-    model: str | None = None  # a model file; its friction is subtracted instead of fitted
-    allow_overlap: bool = False  # one recording may be fitted and judged by
-    skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
+    model: str | None = option(None, "model.json whose friction is subtracted, not fitted.")
+    allow_overlap: bool = option(False, "One recording may be fitted and judged by.")
+    skip_sanity_checks: bool = option(False, "Fit torque that fails its checks.")
 
     @property
     def reconstruction(self) -> Reconstruction:

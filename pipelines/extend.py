@@ -10,6 +10,7 @@ takes its numbers from frequency responses, a load from how the base parameters 
 is named with the reason; there is no way around it. A model that an earlier extension left in the default folder, and this one
 does not make anew, is moved beside it with its whole output, extend-cogging-2: the default folder holds the newest outcome, whoever
 looks there finds a model only where it was accepted, and no model that was accepted is lost.
+Takes some 10 s for three joints and two minutes of motion.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from pipelines.io.derive import derive, recording
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
 from pipelines.io.model_file import Source, read_model, write_model
+from pipelines.io.option import option
 from pipelines.model.arm import Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
@@ -53,16 +55,16 @@ __all__ = ["STAGE", "Extension", "Settings", "compute", "read", "report"]
 class Settings:
     """By what the model is extended, and which logs do what."""
 
-    causes: tuple[str, ...] = ()  # CAUSE[:JOINT[:NAME=VALUE,…]]; the values are where non-linear numbers start
+    causes: tuple[str, ...] = option((), "CAUSE:JOINT, or CAUSE:JOINT:NAME=VALUE with a start for a non-linear number: cogging:2:order=18; all causes are listed below. What may act more than once at a joint, waves of several orders say, does so as held-out logs confirm. Repeatable.", "--with", causes=True)
     identify: tuple[str, ...] = ()  # paths of logs to fit, instead of those that say so
     validate: tuple[str, ...] = ()  # that judge
     reference: tuple[str, ...] = ()  # of the arm as it was before
-    model: str | None = None  # a model file: its friction laws and its effects are fitted anew
-    blocks: int = BLOCKS  # held out in turn where no log is
-    cutoff_hz: float | None = None  # [Hz] low-pass over torque and columns; None: from the motion
-    decimate: int | None = None  # every Nth sample; None: from the filter
-    min_speed: tuple[float, ...] = (0.0,)  # [rad/s] slower samples of a joint are left out of its own equations
-    skip_sanity_checks: bool = False  # torque that looks swapped, flipped, scaled or mistimed beside the motion may be fitted
+    model: str | None = option(None, "model.json to extend: its effects are kept, and fitted anew.")
+    blocks: int = option(BLOCKS, "Blocks held out in turn where no log is validate.")
+    cutoff_hz: float | None = option(None, "Low-pass over torque and columns [Hz]. [of the motion, 10..25]")
+    decimate: int | None = option(None, "Keep every Nth sample. [2.6 a period of the low-pass]")
+    min_speed: tuple[float, ...] = option((0.0,), "Leave slower samples out [rad/s]: one, or one a joint.")
+    skip_sanity_checks: bool = option(False, "Fit torque that fails its checks.")
 
 
 @dataclass(frozen=True)

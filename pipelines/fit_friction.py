@@ -20,6 +20,7 @@ from pipelines.io.derive import derive, recording
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
 from pipelines.io.model_file import ModelFile, Source, read_model, write_model
+from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe
@@ -56,9 +57,9 @@ __all__ = ["STAGE", "Result", "Settings", "compute", "report"]
 class Settings:
     """Law, method and windows of the fit."""
 
-    law: str | None = None  # a friction law, or several joined by "+"; None: the simplest that is not measurably worse
-    method: str = "varpro"  # how its numbers are found in the end: varpro, output-error or ekf
-    window: float = 0.02  # [s] of the equations, the shortest: a coarse encoder takes longer ones
+    law: str | None = option(None, "Law to fit, as the report names it. [the simplest that is not worse]")
+    method: str = option("varpro", "varpro, output-error, or ekf (Kostić et al. 2004).")
+    window: float = option(0.02, "Windows of the equations [s], the shortest.")
     order: int = Reconstruction.order  # of the smoother that motion begins with
     together: bool = True  # where no joint was driven alone: friction with the base parameters, from logs in which all move
 

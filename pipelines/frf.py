@@ -21,6 +21,7 @@ from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.io.derive import recording
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.model_file import read_model
+from pipelines.io.option import option
 from pipelines.model.arm import Arm
 from pipelines.model.frf.findings import Findings, frf_findings
 from pipelines.model.frf.grouping import GroupingConfig, advance
@@ -68,12 +69,12 @@ _CONFIG = FrfConfig()
 class Settings:
     """How responses are estimated, where modes are looked for, and what is drawn."""
 
-    estimator: str = "auto"  # multisine where v repeats, else local-polynomial; or welch
-    resolution: float | None = None  # [Hz] of local polynomials and Welch's segments; None: 0.25 Hz, or one over the period
-    low: float = BAND[0]  # [Hz] modes are looked for from here
-    high: float = BAND[1]  # [Hz] to here, or 0.3 of the rate
-    model: str | None = None  # model.json whose inertia is expected; None: the controller's own
-    postures: tuple[int, ...] = ()  # of each joint, numbered as in the table: drawn as Bode plots; none: the paper's two
+    estimator: str = option("auto", "auto, multisine, local-polynomial or welch.")
+    resolution: float | None = option(None, "Of the spectra [Hz]. [0.25, or one over the period]")
+    low: float = option(BAND[0], "Modes are looked for from here [Hz].")
+    high: float = option(BAND[1], "To here [Hz]. [250, or 0.3 of the rate]")
+    model: str | None = option(None, "model.json whose inertia is expected. [the controller's own]")
+    postures: tuple[int, ...] = option((), "Postures to draw, by their numbers: 1,3. [nearest to the two of Kostić et al. 2004]", "--posture")
 
 
 @dataclass(frozen=True)

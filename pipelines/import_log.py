@@ -27,6 +27,7 @@ from pipelines.importers.recipe import ResampleSpec
 from pipelines.importers.repair import Limits, Recording, late_intervals, repair
 from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.files import regular_file, write_log
+from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import RobotDescription
 from pipelines.io.table import write_table
@@ -65,10 +66,11 @@ class Settings:
     `map`: "q_1=Joint_1", columns named differently from the recipe. `trust_units`: units are what is declared, however large
     the numbers."""
 
-    recipe: str = ""
-    source: Path | None = None
-    map: tuple[str, ...] = ()
-    trust_units: bool = False
+    recipe: str = option("", "Recipe: a TOML file, or the name of a shipped one.", "RECIPE")
+    source: Path | None = option(None, "Folder the recordings are in. [the recipe's]")
+    map: tuple[str, ...] = option((), "Column to take for a signal: q_1=Joint_1. Repeatable.")
+    trust_units: bool = option(False, "Units are as declared, however large the numbers.")
+    guess: Path | None = option(None, "Draft a recipe for this recording, with the evidence; print it.", option=False)
 
 
 @dataclass(frozen=True)

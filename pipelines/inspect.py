@@ -19,6 +19,7 @@ from pipelines.estimation.checks.findings import boundary_findings, without_foll
 from pipelines.io.codes import first_to_read, title_of
 from pipelines.io.derive import recording
 from pipelines.io.files import Opened
+from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.plausibility import plausibility_findings
 from pipelines.quality.checks import NotTested, Subject, check_together, findings
@@ -43,8 +44,8 @@ class Settings:
     """`trust_units`: units are what the log says, however large the numbers (S05, S07). `allow_overlap`: one recording may have two
     roles (D14)."""
 
-    trust_units: bool = False
-    allow_overlap: bool = False
+    trust_units: bool = option(False, "Units are as declared, however large the numbers.")
+    allow_overlap: bool = option(False, "One recording may be fitted and judged by.")
 
 
 @dataclass(frozen=True)

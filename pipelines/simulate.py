@@ -20,6 +20,7 @@ from pipelines.io.derive import recording
 from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import Opened, write_log
 from pipelines.io.model_file import read_model
+from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.named_cause import acting_cause
@@ -38,14 +39,14 @@ _DRAWN = 4  # logs whose series are kept for figures
 class Settings:
     """Which model, what ails it, and how its logs are imitated."""
 
-    model: str = ""  # a model file
-    fault: tuple[str, ...] = ()  # CAUSE[:JOINT]:NAME=VALUE,…
-    replicas: int = 1
-    seed: int = 1
-    noise: tuple[float, ...] = ()  # [N m] std of the drives' torque noise: one, or one a joint
-    windowed: bool = False
-    window: float = 0.1  # [s]
-    steps: int | None = None  # of the integrator, a sample, the body held in none; None: as few as the error allows
+    model: str = option("", "The model.json of estimate-bps, or the shipped 'rrr'.", "MODEL")
+    fault: tuple[str, ...] = option((), "CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes are listed below; a wrong NAME is refused with a list of the right ones.", causes=True)
+    replicas: int = option(1, "Simulations that differ in their noise; windows have one.")
+    seed: int = option(1, "Seed of the first one's noise.")
+    noise: tuple[float, ...] = option((), "Torque noise of the drives, std [N m], one or one a joint: 0.02,0.01,0.005. Windows have none. [0]")
+    windowed: bool = option(False, "In short windows, though the controller is known.")
+    window: float = option(0.1, "Length of such a window [s].")
+    steps: int | None = option(None, "Runge-Kutta steps a sample; 1 to 1000. [as few as the error allows]")
 
     @property
     def how(self) -> How:

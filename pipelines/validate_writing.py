@@ -20,6 +20,7 @@ from pipelines.io.derive import derive, recording
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
 from pipelines.io.model_file import ModelFile, read_model
+from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.io.text import read_small_text
@@ -44,25 +45,25 @@ _LONGEST = 200  # letters, or moves: minutes of writing, and seconds of planning
 class Settings:
     """Which model is judged and by what; or which task is designed."""
 
-    model: str | None = None  # a model file; None: what the folder holds, or what its logs give
-    torque_gate: float = 0.1  # relative torque error of a joint
-    draws: int = 5  # of the controller's model, where control cases are simulated
-    seed: int = 1  # of those draws, and of via points
-    simulate: bool = True  # the task, and control cases that nobody recorded
-    text: str | None = None  # design this task instead
-    plane_y: float = Wishes.plane_y  # [m] the plane of the letters
-    x: float = Wishes.x  # [m] the middle of the text
-    z: float = Wishes.z  # [m]
-    size: float = Wishes.size  # [m] height of a letter
+    model: str | None = option(None, "model.json to judge. [the folder's, else fitted to its logs]")
+    torque_gate: float = option(0.1, "Largest relative torque error of a joint.")
+    draws: int = option(5, "Models that simulated control cases run on in turn.")
+    seed: int = option(1, "Seed of those, and of via points.")
+    simulate: bool = option(True, "Judge by what was recorded alone.", "--no-simulation")
+    text: str | None = option(None, "Design this writing task instead: trajectory.h5 for the robot.")
+    plane_y: float = option(Wishes.plane_y, "Plane of the letters, y [m].")
+    x: float = option(Wishes.x, "Middle of the text, x [m].")
+    z: float = option(Wishes.z, "Middle of the text, z [m].")
+    size: float = option(Wishes.size, "Height of a letter [m].")
     lift: float = Wishes.lift  # [m] off the plane between strokes
-    speed: float = Wishes.speed  # [m/s] of the tip in fast phases
-    slow: float = Wishes.slow  # [m/s] in slow ones
-    acceleration: float = Wishes.acceleration  # [m/s^2] of the tip
-    elbow: str | None = None  # up | down, of the RRR arm; None: up
-    posture: tuple[float, ...] | None = None  # [rad] near the task, of any other arm
-    via_points: int | None = None  # design so many moves between random postures instead of a text
+    speed: float = option(Wishes.speed, "Speed of the tip in fast phases [m/s].")
+    slow: float = option(Wishes.slow, "In slow phases, from a line into an arc [m/s].")
+    acceleration: float = option(Wishes.acceleration, "Largest acceleration of the tip [m/s^2].")
+    elbow: str | None = option(None, "up or down, of the RRR arm. [up]")
+    posture: tuple[float, ...] | None = option(None, "Posture near the task [rad], of any other arm.")
+    via_points: int | None = option(None, "Design so many moves between random postures instead.")
     sample_time: float = 1e-3  # [s] of the designed task
-    recipe: str | None = None  # whose inverse writes controller.csv
+    recipe: str | None = option(None, "Recipe of import: controller.csv in its order, units and rate.")
 
     @property
     def designs(self) -> bool:

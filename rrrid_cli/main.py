@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import atexit
-import copy
+import codecs
+import json
 import os
+import re
 import signal
 import sys
+import unicodedata
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from types import FrameType
@@ -15,139 +19,195 @@ from typing import Any, NoReturn, TextIO
 import typer
 
 from pipelines.batch.process import economise
-from pipelines.errors import EnvironmentFault, Interrupted, RrridError
+from pipelines.errors import EnvironmentFault, Interrupted, RrridError, UsageError, did_you_mean
 from pipelines.io.atomic import fault_of
-from rrrid_cli.commands import app
-from rrrid_cli.console import say_error, say_error_object
-from rrrid_cli.streams import prepare_streams
-from rrrid_cli.usage import WrongUsage, as_error, as_given
+from rrrid_cli.app import build
+from rrrid_cli.console import print_error
 
-__all__ = ["entry"]
+__all__ = ["call", "entry"]
 
-
-def _interrupt(number: int, _frame: FrameType | None) -> NoReturn:
-    raise Interrupted(number)
+# What a character becomes where an encoding lacks it; any other its closest ASCII letters.
+PLAIN = '→:-> ·:- −:- ×:x ≤:<= ≥:>= ±:+- ∞:inf τ:tau Φ:Phi “:" ”:" ’:\''
 
 
 def entry() -> NoReturn:
-    """The console script: every error becomes one line and an exit code; a traceback only with --debug."""
+    """Run the program: an error becomes one line and an exit code, with --debug a traceback."""
     economise()
     signal.signal(signal.SIGTERM, _interrupt)
     signal.signal(signal.SIGINT, _interrupt)
-    sys.unraisablehook = _again
-    as_json, debug = "--json" in sys.argv, "--debug" in sys.argv
-    prepare_streams(as_json)
+    sys.unraisablehook = _raise_again
+    words = sys.argv[1:]
+    _prepare_streams("--json" in words)
     try:
-        if "_RRRID_COMPLETE" in os.environ:  # a shell asks how the line could go on
-            app(prog_name="rrrid", complete_var="_RRRID_COMPLETE")
-        code = _ended(sys.argv[1:])
-    except (RrridError, Interrupted) as problem:
-        _deaf()
-        if debug:
-            raise
-        error = problem.as_error() if isinstance(problem, Interrupted) else as_given(_no_folder(problem), sys.argv[1:])
-        _say(error, as_json)
-        if isinstance(problem, Interrupted):
-            _leave(error.exit_code)
-        sys.exit(error.exit_code)
+        code = _exit_code(words)
     except BrokenPipeError:
-        # The reader of a pipe has left; what is still buffered goes nowhere, without a second complaint at exit.
-        _mute()
-        sys.exit(0)
-    except OSError as problem:
-        if debug:
+        _discard(
+            sys.stdout, sys.stderr
+        )  # the reader of a pipe has left: without a second complaint at exit
+        code = 0
+    except (Exception, Interrupted) as problem:
+        _ignore_signals()
+        if "--debug" in words:
             raise
-        fault = _no_folder(fault_of(problem, Path("standard output")))
-        _say(fault, as_json=False)
-        _mute()
-        sys.exit(fault.exit_code)
-    except Exception as problem:
-        if debug:
-            raise
-        _say(_internal(problem), as_json)
-        sys.exit(70)
-    _deaf()
+        error = _as_error(problem, words)
+        code = error.exit_code
+        _print_error(error, "--json" in words)
+        if isinstance(problem, Interrupted):
+            _leave(code)
+    _ignore_signals()
     sys.exit(code)
 
 
-def _ended(words: list[str]) -> int:
-    """The exit code of a command, when all that it prints has been taken."""
+def _exit_code(words: Sequence[str]) -> int:
+    """Return the exit code of a command, when all that it prints has been taken."""
+    code = 0
     try:
-        _call(words)
-        code = 0
+        call(words)
     except typer.Exit as ended:
         code = ended.exit_code
     sys.stdout.flush()
     return code
 
 
-def _say(error: RrridError, as_json: bool) -> None:
-    """Print the error on each stream that takes it; the exit code reports it in any case."""
-    try:
-        say_error(error)
-    except OSError:
-        _mute(sys.stderr)
-    try:
-        if as_json:
-            say_error_object(error)
-        sys.stdout.flush()
-    except OSError:
-        _mute(sys.stdout)
-
-
-def _no_folder(problem: RrridError) -> RrridError:
-    """`problem`, or that the working folder is gone, which explains what the machine could not do."""
-    try:
-        os.getcwd()
-    except FileNotFoundError:
-        if isinstance(problem, EnvironmentFault):
-            return EnvironmentFault("P02", "the folder that the command was called in was deleted", where="working folder",
-                                    remedy="call it from a folder that exists (cd)")
-    return problem
-
-
-def _mute(*streams: TextIO) -> None:
-    """Discard further output on these streams, or both: the reader of the pipe has left, or the disk is full."""
-    for stream in streams or (sys.stdout, sys.stderr):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def _call(words: list[str]) -> None:
-    """Parse and run, without the parser's own way of ending: it has other words for errors, and 1 for Ctrl-C.
+def call(words: Sequence[str]) -> None:
+    """Parse and run; typer's own way of ending has other words for errors, and 1 for Ctrl-C.
 
     Raises:
         typer.Exit: done, with the exit code.
-        UsageError: C01, an unknown option or command; C02, an argument is missing or has the wrong form.
+        UsageError: C01, an unknown option or command; C02, an argument is missing or wrong.
     """
-    only = _with_only(words[0]) if words else app
-    command = typer.main.get_command(only)
+    if "_RRRID_COMPLETE" in os.environ:  # a shell asks how the line could go on
+        line = os.environ.get("COMP_WORDS", "") or os.environ.get("_TYPER_COMPLETE_ARGS", "")
+        build("".join(line.split()[1:2]))(prog_name="rrrid", complete_var="_RRRID_COMPLETE")
+    command = typer.main.get_command(build(words[0] if words else ""))
     try:
         with command.make_context("rrrid", list(words)) as context:
             command.invoke(context)
-    except WrongUsage as problem:
+    except typer.TyperException as problem:
         if not words:  # `rrrid` alone: the help
             print(problem.format_message(), file=sys.stderr)
             raise typer.Exit(2) from None
-        raise as_error(problem, "rrrid" if only.registered_commands is app.registered_commands else f"rrrid {words[0]}") from None
+        raise _usage_error(problem, f"rrrid {words[0]}") from None
 
 
-def _with_only(word: str) -> typer.Typer:
-    """The application with the one command that is called for; with all of them where `word` is none, for a hint."""
-    named = [command for command in app.registered_commands
-             if word == (command.name or getattr(command.callback, "__name__", None))]
-    narrow = copy.copy(app)
-    narrow.registered_commands = named or app.registered_commands
-    return narrow
+def _usage_error(problem: typer.TyperException, called: str) -> UsageError:
+    """Return typer's complaint in rrrid's words.
+
+    Args:
+        called: the command, where typer does not say whose option it is.
+    """
+    context: Any = getattr(problem, "ctx", None)
+    where = context.command_path if context is not None else called
+    text, code = problem.format_message().splitlines()[0].rstrip("."), "C02"
+    if found := re.match(r"No such (option|command):? '?([^' ]+)", text):
+        known = list(getattr(context.command, "commands", {}))
+        if found[1] == "option":
+            known = [name for one in context.command.get_params(context) for name in one.opts]
+        text, code = f"no such {found[1]} '{found[2]}'{did_you_mean(found[2], known)}", "C01"
+    return UsageError(
+        code, f"{text[0].lower()}{text[1:]}", where=where, remedy=f"see '{where} --help'"
+    )
 
 
-def _deaf() -> None:
-    """All is decided: no signal may end the last words in a traceback."""
+def _as_error(problem: BaseException, words: Iterable[str]) -> RrridError:
+    """Return what ended a command as an error with a code, a place and a remedy."""
+    if isinstance(problem, Interrupted):
+        return problem.as_error()
+    if isinstance(problem, OSError):
+        problem = fault_of(problem, Path("standard output"))
+    if not isinstance(problem, RrridError):
+        return _internal(problem)
+    try:
+        os.getcwd()
+    except FileNotFoundError:  # relative paths mean nothing
+        if isinstance(problem, EnvironmentFault):
+            return EnvironmentFault(
+                "P02",
+                "the folder that the command was called in was deleted",
+                where="working folder",
+                remedy="call it from a folder that exists (cd)",
+            )
+        return problem
+    return _as_given(problem, words)
+
+
+def _as_given(problem: RrridError, words: Iterable[str]) -> RrridError:
+    """Return the error with every path as the command line gave it; stages have absolute paths."""
+    from pipelines.io.places import renamed
+
+    names: dict[str, str] = {}
+    for text in (
+        part
+        for word in words
+        for part in (word, word.partition("=")[2])
+        if part and not part.startswith("-")
+    ):
+        path = Path(text)
+        for one in () if path.is_absolute() else (path, *path.parents):
+            if one == path or one != Path():
+                names.setdefault(str(one.absolute()), str(one))
+                names.setdefault(os.path.abspath(one), str(one))
+    for each in (problem, *problem.others):
+        each.where, each.message, each.remedy = (
+            renamed(text, names) for text in (each.where, each.message, each.remedy)
+        )
+    return problem
+
+
+def _internal(problem: BaseException) -> RrridError:
+    """Return an error of rrrid's own: the traceback goes to a file, the user gets one line."""
+    import tempfile
+    import traceback
+
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="rrrid-crash-", suffix=".txt", delete=False, encoding="utf-8"
+    ) as file:
+        file.write(f"{' '.join(sys.argv)}\n\n")
+        traceback.print_exception(problem, file=file)
+    return RrridError(
+        "Z70",
+        f"internal error: {type(problem).__name__}: {problem}",
+        remedy=f"please report it with {file.name}",
+    )
+
+
+def _print_error(error: RrridError, as_json: bool) -> None:
+    """Print an error on each stream that takes it; the exit code says it in any case."""
+    try:
+        print_error(error)
+    except OSError:
+        _discard(sys.stderr)
+    try:
+        if as_json:
+            from pipelines.io.results import json_text
+
+            others = {"others": [other.as_dict() for other in error.others]} if error.others else {}
+            sys.stdout.write(
+                json_text({"error": error.as_dict(), "exit": error.exit_code, **others})
+            )
+        sys.stdout.flush()
+    except OSError:
+        _discard(sys.stdout)
+
+
+def _discard(*streams: TextIO) -> None:
+    """Discard further output: the reader of the pipe has left, or the disk is full."""
+    for stream in streams:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> NoReturn:
+    raise Interrupted(number)
+
+
+def _ignore_signals() -> None:
+    """Let no signal end the last words in a traceback."""
     for number in (signal.SIGTERM, signal.SIGINT):
         signal.signal(number, signal.SIG_IGN)
 
 
 def _leave(exit_code: int) -> NoReturn:
-    """End without taking the interpreter apart: a signal that broke into a C library may have left it where that crashes."""
+    """End at once: after a signal inside a C library the interpreter may not be able to end."""
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError):
@@ -155,25 +215,51 @@ def _leave(exit_code: int) -> NoReturn:
     os._exit(exit_code)
 
 
-def _again(lost: Any) -> None:
-    """A signal that came while Python could raise nothing (in a destructor, in a callback of C) comes once more."""
+def _raise_again(lost: Any) -> None:
+    """Send a signal once more that came where Python can raise nothing: in a destructor, say."""
     if isinstance(lost.exc_value, Interrupted):
         import threading
 
         threading.Timer(0.01, os.kill, (os.getpid(), lost.exc_value.exit_code - 128)).start()
-    elif "h5py" not in str(lost.object):  # what a full disk makes of HDF5's objects, beside the error that has been told
+    elif "h5py" not in str(
+        lost.object
+    ):  # what a full disk makes of HDF5's objects, after the error that was printed
         sys.__unraisablehook__(lost)
 
 
-def _internal(problem: Exception) -> RrridError:
-    """An error of ours: the traceback goes to a file, the user gets one line."""
-    import tempfile
-    import traceback
+def _prepare_streams(as_json: bool) -> None:
+    """Open a closed standard stream on the null device, and let no character fail.
 
-    with tempfile.NamedTemporaryFile("w", prefix="rrrid-crash-", suffix=".txt", delete=False, encoding="utf-8") as file:
-        file.write(f"{' '.join(sys.argv)}\n\n")
-        traceback.print_exception(problem, file=file)
-    return RrridError("Z70", f"internal error: {type(problem).__name__}: {problem}", remedy=f"please report it with {file.name}")
+    A character that the encoding lacks becomes an escape in JSON and elsewhere similar letters.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            null = os.open(os.devnull, os.O_RDWR)
+            if null != number:  # a later file must not take the number
+                os.dup2(null, number)
+            setattr(sys, name, open(number, "r" if number == 0 else "w", encoding="utf-8"))  # noqa: SIM115
+    codecs.register_error("rrrid-json", _escape)
+    codecs.register_error("rrrid-plain", _simplify)
+    for stream, errors in (
+        (sys.stdout, "rrrid-json" if as_json else "rrrid-plain"),
+        (sys.stderr, "rrrid-plain"),
+    ):
+        if (change := getattr(stream, "reconfigure", None)) is not None:
+            change(errors=errors)
+
+
+def _escape(problem: UnicodeError) -> tuple[str, int]:
+    """Return the characters that an encoding lacks as JSON escapes."""
+    assert isinstance(problem, UnicodeEncodeError)
+    return json.dumps(problem.object[problem.start : problem.end])[1:-1], problem.end
+
+
+def _simplify(problem: UnicodeError) -> tuple[str, int]:
+    """Return similar characters for those that an encoding lacks."""
+    assert isinstance(problem, UnicodeEncodeError)
+    missing = unicodedata.normalize("NFKD", problem.object[problem.start : problem.end])
+    plain = dict(pair.split(":") for pair in PLAIN.split())
+    return "".join(plain.get(sign, sign if sign.isascii() else "") for sign in missing), problem.end
 
 
 if __name__ == "__main__":

@@ -1,232 +1,321 @@
-"""The options that every command shares, written once and put behind each command's own."""
+"""Options of the command line, made of dataclasses: names, help, defaults and kinds of values.
+
+A field declared by `pipelines.io.option.option` is an option of its stage's command; any other is
+set by --set or --config alone. typer gets every value as text, and `read_values` reads it as the
+field's kind.
+"""
 
 from __future__ import annotations
 
-import copy
-import functools
-import inspect
-from collections.abc import Callable
-from dataclasses import dataclass
+import sys
+import types
+import typing
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import Field, dataclass, fields
+from importlib import import_module
+from importlib.util import find_spec
+from inspect import Parameter
 from pathlib import Path
-from typing import Annotated, Any, get_args
+from typing import Annotated, Any, TypeVar
 
 import typer
 
-from pipelines.errors import UsageError
-from rrrid_cli.conversion import plainly
+from pipelines.errors import UsageError, clean, did_you_mean
+from pipelines.io.option import option
+from pipelines.io.toml_text import TomlError, parse_toml
 
-__all__ = ["CauseCommand", "Common", "LogPaths", "Roles", "SomeLogs", "StageCommand", "StageGroup", "numbers", "whole_numbers",
-           "with_common", "with_common_but"]
+__all__ = ["Common", "make_settings", "parameters", "read", "read_values", "settable", "stage_of"]
 
-LogPaths = Annotated[list[Path], typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
-                                                  readable=False)]  # rrrid says it better: exit 6, RRID-F13
-SomeLogs = Annotated[list[Path] | None, typer.Argument(help="Logs, or folders of logs.", show_default=False, metavar="LOGS",
-                                                       readable=False)]  # of commands that take --identify in their place
-
-
-@dataclass(frozen=True)
-class Roles:
-    """Logs named for a role, instead of the logs' own roles."""
-
-    identify: tuple[str, ...] = ()
-    validate: tuple[str, ...] = ()
-    reference: tuple[str, ...] = ()
-
-    @property
-    def named(self) -> dict[str, tuple[str, ...]]:
-        """Role -> paths, of those that were given."""
-        return {role: paths for role in ("identify", "validate", "reference") if (paths := getattr(self, role))}
+S = TypeVar("S")
+# What a stage reads by itself. Within `run` it has logs and models from the run, unless the field
+# says `in_run`.
+OWN_INPUTS = ("identify", "validate", "reference", "model", "text", "via_points", "recipe")
+KINDS = {int: "a whole number", float: "a number", bool: "true or false", str: "a text"}
+METAVARS = {int: "NUMBER", float: "NUMBER", str: "TEXT", Path: "PATH"}
+EXAMPLES = {int: ("whole number", "4", "20,20,10"), float: ("number", "0.5", "50,60,70")}
 
 
 @dataclass(frozen=True)
 class Common:
-    """Values of the shared options."""
+    """Options of every command."""
 
-    out: Path | None
-    json: bool
-    strict: bool
-    check: bool
-    robot: str | None
-    assume_units: bool
-    format: str | None
-    config: Path | None
-    set: list[str]
-    no_report: bool
-    force: bool
-    quiet: bool
-    verbose: bool
-    debug: bool
-    joints: tuple[int, ...] = ()
-    session: str = ""
+    out: Path | None = option(None, "Folder for the output.")
+    json: bool = option(False, "Print result.json on standard output, and nothing else there.")
+    strict: bool = option(False, "A repair of the data is an error (exit 3).")
+    check: bool = option(False, "Exit 1 where a gate failed or something was found.")
+    robot: str | None = option(None, "Robot description to use instead of the logs' own.")
+    assume_units: bool = option(False, "Take signals without units as SI.")
+    format: str = option("h5", "Container of the logs that are written: h5 or parquet.")
+    config: Path | None = option(None, "TOML file of settings, one table a stage.")
+    set: tuple[str, ...] = option((), "One setting: STAGE.OPTION=VALUE; the names are below.")
+    no_report: bool = option(False, "Leave report and figures out.")
+    force: bool = option(False, "Replace files that were changed as well, and keep none.")
+    quiet: bool = option(False, "Print nothing but errors.", "-q", "--quiet")
+    verbose: bool = option(False, "Verbose progress.", "-v", "--verbose")
+    debug: bool = option(False, "Show the traceback of an internal error.")
 
-
-def _joints(text: str | None) -> tuple[int, ...]:
-    """"1,3" as joints, counted from 1."""
-    parts = text.split(",") if text is not None else []
-    if not all(part.strip().isascii() and part.strip().isdigit() and len(part.strip()) < 5 for part in parts):
-        raise UsageError("C02", f"'{text}' is no list of joints", where="--joints", remedy="write for example 1,3")
-    return tuple(int(part) for part in parts)
+    def __post_init__(self) -> None:
+        if self.quiet and self.verbose:
+            message, where = "-q and -v contradict each other", "-q, -v"
+            raise UsageError("C02", message, where=where, remedy="give one of them")
+        if self.format not in ("h5", "parquet"):
+            message = f"'{self.format}' is no container"
+            raise UsageError("C02", message, where="--format", remedy="give h5 or parquet")
 
 
-def numbers(texts: list[str] | None, where: str) -> tuple[float, ...] | None:
-    """"1,2,3", or an option given several times, as numbers; None where it was not given."""
-    if not texts:
-        return None
-    try:
-        return tuple(float(part) for text in texts for part in text.split(","))
-    except ValueError:
-        raise UsageError("C02", f"'{','.join(texts)}' is no list of numbers", where=where,
-                         remedy="write for example 50,60,70") from None
+def module_of(command: str) -> str:
+    """Return the module of a command's stage; `import` is a word of the language."""
+    return f"pipelines.{'import_log' if command == 'import' else command.replace('-', '_')}"
 
 
-def whole_numbers(texts: list[str] | None, where: str) -> tuple[int, ...] | None:
-    """The same for whole numbers."""
-    found = numbers(texts, where)
-    if found is not None and any(not value.is_integer() or abs(value) > 1e9 for value in found):
-        raise UsageError("C02", f"'{','.join(texts or ())}' is no list of whole numbers", where=where,
-                         remedy="write for example 20,20,10")
-    return None if found is None else tuple(map(int, found))
+def stage_of(command: str) -> Any:
+    """Return the stage of a command."""
+    return import_module(module_of(command)).STAGE
 
 
-def _flag(words: str, *names: str) -> Any:
-    return typer.Option(*names, help=words)
+def stage_file(command: str) -> Path:
+    """Return the file of a command's stage, which is not imported."""
+    return Path(str(getattr(find_spec(module_of(command)), "origin", "")))
 
 
-def _path(words: str, *names: str) -> Any:
-    return typer.Option(*names, help=words, readable=False)
-
-
-_ORDER = ("run", "batch", "demo", "inspect", "import", "convert", "design-excitation", "fit-friction", "reconstruct",
-          "estimate-bps", "validate-writing", "frf", "simulate", "diagnose", "extend", "compare", "report", "schema", "doctor")
-
-
-class StageGroup(typer.core.TyperGroup):
-    """All commands together, with --help and --version, in the order in which they are needed."""
-
-    def list_commands(self, ctx: Any) -> list[str]:
-        return sorted(super().list_commands(ctx), key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        return plainly(super().get_params(ctx))
-
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
-        """Every command with its whole sentence: it is wrapped, where the parser's own list would cut it."""
-        commands = [(name, self.get_command(ctx, name)) for name in self.list_commands(ctx)]
-        rows = [(name, " ".join((command.help or "").split("\n\n")[0].split())) for name, command in commands if command]
-        with formatter.section("Commands"):
-            formatter.write_dl(rows)
-
-
-class StageCommand(typer.core.TyperCommand):
-    """A command whose help ends in what --set takes. The stage is imported for its own help alone."""
-
-    def get_params(self, ctx: Any) -> list[Any]:
-        return plainly(super().get_params(ctx))
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        from rrrid_cli.settings import known_options
-
-        for stage, names in known_options(str(self.name)).items():
-            formatter.write_paragraph()
-            formatter.write_text(f"--set {stage}.OPTION=VALUE, options: {', '.join(names) or 'none'}.")
-
-
-class CauseCommand(StageCommand):
-    """A command that takes causes: its help ends in all of them, each with a few words."""
-
-    def format_epilog(self, ctx: Any, formatter: Any) -> None:
-        from pipelines.model.effects import all_effects
-
-        super().format_epilog(ctx, formatter)
-        for scope, title in (("joint", "Causes at one joint"), ("arm", "Causes of the whole arm")):
-            with formatter.section(title):
-                formatter.write_dl([(effect.name, effect.words.title) for effect in all_effects() if effect.scope == scope])
-
-
-_OUT = "Folder for everything the command leaves"
-_KEPT = "an earlier result of another command is kept"
-_SHARED: tuple[tuple[str, Any, Any], ...] = (
-    ("out", Annotated[Path | None, _path(f"{_OUT}; {_KEPT}. [runs/ROBOT/FOLDER/COMMAND]", "--out")], None),
-    ("json", Annotated[bool, _flag("Print result.json on standard output, and nothing else there.", "--json")], False),
-    ("strict", Annotated[bool, _flag("A repair of the data is an error (exit 3).", "--strict")], False),
-    ("check", Annotated[bool, _flag("Exit 1 where a gate failed or something was found.", "--check")], False),
-    ("robot", Annotated[str | None, _flag("Robot description to use instead of the logs' own.", "--robot")], None),
-    ("assume_units", Annotated[bool, _flag("Take signals without units as SI.", "--assume-units")], False),
-    ("format", Annotated[str | None, _flag("Container of the logs that are written: h5 or parquet. [h5]", "--format")], None),
-    ("config", Annotated[Path | None, _path("TOML file of settings, one table a stage.", "--config")], None),
-    ("set", Annotated[list[str], _flag("One setting: STAGE.OPTION=VALUE. Repeatable; the names are listed below.", "--set")], []),
-    ("no_report", Annotated[bool, _flag("Leave report and figures out.", "--no-report")], False),
-    ("force", Annotated[bool, _flag("Replace rrrid's own earlier output, files that were changed as well, and keep none.",
-                                     "--force")], False),
-    ("quiet", Annotated[bool, _flag("Print nothing but errors.", "-q", "--quiet")], False),
-    ("verbose", Annotated[bool, _flag("Verbose progress.", "-v", "--verbose")], False),
-    ("debug", Annotated[bool, _flag("Show the traceback of an internal error.", "--debug")], False),
-)
-
-
-# Of the commands that read logs.
-_JOINTS = ("joints", Annotated[str | None, _flag("Joints to take of every log: 1,3. With --robot, where it is another arm.",
-                                                  "--joints")], None)
-
-
-# Of the commands that read logs by their roles.
-_ROLES: tuple[tuple[str, Any, Any], ...] = tuple((role, Annotated[list[str], _flag(words, f"--{role}")], []) for role, words in (
-    ("identify", "Identification logs, instead of the logs' own roles. Repeatable."), ("validate", "Validation logs. Repeatable."),
-    ("reference", "Reference logs, of the arm as it was before. Repeatable.")))
-
-# Of the commands that read logs, except `batch`, which takes all sessions.
-_SESSION = ("session", Annotated[str, _flag("Of several robots or days take this: 'ROBOT', or "
-                                            "'ROBOT 2026-05-18'. [several are refused]", "--session")], "")
-_LOGS = {"logs", "replay", "prior_logs"}
-
-
-def _but(kind: Any, **said: Any) -> Any:
-    """An option of which help says other things."""
-    typed, option = get_args(kind)
-    other = copy.copy(option)
-    vars(other).update(said)
-    return Annotated[typed, other]
-
-
-def with_common_but(*idle: str, out: str = "") -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """`with_common` of a command on which the options `idle` have no effect: they are taken, and its help is silent about them.
+def parameters(
+    kind: type[Any], only: Iterable[str] | None = None, hidden: Iterable[str] = (), **texts: str
+) -> list[Parameter]:
+    """Return the typer parameters of a dataclass's options.
 
     Args:
-        out: where its output goes by default, if not where that of others goes.
+        only: fields that are offered; None: all.
+        hidden: fields about which help is silent.
+        texts: field -> other help.
     """
-    return lambda command: _with_common(command, idle, out)
+    found, hints = [], typing.get_type_hints(kind)
+    for field in fields(kind):
+        if "help" not in field.metadata or (only is not None and field.name not in only):
+            continue
+        value, many = _kind(hints[field.name])
+        taken: Any = bool if value is bool else list[str] if many else str
+        metavar = None if value is bool else METAVARS[value]
+        if field.metadata.get("pair"):
+            taken, metavar = tuple[str, str], f"{metavar} {metavar}"
+        flag = _flags(field)[0]
+        text = texts.get(field.name, field.metadata["help"])
+        default: Any = field.default
+        required = field.metadata.get("required", False)
+        if default not in (None, False, True, (), "") and not text.endswith("]") and not required:
+            text += f" [{','.join(map(str, default)) if many else default}]"
+        about: Any = typer.Argument(help=text, metavar=flag, show_default=False)
+        if flag.startswith("-"):
+            about = typer.Option(
+                *_flags(field),
+                help=text,
+                metavar=metavar,
+                hidden=field.name in hidden,
+                show_default=False,
+            )
+        found.append(
+            Parameter(
+                _key(kind, field),
+                Parameter.KEYWORD_ONLY,
+                default=Parameter.empty if required else None,
+                annotation=Annotated[taken if required else taken | None, about],
+            )
+        )
+    return found
 
 
-def with_common(command: Callable[..., None]) -> Callable[..., None]:
-    """`command(own options…, common)` as a command that takes the shared options as well; with `roles`, those too."""
-    return _with_common(command, (), "")
+def _flags(field: Field[Any]) -> tuple[str, ...]:
+    return field.metadata["flags"] or (f"--{field.name.replace('_', '-')}",)
 
 
-def _with_common(command: Callable[..., None], idle: tuple[str, ...], out: str) -> Callable[..., None]:
-    words: dict[str, dict[str, Any]] = {name: {"hidden": True} for name in idle}
-    if out:
-        words["out"] = {"help": f"{_OUT}. [{out}]"}
-    own = inspect.signature(command, eval_str=True)
-    by_role = _ROLES if "roles" in own.parameters else ()
-    options = [*by_role, *_SHARED]
-    if own.parameters.keys() & _LOGS:
-        options.append(_SESSION)
-    if own.parameters.keys() & {"logs", "root"}:
-        options.append(_JOINTS)
-    shared = [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, annotation=_but(kind, **words.get(name, {})), default=default)
-              for name, kind, default in options]
-    kept = [p for p in own.parameters.values() if p.name not in ("common", "roles")]
+def _key(kind: type[Any], field: Field[Any]) -> str:
+    """Return the name of an option among those of all dataclasses of a command."""
+    return f"{kind.__name__.lower()}_{field.name}"
 
-    @functools.wraps(command)
-    def run(**given: Any) -> None:
-        said = {name: given.pop(name) for name, _, _ in options}
-        if said["quiet"] and said["verbose"]:
-            raise UsageError("C02", "-q and -v ask for opposite things", where="-q, -v", remedy="give one of them")
-        if by_role:
-            given["roles"] = Roles(**{role: tuple(said.pop(role) or ()) for role, _, _ in by_role})
-        command(**given, common=Common(**(said | {"joints": _joints(said.get("joints"))})))
 
-    parameters = [p.replace(kind=inspect.Parameter.KEYWORD_ONLY) for p in kept] + shared
-    run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    run.__annotations__ = {p.name: p.annotation for p in parameters}
-    return run
+def _kind(hint: Any) -> tuple[Any, bool]:
+    """Return the kind of a value, and if there may be several: tuple[int, ...] gives int, True."""
+    while typing.get_origin(hint) in (typing.Union, types.UnionType):
+        hint = typing.get_args(hint)[0]
+    return (typing.get_args(hint)[0], True) if typing.get_origin(hint) is tuple else (hint, False)
+
+
+def read(kind: type[S], given: Mapping[str, Any]) -> S:
+    """Return a dataclass filled in from the command line."""
+    return kind(**read_values(kind, given))
+
+
+def read_values(kind: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what was given of the options of a dataclass, each as the kind of its field.
+
+    Raises:
+        UsageError: C02, no number where the option takes one.
+    """
+    hints, found = typing.get_type_hints(kind), {}
+    for field in fields(kind):
+        value = given.get(_key(kind, field))
+        if "help" not in field.metadata or value is None:
+            continue
+        wanted, many = _kind(hints[field.name])
+        flag = _flags(field)[0]
+        if wanted is bool:
+            found[field.name] = value if "/" in flag else not field.default
+        elif many and wanted in EXAMPLES:
+            text = ",".join(value)
+            found[field.name] = tuple(_number(wanted, part, flag, text) for part in text.split(","))
+        elif wanted in EXAMPLES:
+            found[field.name] = _number(wanted, value, flag, "")
+        else:
+            found[field.name] = tuple(map(wanted, value)) if many else wanted(value)
+    return found
+
+
+def _number(kind: type[Any], text: str, flag: str, listed: str) -> Any:
+    """Return a number of the command line, one of `listed` where there may be several."""
+    try:
+        value = kind(text)
+        if kind is float or abs(value) < 1 << 63:
+            return value
+    except ValueError:
+        pass
+    name, one, several = EXAMPLES[kind]
+    message, remedy = f"'{clean(text, 60)}' is no {name}", f"give a {name}, such as {one}"
+    if listed:
+        message, remedy = (
+            f"'{clean(listed, 60)}' is no list of {name}s",
+            f"write for example {several}",
+        )
+    raise UsageError("C02", message, where=flag, remedy=remedy)
+
+
+def settable(command: str) -> dict[str, list[str]]:
+    """Return what --set takes for a command: stage -> names; for `run` those of all its stages."""
+    if command != "run":
+        return {command: _names(stage_of(command).settings)}
+    kinds = {stage: stage_of(stage).settings for stage in _run_stages()}
+    return {
+        stage: [n for n in _names(kind) if not _is_own(kind, n)] for stage, kind in kinds.items()
+    }
+
+
+def _names(kind: type[Any]) -> list[str]:
+    return [field.name for field in fields(kind) if field.metadata.get("option", True)]
+
+
+def _is_own(kind: type[Any], name: str) -> bool:
+    able = {field.name for field in fields(kind) if field.metadata.get("in_run")}
+    return name in OWN_INPUTS and name not in able
+
+
+def _run_stages() -> list[str]:
+    from pipelines.run import STEPS
+
+    return [module.replace("_", "-") for module in STEPS]
+
+
+def make_settings(
+    kind: type[S],
+    stage: str,
+    stages: Iterable[str],
+    config: Path | None,
+    sets: Iterable[str],
+    given: Mapping[str, Any],
+) -> S:
+    """Return settings of a file, then --set, then the command's own options: the last one counts.
+
+    Args:
+        stage: the command's name. Its table of the file is used; the others are checked all the
+            same, and `run` hands them to its stages.
+        stages: every known name, for a hint where one is misspelt.
+        given: the command's own options, of those that were given.
+
+    Raises:
+        UsageError: C01, an unknown stage or option; C02, a value of the wrong kind or range; C04,
+            no such file.
+    """
+    chosen: dict[str, dict[str, Any]] = {stage: {}}
+    for where, name, options in (*_from_file(config), *_from_sets(sets)):
+        if name not in stages:
+            message = f"'{name}' is no stage{did_you_mean(name, stages)}"
+            raise UsageError("C01", message, where=where, remedy="write STAGE.OPTION")
+        if not isinstance(options, Mapping):
+            message, remedy = (
+                f"'{name}' is a stage, not an option",
+                f"write [{name}] and its options",
+            )
+            raise UsageError("C01", message, where=where, remedy=remedy)
+        owner = kind if name == stage else stage_of(name).settings
+        for key, value in options.items():
+            if stage == "run" and name in _run_stages() and _is_own(owner, key):
+                message = f"{name}.{key} has no place in a run, whose stages share logs and models"
+                remedy = f"give it to rrrid {name}; run takes --identify, --validate, --reference"
+                raise UsageError("C02", message, where=where, remedy=remedy)
+            value = _value(owner, key, value, f"{where}, {name}.{key}")
+            chosen.setdefault(name, {})[key] = value
+    own = chosen.pop(stage) | dict(given)
+    if stage == "run":
+        own["stages"] = {name: stage_of(name).settings(**values) for name, values in chosen.items()}
+    return kind(**own)
+
+
+def _from_file(path: Path | None) -> Iterator[tuple[str, str, Any]]:
+    """Yield (where, stage, options) of a TOML file."""
+    if path is None:
+        return
+    from pipelines.io.text import read_small_text
+
+    text = read_small_text(path, what="a TOML file of settings")
+    try:
+        tables = parse_toml(text)
+    except TomlError as problem:
+        remedy = "settings are TOML; YAML is not read"
+        raise UsageError("C03", f"not valid TOML: {problem}", where=path, remedy=remedy) from None
+    for stage, options in tables.items():
+        yield str(path), stage, options
+
+
+def _from_sets(sets: Iterable[str]) -> Iterator[tuple[str, str, Any]]:
+    """Yield (where, stage, options) of each STAGE.OPTION=VALUE."""
+    for text in sets:
+        name, equals, value = text.partition("=")
+        stage, dot, key = name.strip().partition(".")
+        if not (equals and dot and key):
+            message, remedy = (
+                f"'{text}' is not STAGE.OPTION=VALUE",
+                "write for example convert.to=csv",
+            )
+            raise UsageError("C01", message, where="--set", remedy=remedy)
+        try:
+            parsed = parse_toml(f"x = {value}")["x"]
+        except TomlError:
+            parsed = value.strip()  # a bare word is a text
+        yield "--set", stage, {key: parsed}
+
+
+def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
+    """Return a value of TOML as the field `name` takes it."""
+    known = _names(kind)
+    if name not in known:
+        message = f"no such option{did_you_mean(name, known)}"
+        raise UsageError(
+            "C01", message, where=where, remedy=f"there are: {', '.join(known) or 'none'}"
+        )
+    wanted, many = _kind(typing.get_type_hints(kind)[name])
+    listed = [value] if many and isinstance(value, str) else value  # a text: a list of one
+    if many and isinstance(listed, list) and all(_fits(wanted, item) for item in listed):
+        return tuple(map(wanted, listed))
+    if not many and _fits(wanted, value):
+        return wanted(value)
+    what = "a list" if many else KINDS.get(wanted, f"a {wanted.__name__}")
+    message = f"{clean(repr(value), 60)} is not {what}"
+    raise UsageError("C02", message, where=where, remedy="correct the value")
+
+
+def _fits(kind: type[Any], value: Any) -> bool:
+    """Say whether a value of TOML is of a kind; its whole numbers have no bound."""
+    if isinstance(value, bool):
+        return kind is bool
+    if kind is float:
+        return isinstance(value, int | float) and abs(value) <= sys.float_info.max
+    if kind is int:
+        return isinstance(value, int) and abs(value) < 1 << 63
+    return kind in (str, Path) and isinstance(value, str)

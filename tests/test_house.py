@@ -18,7 +18,6 @@ CONSTANTS = {
     "pipelines/io": 58, "pipelines/model": 458, "pipelines/quality": 28, "pipelines/recall":
     3, "pipelines/reconstruct.py": 1, "pipelines/report": 65, "pipelines/signal": 41,
     "pipelines/simulate.py": 1, "pipelines/stage.py": 1, "pipelines/validate_writing.py": 1,
-    "rrrid_cli": 8,
 }
 
 

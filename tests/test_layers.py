@@ -49,11 +49,9 @@ NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy
 CIRCLES = {
     ("pipelines.installation.examine", "pipelines.installation.self_test"),
     ("pipelines.signal.observer", "pipelines.signal.segments", "pipelines.signal.tuning"),
-    ("rrrid_cli.batch", "rrrid_cli.commands", "rrrid_cli.commands.workflow"),
 }
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.
-BY_NAME = {"pipelines.run", "pipelines.stored.redraw", "pipelines.batch.plan", "pipelines.model.effects",
-           "rrrid_cli.settings", "rrrid_cli.commands"}
+BY_NAME = {"pipelines.run", "pipelines.stored.redraw", "pipelines.batch.plan", "pipelines.model.effects", "rrrid_cli.options"}
 HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
 
 

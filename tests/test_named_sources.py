@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rrrid_cli.commands.application import STAGES
-from rrrid_cli.commands.tools import _schema
+from rrrid_cli.app import STAGES, schema_of
 
 REPO = Path(__file__).resolve().parents[1]
 FILES = sorted(path for folder in ("pipelines", "rrrid_cli") for path in (REPO / folder).rglob("*.py"))
@@ -51,7 +50,7 @@ def test_no_message_speaks_of_a_paper_without_its_name() -> None:
 
 @pytest.mark.parametrize("what", [*STAGES, "batch", "model", "log"])
 def test_no_schema_speaks_of_a_paper_without_its_name(what: str) -> None:
-    texts = re.findall(r'"description": "((?:[^"\\]|\\.)*)"', json.dumps(_schema(what), ensure_ascii=False))
+    texts = re.findall(r'"description": "((?:[^"\\]|\\.)*)"', json.dumps(schema_of(what), ensure_ascii=False))
     assert not [text for text in texts if nameless(text)]
 
 

@@ -21,7 +21,7 @@ from pipelines.model.motion import Reconstruction
 from pipelines.model.motion import reconstruct as motion_of
 from pipelines.signal.chain import held_input, transition
 from pipelines.stage import Outcome, Request, run_stage
-from rrrid_cli.commands import app
+from tests.cli.commands import rrrid
 from tests.fault_table import FAULTS
 from tests.faulty import good_path
 from tests.healthy import AMPLIFIER, ENCODER, good_log, make_log, rest, rows, with_signal
@@ -281,17 +281,15 @@ def test_a_short_log_and_an_order_of_two(tmp_path: Path) -> None:
 
 def test_command_line(samples: Path, tmp_path: Path) -> None:
     """--jerk-std as a list, --method, --format and --json; a wrong list is wrong usage."""
-    from typer.testing import CliRunner
-
     log = str(samples / "rrr-closed-form/friction-1.h5")
-    done = CliRunner().invoke(app, ["reconstruct", log, "--out", str(tmp_path / "out"), "--jerk-std", "50,60", "--jerk-std", "70",
-                                    "--method", "observer", "--format", "parquet", "--json", "--no-report"])
-    assert done.exit_code == 0, done.output
+    done = rrrid("reconstruct", log, "--out", "out", "--jerk-std", "50,60", "--jerk-std", "70", "--method", "observer",
+                 "--format", "parquet", "--json", "--no-report", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     np.testing.assert_allclose(result["observer"]["jerk_std"], [50.0, 60.0, 70.0])
     assert (tmp_path / "out/logs/friction-1.parquet").exists()
     for key in ("gains", "bandwidth_hz", "measurement_std", "jerk_std"):
         assert len(result["observer"][key]) == 3
     assert len(result["reconstruction_error_max"]) == len(result["innovation_whiteness"]) == 3
-    wrong = CliRunner().invoke(app, ["reconstruct", log, "--out", str(tmp_path / "x"), "--bandwidth", "fast"])
-    assert "C02" in str(wrong.exception)
+    wrong = rrrid("reconstruct", log, "--out", "x", "--bandwidth", "fast", cwd=tmp_path)
+    assert (wrong.returncode, "C02" in wrong.stderr) == (2, True)

@@ -8,6 +8,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.experiment import Array
+from pipelines.io.option import option
 from pipelines.quality.segments import Usable
 from pipelines.signal.chain import ORDERS, stationary
 from pipelines.signal.grid import Grid, lay_on
@@ -37,11 +38,16 @@ class Reconstruction:
     to a parameter is 0.5 standard deviations with order 3 and 0.03 with order 4 (`Observers`).
     """
 
-    method: str = "smoother"
-    order: int = 4  # of the chain of integrators; 3 is the paper's
-    jerk_std: tuple[float, ...] | None = None  # σ [rad/s^order], one a joint or one for all
-    bandwidth: tuple[float, ...] | None = None  # [Hz] -3 dB of the observer's position, instead of jerk_std
-    average: bool = True  # periods of a periodic log, where they differ by noise alone
+    method: str = option("smoother", "smoother, observer, zero-phase or central-differences.")
+    # of the chain of integrators
+    order: int = option(4, "Integrators in the observer: 2, 3 (Kostić et al. 2004) or 4.")
+    jerk_std: tuple[float, ...] | None = option(
+        None, "Jerk σ [rad/s^order]: one, or one a joint. [as data say]")
+    # -3 dB of the observer's position
+    bandwidth: tuple[float, ...] | None = option(
+        None, "Bandwidth [Hz], instead of jerk: one, or one a joint.")
+    average: bool = option(
+        True, "Of a periodic log, take the mean of periods that differ by noise alone. [average]", "--average/--no-average")
 
     def as_settings(self) -> dict[str, object]:
         """What a derived log must have been made with to be used; the motion of its samples is the same, averaged or not."""

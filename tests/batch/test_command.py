@@ -111,12 +111,12 @@ def test_json_is_the_result_and_nothing_else(tmp_path: Path) -> None:
 def test_a_wrong_option_is_exit_2(tmp_path: Path, words: tuple[str, ...], code: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """C01, C02, C04: before anything is written."""
     from pipelines.errors import UsageError
-    from rrrid_cli.main import _call
+    from rrrid_cli.main import call
 
     write_log(tmp_path / "root/a.h5", small_log(samples=100))
     monkeypatch.chdir(tmp_path)
     stage = () if "--stage" in words else ("--stage", "convert")
     with pytest.raises(UsageError) as refused:
-        _call(["batch", "root", "--out", "out", "-q", *stage, *words])
+        call(["batch", "root", "--out", "out", "-q", *stage, *words])
     assert refused.value.code == f"RRID-{code}"
     assert not list(tmp_path.glob("out/result.json"))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +13,8 @@ import pytest
 from pipelines.errors import Check
 from pipelines.report.report import Report, Table
 from pipelines.stage import Outcome
-from rrrid_cli.console import Teller, say_checks, say_outcome, say_table
+from rrrid_cli.console import Progress, print_checks, print_outcome, print_table
+from rrrid_cli.options import Common
 
 TABLE = Table(("joint", "held-out torque error now [N m]", "cause"),
               ((1, 0.08783, "cogging"), (2, 1.2, "–"), (3, None, "no cause")))
@@ -21,33 +25,33 @@ def outcome_of(report: Report) -> Outcome[Any]:
 
 
 def test_numbers_stand_point_under_point(capsys: pytest.CaptureFixture[str]) -> None:
-    say_outcome(outcome_of(Report("t", "It is so.", key_figures=TABLE)), as_json=False, quiet=False, verbose=False)
+    print_outcome(outcome_of(Report("t", "It is so.", key_figures=TABLE)), Common())
     verdict, *lines = capsys.readouterr().out.splitlines()[:-1]
     assert verdict == "It is so."
-    head, body = lines[:-3], lines[-3:]
-    assert [line.rstrip() for line in head] == ["             held-out", "         torque error", "                  now",
-                                                "  joint         [N m]  cause"]
-    assert body == ["      1       0.08783  cogging", "      2       1.20000  –", "      3             –  no cause"]
+    assert lines == ["  joint  held-out torque error now [N m]  cause",
+                     "      1                          0.08783  cogging",
+                     "      2                          1.20000  –",
+                     "      3                                –  no cause"]
 
 
 def test_figures_of_different_things_are_left_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
     """A name and a figure: none is filled up for the sake of another."""
     table = Table(("what", "value"), (("condition number", 2.31), ("samples", 30000), ("torque error, relative [%]", 0.0871)))
-    say_outcome(outcome_of(Report("t", "v", key_figures=table)), as_json=False, quiet=False, verbose=False)
+    print_outcome(outcome_of(Report("t", "v", key_figures=table)), Common())
     assert [line.split("  ")[-1].strip() for line in capsys.readouterr().out.splitlines()[1:-1]] == ["2.31", "30 000", "0.0871"]
 
 
 def test_what_to_check_follows_the_verdict(capsys: pytest.CaptureFixture[str]) -> None:
     report = Report("t", "Cogging at joint 2.", advice=("What to check: the magnets.",))
-    say_outcome(outcome_of(report), as_json=False, quiet=False, verbose=False)
+    print_outcome(outcome_of(report), Common())
     assert capsys.readouterr().out.splitlines()[:2] == ["Cogging at joint 2.", "What to check: the magnets."]
-    say_outcome(outcome_of(report), as_json=False, quiet=True, verbose=False)
+    print_outcome(outcome_of(report), Common(quiet=True))
     assert capsys.readouterr().out == ""
 
 
 def test_units_are_written_as_in_the_report(capsys: pytest.CaptureFixture[str]) -> None:
     table = Table(("log", "acceleration [rad/s^2]", "k3 [1/s^2]"), (("a", 1.0, 2.0),))
-    say_outcome(outcome_of(Report("t", "v", key_figures=table)), as_json=False, quiet=False, verbose=False)
+    print_outcome(outcome_of(Report("t", "v", key_figures=table)), Common())
     said = capsys.readouterr().out
     assert "[rad/s²]" in said
     assert "[1/s²]" in said
@@ -55,7 +59,7 @@ def test_units_are_written_as_in_the_report(capsys: pytest.CaptureFixture[str]) 
 
 
 def test_no_rows_no_table(capsys: pytest.CaptureFixture[str]) -> None:
-    say_table(("a", "b"), [])
+    print_table(("a", "b"), [])
     assert capsys.readouterr().out == ""
 
 
@@ -65,16 +69,16 @@ def test_a_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
             "extended [% of rated]")
     rows = [("1", "0.0878", "0.0876", "0.0747", "1.2×, in order", "0.146", "0.146"),
             ("2", "0.2373", "0.0221", "0.0281", "8.4× → 0.79×, in order", "0.791", "0.074")]
-    say_table(head, rows)
+    print_table(head, rows)
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 80
     assert sorted(" ".join(lines[:-2]).split()) == sorted(" ".join(head).split())
     assert [line.split() for line in lines[-2:]] == [" ".join(row).split() for row in rows]
     wide = [("a" * 70, "b" * 70, "c")]
-    say_table(("one", "two", "all of them [%]"), wide)  # no heading could make it fit: each is told as it reads best
+    print_table(("one", "two", "all of them [%]"), wide)  # no heading could make it fit: each is told as it reads best
     *above, told = capsys.readouterr().out.splitlines()
     assert told.split() == list(wide[0])
-    assert [line.split() for line in above] == [["all", "of", "them"], ["one", "two", "[%]"]]
+    assert sorted(" ".join(above).split()) == sorted(["one", "two", "all", "of", "them", "[%]"])
 
 
 def test_one_finding_of_several_logs_is_told_once(capsys: pytest.CaptureFixture[str]) -> None:
@@ -84,7 +88,7 @@ def test_one_finding_of_several_logs_is_told_once(capsys: pytest.CaptureFixture[
     wide = [Check.of("S07", "reject", f"q of joint {j} is in degrees", where=f"{name}.h5, signal q, joint {j}", remedy="do it")
             for name in "ab" for j in (1, 2)]
     lost = [Check.of("D09", "warn", f"p{j} cannot be told", where="a.h5") for j in (1, 2)]
-    say_checks([Check.of("F05", "warn", "no integrity data", where="a.h5"), *late, *lost, *wide], False, None)
+    print_checks([Check.of("F05", "warn", "no integrity data", where="a.h5"), *late, *lost, *wide], False, None)
     assert capsys.readouterr().out.splitlines() == [
         "  x RRID-S07 a.h5, signal q, joint 1: q of joint 1 is in degrees (do it)",
         "      alike 4 times in all, in a.h5, b.h5; joints 1, 2",
@@ -94,36 +98,39 @@ def test_one_finding_of_several_logs_is_told_once(capsys: pytest.CaptureFixture[
         "  ! RRID-F05 a.h5: no integrity data"]
 
 
-def test_who_reads_a_pipe_hears_now_and_then_that_something_is_done(capsys: pytest.CaptureFixture[str],
-                                                                    monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing of what is over in seconds; of what takes minutes a line now and then; nothing at all with -q."""
-    now = [0.0]
-    monkeypatch.setattr("rrrid_cli.console.time.monotonic", lambda: now[0])
-    for quiet, heard in ((False, ["third", "fifth"]), (True, [])):
-        now[0] = 0.0
-        teller = Teller(quiet, False)
-        for at, words in ((1.0, "first"), (15.0, "second"), (25.0, "third"), (40.0, "fourth"), (60.0, "fifth")):
-            now[0] = at
-            teller(words)
-        teller.done()
+def test_the_reader_of_a_pipe_sees_a_line_now_and_then(capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing of what is over in seconds; of what takes long the step and its seconds; nothing at all with -q."""
+    for quiet, lines in ((False, 3), (True, 0)):
+        progress = Progress(Common(quiet=quiet), silence=0.05)
+        with progress:
+            progress("reading")
+        assert capsys.readouterr().err == ""
+        with progress:
+            progress("searching")
+            time.sleep(0.3)
         out, err = capsys.readouterr()
-        assert (out, err.splitlines()) == ("", heard)
+        assert out == ""
+        assert len(err.splitlines()) >= lines
+        assert set(err.splitlines()) <= {"searching, 0 s"}
 
 
-def test_a_step_that_takes_minutes_is_told_again_with_its_seconds(capsys: pytest.CaptureFixture[str],
-                                                                  monkeypatch: pytest.MonkeyPatch) -> None:
-    """No search of two minutes is silent, in a pipe or on a terminal; one of seconds is not counted."""
-    now = [0.0]
-    monkeypatch.setattr("rrrid_cli.console.time.monotonic", lambda: now[0])
-    monkeypatch.setattr("rrrid_cli.console._TICK", 1e9)  # the test is the clock
-    for live, heard in ((False, "searching, 25 s\nsearching, 60 s\n"),
-                        (True, "\rsearching\rsearching, 25 s\rsearching, 30 s\rsearching, 60 s\r               \r")):
-        now[0] = 0.0
-        teller = Teller(False, False)
-        teller.live = live
-        teller("searching")
-        for at in (3.0, 25.0, 30.0, 60.0):
-            now[0] = at
-            teller.still()
-        teller.done()
-        assert capsys.readouterr().err == heard
+def test_verbose_progress_is_every_step(capsys: pytest.CaptureFixture[str]) -> None:
+    with (progress := Progress(Common(verbose=True))):
+        progress("reading")
+        progress("search\x1b[31ming")
+    assert capsys.readouterr().err == "reading\nsearch[31ming\n"
+
+
+def test_a_terminal_shows_the_step_and_is_left_clean(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One line that is written over, and gone at the end."""
+    terminal = io.StringIO()
+    monkeypatch.setattr(terminal, "isatty", lambda: True)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    monkeypatch.setenv("TERM", "xterm")
+    with (progress := Progress(Common())):
+        progress("searching [bold]")
+        time.sleep(0.7)
+    shown = terminal.getvalue()
+    assert "searching [bold] " in shown
+    assert "0:00:00" in shown
+    assert shown.endswith("\x1b[1A\x1b[2K")

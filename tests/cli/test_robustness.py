@@ -277,9 +277,9 @@ def test_a_verdict_is_never_cut_off() -> None:
     from io import StringIO
 
     from pipelines.report.report import Report
-    from rrrid_cli.console import say_verdict
+    from rrrid_cli.console import print_verdict
 
     stream = StringIO()
     verdict = " ".join(f"Joint {k} has friction of its own." for k in range(200)) + " The end."
-    say_verdict(Report("Run", verdict, "attention", None, ()), stream)
+    print_verdict(Report("Run", verdict, "attention", None, ()), stream)
     assert stream.getvalue() == verdict + "\n"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from pipelines.design_excitation import Settings as Design
 from pipelines.diagnose import Settings
 from pipelines.errors import UsageError
-from rrrid_cli.options import whole_numbers
-from rrrid_cli.settings import make_settings
+from rrrid_cli.options import make_settings, read_values
 
 
 def made(*sets: str) -> Settings:
@@ -40,9 +40,9 @@ def test_a_whole_number_of_hundreds_of_digits_is_refused() -> None:
     """As an option, in a configuration, and in a list: no arithmetic of floats holds it."""
     number = int("9" * 400)
     with pytest.raises(UsageError, match="C02 --max-causes: "):
-        make_settings(Settings, "diagnose", ("diagnose",), None, (), {"max_causes": number})
+        read_values(Settings, {"settings_max_causes": str(number)})
     with pytest.raises(UsageError, match="is not a whole number"):
         made(f"diagnose.max_causes={number}")
     for text in (str(number), "nan", "1e12"):
         with pytest.raises(UsageError, match="C02 --harmonics"):
-            whole_numbers([text], "--harmonics")
+            read_values(Design, {"settings_harmonics": [text]})

@@ -13,8 +13,7 @@ import pytest
 from pipelines.io.field_words import words_of
 from pipelines.io.result_words import WORDS
 from pipelines.stage import result_type
-from rrrid_cli.commands.application import STAGES
-from rrrid_cli.commands.tools import _schema
+from rrrid_cli.app import STAGES, schema_of
 
 FILES = ("model", "log", "batch", *STAGES)
 
@@ -35,7 +34,7 @@ def wordless(schema: Any, place: str = "") -> Iterator[str]:
 @pytest.mark.parametrize("what", FILES)
 def test_every_field_is_told_in_words(what: str) -> None:
     """Of each stage's result.json, of a model and a log: at every depth."""
-    assert list(wordless(_schema(what))) == []
+    assert list(wordless(schema_of(what))) == []
 
 
 def kinds(one: Any, seen: set[type[Any]]) -> None:

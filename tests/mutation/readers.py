@@ -23,8 +23,8 @@ from pipelines.model.effects.base import Motion
 from pipelines.model.named_cause import acting_cause
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Request, Stage
-from rrrid_cli.commands import STAGES
-from rrrid_cli.settings import make_settings
+from rrrid_cli.app import STAGES
+from rrrid_cli.options import make_settings
 from tests.healthy import fourier, make_log
 from tests.importers.good import RECIPE, good, text
 from tests.importers.test_matlab import mat73, signals

@@ -14,7 +14,8 @@ from pipelines.report.render import render_report
 from pipelines.report.report import Report, Table, column_texts, filled
 from pipelines.report.style import format_number, three_digits
 from pipelines.stage import Outcome
-from rrrid_cli.console import say_outcome
+from rrrid_cli.console import print_outcome
+from rrrid_cli.options import Common
 
 TABLE = Table(("joint", "torque [N m]", "torque [% of rated]", "gravity [N m]", "note"),
               (("waist", 0.042, None, "", "in order"), ("elbow", None, math.nan, " ", "")), "Held out.")
@@ -38,7 +39,7 @@ def test_page_and_terminal_leave_it_out(capsys: pytest.CaptureFixture[str]) -> N
     report = Report("t", "v", key_figures=TABLE)
     page = render_report(report, {})["report.html"].decode()
     outcome: Outcome[Any] = Outcome(None, {}, report, Path("out"), 0, ())
-    say_outcome(outcome, as_json=False, quiet=False, verbose=False)
+    print_outcome(outcome, Common())
     for shown in (re.sub(r"<[^>]+>", " ", page), capsys.readouterr().out):
         assert "in order" in shown
         assert "gravity" not in shown

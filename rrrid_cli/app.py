@@ -1,0 +1,476 @@
+"""Every command: its help, what it takes beside the settings of its stage, what it does."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields, replace
+from inspect import Signature
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pipelines import __version__
+from pipelines.errors import Check, EnvironmentFault, UsageError, did_you_mean, escaped
+from pipelines.io.option import option
+from rrrid_cli import console
+from rrrid_cli.options import (
+    Common,
+    make_settings,
+    parameters,
+    read,
+    read_values,
+    settable,
+    stage_file,
+    stage_of,
+)
+
+if TYPE_CHECKING:
+    from pipelines.stage import Outcome
+
+__all__ = ["STAGES", "build", "schema_of"]
+
+# In the order in which they are needed.
+COMMANDS = ["run", "batch", "demo", "inspect", "import", "convert", "design-excitation"]
+COMMANDS += ["fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf", "simulate"]
+COMMANDS += ["diagnose", "extend", "compare", "report", "schema", "doctor"]
+STAGES = tuple(name for name in COMMANDS if name not in ("batch", "report", "schema", "doctor"))
+# Shared options without effect: they are accepted, and help is silent about them.
+IDLE: dict[str, tuple[str, ...]] = {
+    "inspect": ("format",),
+    "frf": ("format",),
+    "diagnose": ("format",),
+}
+IDLE |= {"import": ("check",), "convert": ("check",), "simulate": ("check",)}
+IDLE |= {
+    "compare": ("robot", "assume_units", "format", "strict"),
+    "demo": ("robot", "assume_units"),
+}
+OUT = {"demo": "demo", "batch": "runs/several/ROOT/batch", "report": "DIR"}
+
+
+@dataclass(frozen=True)
+class Nothing:
+    """No inputs but those that the settings name."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """Which of the logs are taken."""
+
+    text = "Of several robots or days take this: 'ROBOT', or 'ROBOT 2026-05-18'."
+    session: str = option("", text)
+
+
+@dataclass(frozen=True)
+class Logs(Session):
+    """Logs that are all used alike."""
+
+    logs: tuple[Path, ...] = option((), "Logs, or folders of logs.", "LOGS", required=True)
+    joints: tuple[int, ...] = option(
+        (), "Joints to take of every log: 1,3; --robot describes them."
+    )
+
+
+@dataclass(frozen=True)
+class RoleLogs(Logs):
+    """Logs by their roles."""
+
+    logs: tuple[Path, ...] = option((), "Logs, or folders of logs.", "LOGS")
+    identify: tuple[str, ...] = option((), "Identification logs, instead of the logs' own roles.")
+    validate: tuple[str, ...] = option((), "Validation logs, instead of the logs' own roles.")
+    reference: tuple[str, ...] = option((), "Logs of the arm as it was before.")
+
+
+@dataclass(frozen=True)
+class Replay(Session):
+    """Logs to imitate."""
+
+    replay: tuple[Path, ...] = option((), "Log to replay, or a folder. Repeatable.")
+
+
+@dataclass(frozen=True)
+class PriorLogs(Session):
+    """Logs of earlier experiments."""
+
+    prior_logs: tuple[Path, ...] = option((), "Earlier logs, or a result of frf. Repeatable.")
+
+
+@dataclass(frozen=True)
+class Results:
+    """Two results."""
+
+    a: Path = option(Path(), "A command's folder, result.json or model.json.", "A", required=True)
+    b: Path = option(Path(), "Another one of the same command.", "B", required=True)
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Many folders of logs, and how they are worked through."""
+
+    root: Path = option(Path(), "Folder with many folders of logs.", "ROOT", required=True)
+    stage: str = option("run", "Command to run on each: run, estimate-bps, inspect, …")
+    each_log: bool = option(False, "On each log, not on each folder that holds logs.")
+    jobs: int | None = option(None, "Items at a time. [as many as there are cores]")
+    timeout: float | None = option(None, "Time for one item [s]; then it has failed. [none]")
+    memory: str | None = option(None, "Memory for one item: 500M, 2G; then it has failed. [none]")
+    on_error: str = option("continue", "continue or abort, where an item is rejected or fails.")
+    resume: bool = option(False, "Do only what is unfinished, failed, rejected or changed.")
+    shard: str | None = option(None, "I/N: every Nth item alone, from the Ith on. [all]")
+    backend: str = option("local", "local, or dask://HOST:PORT: a Dask scheduler.")
+    baseline: str | None = option(None, "Known model.json: only what goes beyond it is found.")
+    joints: tuple[int, ...] = option(
+        (), "Joints to take of every log: 1,3; --robot describes them."
+    )
+
+
+@dataclass(frozen=True)
+class Folder:
+    """The result of a command."""
+
+    folder: Path = option(Path(), "A folder that a command has left.", "DIR", required=True)
+
+
+@dataclass(frozen=True)
+class Schema:
+    """Which schema is printed."""
+
+    what: str = option("model", "A command, for its result.json; model; log.", "WHAT")
+
+
+@dataclass(frozen=True)
+class Doctor:
+    """How much is examined."""
+
+    quick: bool = option(False, "Leave the self-test out.")
+
+
+INPUTS = {"demo": Nothing, "import": Nothing, "inspect": Logs, "convert": Logs, "reconstruct": Logs}
+INPUTS |= {"design-excitation": PriorLogs, "simulate": Replay, "compare": Results, "batch": Batch}
+INPUTS |= {"report": Folder, "schema": Schema, "doctor": Doctor}  # any other: RoleLogs
+SHARED = {"report": ("out", "force", "quiet", "debug"), "schema": (), "doctor": ("json", "debug")}
+
+
+def build(word: str) -> typer.Typer:
+    """Return the application; the command `word` alone has its options, and its stage loaded."""
+    settings = {"help_option_names": ["-h", "--help"], "max_content_width": 110}
+    app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, context_settings=settings)
+    app.callback()(_about)
+    for name in COMMANDS:
+        title = _title(name)
+        if name == word:
+            app.command(name, help=_help(name), short_help=title, epilog=_end(name))(
+                _function(name)
+            )
+        else:
+            app.command(name, short_help=title)(_not_called)
+    return app
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"rrrid {__version__}")
+        raise typer.Exit
+
+
+VERSION = typer.Option(
+    "--version", help="Print the version and exit.", callback=_print_version, is_eager=True
+)
+
+
+def _about(version: Annotated[bool, VERSION] = False) -> None:
+    """Identify robot arms from logs: what the simulation gets wrong, and how to make it better."""
+
+
+def _not_called() -> None:
+    """Stand for a command in the list of all."""
+
+
+def _function(name: str) -> Callable[..., None]:
+    """Return the function of a command; typer makes the options of its signature."""
+
+    def called(**given: Any) -> None:
+        raise typer.Exit(ACTIONS.get(name, _stage)(name, given))
+
+    options = parameters(INPUTS.get(name, RoleLogs))
+    if name in STAGES:
+        options += parameters(stage_of(name).settings)
+    out = f"Folder for the output. [{OUT.get(name, 'runs/ROBOT/FOLDER/COMMAND')}]"
+    shared = SHARED.get(name, _names_of(Common))
+    options += parameters(Common, shared, hidden=IDLE.get(name, ()), out=out)
+    called.__signature__ = Signature(options)  # type: ignore[attr-defined]
+    called.__annotations__ = {one.name: one.annotation for one in options}
+    return called
+
+
+def _title(name: str) -> str:
+    """Return the title of a command: the first line of its module, or of its function here."""
+    if name not in STAGES:
+        return str(ACTIONS[name].__doc__)
+    with stage_file(name).open(encoding="utf-8") as file:
+        return file.readline().strip().strip('"')
+
+
+def _help(name: str) -> str:
+    """Return the docstring of a stage's module; what is laid out in columns stays so."""
+    if name not in STAGES:
+        return _title(name)
+    parts = str(sys.modules[stage_of(name).compute.__module__].__doc__).split("\n\n")
+    return "\n\n".join(f"\b\n{part}" if part.startswith("Reads ") else part for part in parts)
+
+
+def _end(name: str) -> str:
+    """Return the end of a command's help: what --set takes, and all causes where it takes some."""
+    if name not in STAGES:
+        return "--set and --config give the stage its options." if name == "batch" else ""
+    parts = [
+        f"--set {stage}.OPTION=VALUE, options: {', '.join(names)}."
+        for stage, names in settable(name).items()
+    ]
+    if any(field.metadata.get("causes") for field in fields(stage_of(name).settings)):
+        from pipelines.model.effects import all_effects
+
+        for scope, title in (("joint", "Causes at one joint"), ("arm", "Causes of the whole arm")):
+            effects = [effect for effect in all_effects() if effect.scope == scope]
+            lines = [f"  {effect.name:24} {effect.words.title}" for effect in effects]
+            parts.append("\n".join(["\b", f"{title}:", *lines]))
+    return "\n\n".join(parts)
+
+
+def _read(name: str, given: Mapping[str, Any]) -> tuple[Any, Any, Any, Common]:
+    """Return a stage, its request and its settings, and the shared options, of the command line."""
+    from pipelines.stage import Request
+
+    stage, common = stage_of(name), read(Common, given)
+    inputs = vars(read(INPUTS.get(name, RoleLogs), given))
+    own, sets = read_values(stage.settings, given), common.set
+    roles = {
+        role: inputs[role] for role in ("identify", "validate", "reference") if inputs.get(role)
+    }
+    if "identify" in _names_of(stage.settings):
+        own, roles = own | roles, {}
+    if name == "convert" and given["common_format"]:
+        sets = (f"convert.to={common.format}", *sets)
+    if name == "estimate-bps" and common.no_report:
+        own["compare"] = False  # what only the report shows
+    settings = make_settings(stage.settings, name, STAGES, common.config, sets, own)
+    paths = [inputs.get(key, ()) for key in ("logs", "replay", "prior_logs")]
+    paths.append(tuple(inputs[key] for key in ("a", "b") if key in inputs))
+    request = Request(
+        tuple(path for part in paths for path in part),
+        tell=console.Progress(common),
+        roles=roles,
+        **_fields_of(Request, vars(common) | inputs),
+    )
+    return stage, request, settings, common
+
+
+def _names_of(kind: type[Any]) -> set[str]:
+    return {field.name for field in fields(kind)}
+
+
+def _fields_of(kind: type[Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of the values that a dataclass has fields for."""
+    return {name: value for name, value in values.items() if name in _names_of(kind)}
+
+
+def _outcome(stage: Any, request: Any, settings: Any, common: Common) -> Outcome[Any]:
+    """Run a stage and print its outcome."""
+    from pipelines.stage import run_stage
+
+    with request.tell:
+        outcome = run_stage(stage, request, settings)
+    console.print_outcome(outcome, common)
+    return outcome
+
+
+def _stage(name: str, given: Mapping[str, Any]) -> int:
+    return _outcome(*_read(name, given)).exit_code
+
+
+def _run(name: str, given: Mapping[str, Any]) -> int:
+    """Run the workflow, or with --dry-run print what would be computed, and why."""
+    stage, request, settings, common = _read(name, given)
+    if not settings.dry_run:
+        return _outcome(stage, request, settings, common).exit_code
+    from pipelines.run import plan
+
+    with request.tell:
+        planned = plan(request, settings)
+    if common.json:
+        _print_json("run", {"stages": planned})
+    elif not common.quiet:
+        rows = [(one.stage, "computed" if one.computed else "cached", one.why) for one in planned]
+        console.print_table(("stage", "would be", "because"), rows)
+    return 0
+
+
+def _import(name: str, given: Mapping[str, Any]) -> int:
+    """Make logs by a recipe, or with --guess print the draft of a recipe."""
+    stage, request, settings, common = _read(name, given)
+    if settings.guess is None:
+        return _outcome(stage, request, settings, common).exit_code
+    from pipelines.import_log import draft_recipe
+    from pipelines.io.results import encode, json_text
+
+    draft = draft_recipe(settings.guess, common.robot)
+    if common.out is not None:
+        remedy = "redirect it: rrrid import --guess FILE > recipe.toml"
+        raise UsageError("C02", "--guess prints its draft", where="--out", remedy=remedy)
+    sys.stdout.write(json_text(encode(draft)[0]) if common.json else draft.text)
+    return 0
+
+
+def _demo(name: str, given: Mapping[str, Any]) -> int:
+    """Simulate logs with a fault, run the workflow on them, compare what was hidden and found."""
+    from pipelines import demo
+    from pipelines.stage import refuse_foreign, run_stage
+
+    stage, request, settings, common = _read(name, given)
+    out, words = common.out or Path("demo"), sys.stderr if common.json else sys.stdout
+    shared = {key: value for key, value in given.items() if key.startswith("common_")}
+    workflow, _, its_settings, _ = _read("run", shared)
+    refuse_foreign(out / "run", common.force, workflow.remakes)  # before the arm is simulated
+    with request.tell:
+        request.tell("simulating the arm")
+        recording = replace(request, out=out / "recording", no_report=True)
+        recorded = run_stage(stage, recording, settings)
+    if not common.quiet:
+        logs = f"{len(recorded.result.logs)} logs into {out / 'recording/logs'}"
+        print(f"Simulated {logs}; now: rrrid run {out / 'recording'}", file=sys.stderr)
+        moved = [check for check in recorded.checks if check.code == "RRID-C05"]
+        console.print_checks(moved, stream=sys.stderr)
+    request = replace(request, paths=(out / "recording",), out=out / "run")
+    try:
+        outcome = _outcome(workflow, request, its_settings, common)
+    except BaseException:
+        if not common.quiet:
+            print(f"Hidden was: {demo.hidden(recorded.result)}.", file=sys.stderr)
+        raise
+    if not common.quiet:
+        report = outcome.folder / "report.html"
+        print(*demo.ending(recorded.result, outcome.result.diagnosis), sep="\n", file=words)
+        print(f"Report:     {report if report.exists() else 'none was asked for'}", file=words)
+        print("Next:       rrrid run FOLDER, on logs of your own;", end=" ", file=words)
+        print("rrrid import --guess FILE drafts what makes logs of recordings", file=words)
+    return outcome.exit_code
+
+
+def _batch(name: str, given: Mapping[str, Any]) -> int:
+    """Run the workflow, or one stage, on every robot and day of many folders, in parallel."""
+    common, own = read(Common, given), read(Batch, given)
+    from pipelines.batch.server import warm_up
+
+    if own.backend == "local":
+        warm_up(f"pipelines.{own.stage.replace('-', '_')}")
+    from pipelines.batch.batch import Wanted, run_batch
+    from pipelines.batch.items import read_shard
+    from pipelines.batch.plan import Options, Plan, load_stage, module_of
+    from pipelines.io.processors import processors
+
+    for flag, value, possible, remedy in (
+        ("--jobs", own.jobs, own.jobs is None or own.jobs > 0, "give 1 or more"),
+        ("--timeout", own.timeout, own.timeout is None or own.timeout > 0.0, "give seconds"),
+        ("--on-error", own.on_error, own.on_error in ("continue", "abort"), "continue or abort"),
+    ):
+        if not possible:
+            raise UsageError("C02", f"'{value}' is not possible", where=flag, remedy=remedy)
+    module, values = module_of(own.stage), vars(common) | vars(own)
+    kind = load_stage(module).settings
+    settings = make_settings(kind, own.stage, STAGES, common.config, common.set, {})
+    options = Options(**_fields_of(Options, values | {"memory": _bytes(own.memory)}))
+    values |= {"jobs": own.jobs or processors(), "shard": read_shard(own.shard)}
+    progress = console.Progress(common)
+    with progress:
+        wanted = Wanted(tell=progress, **_fields_of(Wanted, values))
+        outcome = run_batch(Plan(module, settings, options), wanted)
+    console.print_outcome(outcome, common)
+    return outcome.exit_code
+
+
+def _bytes(text: str | None) -> int | None:
+    """Return an amount of memory in bytes: "2G", "500M"."""
+    if text is None:
+        return None
+    found = re.fullmatch(r"(\d+(?:\.\d+)?)([KMGT]?)I?B?", text.strip().upper())
+    size = float(found[1]) * 1024 ** " KMGT".index(found[2] or " ") if found else 0.0
+    if not 1 << 20 <= size < 1 << 50:
+        message, remedy = f"'{text}' is no amount of memory", "write for example 500M or 2G"
+        raise UsageError("C02", message, where="--memory", remedy=remedy)
+    return int(size)
+
+
+def _report(name: str, given: Mapping[str, Any]) -> int:
+    """Draw a report again from its stored result; nothing is computed."""
+    from pipelines.batch.redraw import redraw_batch
+    from pipelines.io.stored_result import read_result
+    from pipelines.stored.redraw import redraw
+
+    common, folder = read(Common, given), read(Folder, given).folder
+    home, target = folder.absolute(), common.out and common.out.absolute()
+    checks: tuple[Check, ...] = ()
+    if home.is_dir() and read_result(home).command == "batch":
+        drawn = redraw_batch(home, target)
+    else:
+        drawn, _, checks = redraw(home, target, common.force)
+    if not common.quiet:
+        console.print_verdict(drawn)
+        console.print_checks(checks)
+        print(f"→ {escaped((common.out or folder) / 'report.html')}")
+    return 0
+
+
+def _doctor(name: str, given: Mapping[str, Any]) -> int:
+    """Examine libraries, threads and folders, with a self-test of some seconds; exit 6: no use."""
+    from pipelines.installation.examine import examine
+
+    found, as_json = [], read(Common, given).json
+    for one in examine(self_test=not read(Doctor, given).quick):  # each is printed when it is known
+        found.append(one)
+        if not as_json:
+            remedy = f" ({one.remedy})" if one.remedy else ""
+            print(f"  {console.SIGNS[one.level]} {one.name}: {one.found}{remedy}", flush=True)
+    works = all(one.level != "bad" for one in found)
+    if as_json:
+        _print_json("doctor", {"works": works, "findings": found})
+    else:
+        print("rrrid can work here." if works else "rrrid cannot work here: see x above.")
+    return 0 if works else EnvironmentFault.exit_code
+
+
+def _print_json(command: str, content: dict[str, Any]) -> None:
+    from pipelines.io.results import encode, headed, json_text
+
+    encoded = {name: encode(value)[0] for name, value in content.items()}
+    sys.stdout.write(json_text(headed(command, encoded)))
+
+
+def _schema(name: str, given: Mapping[str, Any]) -> int:
+    """Print the JSON schema of a command's result.json, of model.json, or of a log."""
+    from pipelines.io.results import json_text
+
+    sys.stdout.write(json_text(schema_of(read(Schema, given).what)))
+    return 0
+
+
+def schema_of(what: str) -> dict[str, Any]:
+    """Return the JSON schema of a command's result.json, of a "model" or of a "log"."""
+    from pipelines.batch.result import Result
+    from pipelines.io.log_schema import log_schema
+    from pipelines.io.model_file import model_schema
+    from pipelines.io.result_schema import result_schema
+    from pipelines.stage import result_type
+
+    known = ("model", "log", "batch", *STAGES)
+    if what not in known:
+        message = f"no schema of '{what}'{did_you_mean(what, known)}"
+        raise UsageError("C02", message, where="schema", remedy=f"one of: {', '.join(known)}")
+    if what in ("model", "log"):
+        return model_schema() if what == "model" else log_schema()
+    return result_schema(Result if what == "batch" else result_type(stage_of(what)), what)
+
+
+ACTIONS = {"run": _run, "import": _import, "demo": _demo}  # any other stage: _stage
+ACTIONS |= {"batch": _batch, "report": _report, "schema": _schema, "doctor": _doctor}
