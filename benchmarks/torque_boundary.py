@@ -30,7 +30,7 @@ from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.io.experiment import ExperimentLog, Signal
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription, format_robot
 from pipelines.model.row_fit import sample_motion
-from pipelines.quality.checks_subject import Subject
+from pipelines.quality.subject import Subject
 
 __all__ = ["KINDS", "Machine", "case", "draw", "main"]
 

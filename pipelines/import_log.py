@@ -32,7 +32,7 @@ from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import RobotDescription
 from pipelines.io.table import write_table
 from pipelines.model.rigid.choose import rigid_body
-from pipelines.quality.checks_subject import many
+from pipelines.quality.subject import many
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.signal.resample import grid, resample
 from pipelines.stage import Inputs, Request, Stage, slug

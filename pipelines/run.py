@@ -28,7 +28,7 @@ from pipelines.io.option import option
 from pipelines.io.places import renamed, short_names, tilde
 from pipelines.io.results import decode, encode
 from pipelines.io.robot import format_robot
-from pipelines.quality.columns_first import columns_first
+from pipelines.quality.checks import columns_first
 from pipelines.recall.chain import Chain
 from pipelines.recall.key import Key, digest_of_json
 from pipelines.recall.pictures import Pictures, pictures_of, with_pictures, write_drawing

@@ -22,8 +22,8 @@ from pipelines.io import schema
 from pipelines.io.experiment import Array, Signal
 from pipelines.io.robot import Drive, RobotDescription
 from pipelines.io.units import UNITS, canonical_unit, to_si
-from pipelines.quality.checks_motion import degrees_or_motor
-from pipelines.quality.checks_subject import many
+from pipelines.quality.subject import many
+from pipelines.quality.units import degrees_or_motor
 
 __all__ = ["Converted", "drive_of", "joint_side", "per_joint", "si_of", "unit_declared",
            "units_of_joints"]  # fmt: skip

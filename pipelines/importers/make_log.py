@@ -28,8 +28,7 @@ from pipelines.io.robot import format_robot
 from pipelines.io.structure import refuse_unlike_format
 from pipelines.io.units import UNITS
 from pipelines.quality.checks import check_log
-from pipelines.quality.checks_motion import degrees_or_motor
-from pipelines.quality.checks_unit import TRUSTED, torque_in_recipe
+from pipelines.quality.units import TRUSTED, degrees_or_motor
 
 __all__ = ["ImportedTable", "SourceFile", "examine", "import_table", "make_log"]
 
@@ -38,8 +37,10 @@ _KEPT = "RRID-D06"
 _TIME = "RRID-S08"  # a recipe's unit of time can be wrong by a thousand and contradict nothing
 # What to do about it is in the recipe, and not in a file that is not written yet.
 _IN_RECIPE = {
-    "RRID-S05": torque_in_recipe(), "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf)),
-}  # fmt: skip
+    "RRID-S05": "declare the unit of tau that its numbers are in, such as unit = \"N mm\", or "
+    "correct the torque limits of the robot",
+    "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf)),
+}
 _SI = {"time": "s", "position": "rad", "velocity": "rad/s", "acceleration": "rad/s^2",
        "torque": "N m", "current": "A", "temperature": "degC"}  # fmt: skip
 _METRES = {"m": "m", "mm": "m", "um": "m", "m/s": "m/s", "mm/s": "m/s", "m/s^2": "m/s^2",

@@ -25,7 +25,7 @@ from pipelines.io.limits import (
     percent,
     sentinels,
 )
-from pipelines.quality.checks_subject import many
+from pipelines.quality.subject import many
 
 __all__ = ["Limits", "Recording", "late_intervals", "repair"]
 

@@ -20,7 +20,7 @@ from pipelines.io.experiment import ExperimentLog
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation import Experiment
 from pipelines.model.simulation.control import Controlling
-from pipelines.quality.checks_subject import Subject
+from pipelines.quality.subject import Subject
 
 __all__ = ["against_command", "commanded"]
 

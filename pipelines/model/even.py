@@ -15,8 +15,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.io.experiment import Array, ExperimentLog
-from pipelines.quality.faults import Mask
-from pipelines.quality.segments import Usable, usable
+from pipelines.quality.segments import Mask, Usable, usable
 from pipelines.signal.instants import Instants, average_held, instants, merge_close
 from pipelines.signal.resample import grid, resample
 

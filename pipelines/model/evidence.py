@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.row_fit import Row, Sampled, relative_residual, row_fits
-from pipelines.quality.checks_subject import Subject
+from pipelines.quality.subject import Subject
 
 __all__ = ["Evidence"]
 

@@ -19,7 +19,7 @@ from pipelines.model.estimation.logs import Recipe, equations_of, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.quality.checks_subject import NotTested, Subject
+from pipelines.quality.subject import NotTested, Subject
 
 __all__ = ["REMEDY", "excitation", "excited"]
 

@@ -37,8 +37,7 @@ from pipelines.model.motion import (
     reconstruct,
 )
 from pipelines.model.rigid.body import Motion
-from pipelines.quality.faults import Mask, quantum
-from pipelines.quality.segments import Usable, usable
+from pipelines.quality.segments import Mask, Usable, quantum, usable
 from pipelines.signal.filters import passed_both_ways
 from pipelines.signal.grid import Grid, grids, lay_on
 from pipelines.signal.periods import Periods, Repeats, average_periods, mean_of_periods, passed_std

@@ -33,8 +33,7 @@ from pipelines.model.tuned import (
     encoder_resolution,
     tuned_observers,
 )
-from pipelines.quality.faults import Mask
-from pipelines.quality.segments import Usable, usable
+from pipelines.quality.segments import Mask, Usable, usable
 from pipelines.signal.grid import Tracker, on_grid
 
 __all__ = ["METHODS", "Mean", "Observers", "Reconstructed", "Reconstruction", "encoder_resolution", "for_equations",

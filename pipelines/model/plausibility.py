@@ -32,7 +32,7 @@ from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
-from pipelines.quality.checks_subject import NotTested, Subject, spread
+from pipelines.quality.subject import NotTested, Subject, spread
 
 __all__ = ["mismatches", "plausibility", "plausibility_findings"]
 

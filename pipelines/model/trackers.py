@@ -17,8 +17,7 @@ from pipelines.io.experiment import Array
 from pipelines.io.order_statistics import distinct
 from pipelines.model.measured import Measured
 from pipelines.model.tuned import Observers, Reconstruction, tuned_observers
-from pipelines.quality.faults import Mask
-from pipelines.quality.segments import long_blocks
+from pipelines.quality.segments import Mask, long_blocks
 from pipelines.signal.grid import Tracker
 from pipelines.signal.observer import Observer, Track, observe
 from pipelines.signal.smoother import Smoother, smooth, twicing_growth

@@ -1,1 +1,1 @@
-"""What is wrong with one log: its clock, its samples, its motion; and which stretches of it can be used."""
+"""Find what is wrong with a log, and which of its stretches can be used; no model is needed."""

@@ -1,117 +1,129 @@
-"""The log doctor: named checks of one log, and of several together.
+"""Run the named checks of one log, and of several together.
 
-    for check in check_log(log):  ...       one `Check` for everything that was looked at, found or not
-    for check in check_together(subjects):  what only several logs show: copies, names, one-way friction logs
+    for check in check_log(log):             a `Check` for each thing checked, wrong or not
+    for check in check_together(logs, ...):  what only several logs show: copies, names, directions
 
-A check that finds nothing says so with level "ok" and what it measured, so that a reader sees what was looked at.
-Codes are rows of the table of bad inputs; D16 (a joint moves that the experiment holds) and S21 (two logs of a folder
-have one name) are two more.
+A check that finds nothing has level "ok" and says what it measured. Codes are rows of the table of
+bad inputs; D16 (a joint moves that the experiment holds) and S21 (two logs of a folder have one
+name) are two more.
 """
 
 from __future__ import annotations
 
+import hashlib
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from typing import Final
 
 from pipelines.errors import Check
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import Opened
-from pipelines.quality.checks_motion import MOTION_CHECKS, both_ways
-from pipelines.quality.checks_pace import PACE_CHECKS
-from pipelines.quality.checks_signal import SIGNAL_CHECKS
-from pipelines.quality.checks_subject import NotTested, Subject
-from pipelines.quality.checks_time import CLOCK_CHECKS, MOTION_BAND, TIME_CHECKS
-from pipelines.quality.checks_unit import UNIT_CHECKS
+from pipelines.quality.clock import CLOCK_CHECKS, ORDER_CHECKS, length
+from pipelines.quality.config import CONFIG
+from pipelines.quality.motion import MOTION_CHECKS, both_ways
+from pipelines.quality.signals import SIGNAL_CHECKS
+from pipelines.quality.subject import NotTested, Subject
+from pipelines.quality.units import UNIT_CHECKS
 
-__all__ = ["CHECKS", "LogCheck", "NotTested", "Subject", "check_log", "check_together", "findings"]
+__all__ = ["CHECKS", "LogCheck", "NotTested", "Subject", "check_log", "check_together"]
+__all__ += ["columns_first", "findings"]
 
 LogCheck = Callable[[Subject], Sequence[Check | NotTested]]
 
-CHECKS: Final[tuple[LogCheck, ...]] = (*TIME_CHECKS, *PACE_CHECKS, MOTION_BAND, *UNIT_CHECKS, *SIGNAL_CHECKS, *MOTION_CHECKS)
+CHECKS: Final[tuple[LogCheck, ...]] = (*CLOCK_CHECKS, *UNIT_CHECKS, *SIGNAL_CHECKS, *MOTION_CHECKS)
 
-
-# What follows from an input that is rejected for another reason is not worth a word of its own.
+# What follows from an input that is rejected for another reason is left out.
+_NO_TIME: Final = ("T03", "T04", "T05", "T07", "T09", "D11", "D12")
 _CONSEQUENCES: Final = {
     "RRID-D04": ("D11", "S16"),
     "RRID-S05": ("D05", "D06"),
     "RRID-S07": ("D06", "D08", "D11", "D12", "D16", "S15", "S16"),
-    "RRID-S08": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),
-    "RRID-S09": ("T03", "T04", "T05", "T07", "T09", "D11", "D12"),
+    "RRID-S08": _NO_TIME,
+    "RRID-S09": _NO_TIME,
 }
 
 
 def check_log(log: ExperimentLog | Subject, trusted: tuple[str, ...] = ()) -> tuple[Check, ...]:
-    """Everything the doctor has to say about one log, but what the user vouches for: codes in `trusted`."""
+    """Return the checks of one log, but for the codes in `trusted`, which the user vouches for."""
     subject = log if isinstance(log, Subject) else Subject(log)
-    return tuple(found for found in findings(subject, trusted) if isinstance(found, Check))
+    return tuple(item for item in findings(subject, trusted) if isinstance(item, Check))
 
 
 def findings(subject: Subject, trusted: tuple[str, ...] = ()) -> tuple[Check | NotTested, ...]:
-    """The same, and what could not be tested."""
-    if subject.log.n_samples < 2:
-        return tuple(TIME_CHECKS[0](subject))
-    if subject.planned:
+    """Return the checks of one log, and what could not be tested."""
+    if subject.log.origin == "planned":
         return ()  # a plan has neither clock nor sensors
+    if not subject.sampled:
+        return tuple(length(subject))
     if not subject.good.time.advances:
-        said = (found for check in CLOCK_CHECKS for found in check(subject) if isinstance(found, Check) and found.level != "ok")
-        return tuple(found for found in said if found.code != "RRID-T07")  # without time nothing is shorter than a period
-    checks = CHECKS if subject.sampled else TIME_CHECKS
-    found = [found for check in checks for found in check(subject) if found.code not in trusted]
-    follows = {f"RRID-{code}" for check in found if isinstance(check, Check) and check.level == "reject"
-               for code in _CONSEQUENCES.get(check.code, ())}
-    return tuple(check for check in found if (isinstance(check, Check) and check.level == "ok") or check.code not in follows)
+        said = (item for check in ORDER_CHECKS for item in check(subject))
+        return tuple(item for item in said if item.level != "ok")
+    found = [item for check in CHECKS for item in check(subject) if item.code not in trusted]
+    rejects = [item.code for item in found if item.level == "reject"]
+    follows = {f"RRID-{code}" for reject in rejects for code in _CONSEQUENCES.get(reject, ())}
+    return tuple(item for item in found if item.level == "ok" or item.code not in follows)
+
+
+def columns_first(checks: Iterable[Check]) -> tuple[Check, ...]:
+    """Return `checks` of one recorder, where mixed-up columns (S13) are put right before all else.
+
+    A log that moves one joint alone then seems to have a wrong sign or scale (S14, S15).
+    """
+    every = list(checks)
+    remedy = "nothing yet: the columns that are mixed up (RRID-S13) can explain it"
+    if any(check.code == "RRID-S13" and check.gate for check in every):
+        for k, check in enumerate(every):
+            if check.code in ("RRID-S14", "RRID-S15") and check.level != "ok":
+                every[k] = replace(check, remedy=f"{remedy}; put them right first")
+    return tuple(every)
 
 
 def check_together(opened: Sequence[Opened], subjects: Sequence[Subject]) -> tuple[Check, ...]:
-    """D14, D10 and names: what only several logs show."""
+    """D14, S21 and D10: what only several logs show."""
     return (*_leaks(opened), *_names(opened), *_one_way_friction(subjects))
 
 
 def _leaks(opened: Iterable[Opened]) -> list[Check]:
     """D14: a log that a fit uses must not judge it."""
-    copies: dict[str, list[Opened]] = defaultdict(list)
+    files: dict[str, list[Opened]] = defaultdict(list)
+    samples: dict[bytes, list[Opened]] = defaultdict(list)
     for one in opened:
-        copies[one.sha256].append(one)
-    found = []
-    for group in copies.values():
-        names = ", ".join(one.path.name for one in group)
-        if len(group) > 1:
-            found.append(Check.of("D14", "warn",
-                                  f"the same file {len(group)} times: {names}",
-                                  where=group[0].path,
-                                  remedy="keep one of them; a copy counts twice in a fit"))
-    content: dict[bytes, list[Opened]] = defaultdict(list)
-    for one in opened:
+        files[one.sha256].append(one)
         if one.log.origin != "planned" and one.log.n_samples > 1:
-            content[one.log.q.tobytes() + one.log.tau.tobytes() if one.log.n_samples < 100 else _fingerprint(one.log)].append(one)
-    for group in content.values():
+            content = hashlib.sha256(one.log.q.tobytes() + one.log.tau.tobytes()).digest()
+            samples[content].append(one)
+    found = []
+    for group in (group for group in files.values() if len(group) > 1):
+        words = f"the same file {len(group)} times: {_listed(group)}"
+        remedy = "keep one of them; a copy counts twice in a fit"
+        found.append(Check.of("D14", "warn", words, where=group[0].path, remedy=remedy))
+    for group in samples.values():
         roles = sorted({one.log.role for one in group})
         if len(roles) > 1:
-            found.append(Check.of("D14", "reject",
-                                  f"leak: {', '.join(one.path.name for one in group)} hold the same samples with roles "
-                                  f"{' and '.join(roles)}",
-                                  where=group[0].path, gate=True,
-                                  remedy="judge on another recording; a fit always explains what it was made from"))
+            words = f"leak: {_listed(group)} hold the same samples with roles {' and '.join(roles)}"
+            remedy = "judge on another recording; a fit always explains what it was made from"
+            where = group[0].path
+            found.append(Check.of("D14", "reject", words, where=where, gate=True, remedy=remedy))
     return found
 
 
-def _fingerprint(log: ExperimentLog) -> bytes:
-    import hashlib
-
-    return hashlib.sha256(log.q.tobytes() + log.tau.tobytes()).digest()
+def _listed(group: Iterable[Opened]) -> str:
+    return ", ".join(one.path.name for one in group)
 
 
 def _names(opened: Iterable[Opened]) -> list[Check]:
-    """A log's name is unique within its folder: results are filed under it."""
+    """S21: a log's name is unique within its folder: results are filed under it."""
     named: dict[tuple[str, str], list[Opened]] = defaultdict(list)
     for one in opened:
         named[str(one.path.parent), one.log.name].append(one)
-    return [Check.of("S21", "warn",
-                     f"{len(group)} logs are named '{name}': {', '.join(one.path.name for one in group)}",
-                     where=folder,
-                     remedy="give each log of a folder a name of its own")
-            for (folder, name), group in named.items() if len(group) > 1 and len({one.sha256 for one in group}) > 1]
+    found = []
+    for (folder, name), group in named.items():
+        if len({one.sha256 for one in group}) > 1:
+            words = f"{len(group)} logs are named '{name}': {_listed(group)}"
+            remedy = "give each log of a folder a name of its own"
+            found.append(Check.of("S21", "warn", words, where=folder, remedy=remedy))
+    return found
 
 
 def _one_way_friction(subjects: Iterable[Subject]) -> list[Check]:
@@ -123,10 +135,12 @@ def _one_way_friction(subjects: Iterable[Subject]) -> list[Check]:
                 groups[subject.log.robot_name, joint].append((subject, up, down))
     found = []
     for (_, joint), members in groups.items():
-        if max(up for _, up, _ in members) < 0.02 or max(down for _, _, down in members) < 0.02:
-            found.append(members[0][0].say("D10", "warn",
-                                           f"the speed of joint {joint + 1} never changes sign in its friction logs: "
-                                           f"Coulomb offset unidentifiable joint {joint + 1}",
-                                           signal="q", joint=joint, gate=True,
-                                           remedy="record the joint in both directions"))
+        first, ups, downs = zip(*members, strict=True)
+        if min(max(ups), max(downs)) < CONFIG.one_way:
+            words = (
+                f"the speed of joint {joint + 1} never changes sign in its friction logs: Coulomb "
+            )
+            words += f"offset unidentifiable joint {joint + 1}"
+            remedy = "record the joint in both directions"
+            found.append(first[0].say("D10", "warn", words, remedy, True, signal="q", joint=joint))
     return found

@@ -10,8 +10,8 @@ import numpy as np
 
 from pipelines.io.experiment import Array
 from pipelines.io.limits import GAP_TICKS
-from pipelines.quality.checks_subject import Subject
 from pipelines.quality.segments import long_blocks
+from pipelines.quality.subject import Subject
 from pipelines.report.figures import (
     Mask,
     Span,

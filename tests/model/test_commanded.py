@@ -17,7 +17,7 @@ from pipelines.estimation.checks.gates import examined
 from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.commanded import against_command, commanded
 from pipelines.model.plausibility import mismatches
-from pipelines.quality.checks_subject import Subject
+from pipelines.quality.subject import Subject
 from tests.healthy import with_signal
 from tests.seeds import rarely
 

@@ -14,8 +14,8 @@ import pytest
 from pipelines.io.files import Opened
 from pipelines.io.limits import percent, sentinels
 from pipelines.quality.checks import CHECKS, LogCheck, NotTested, Subject, check_log, check_together
-from pipelines.quality.checks_motion import limits, peak_speed
-from pipelines.quality.faults import quantum, spikes, time_base, torque_limit
+from pipelines.quality.motion import limits, peak_speed
+from pipelines.quality.segments import quantum, spikes, time_base, torque_limit
 from tests.faulty import healthy_without_reference, turning
 from tests.healthy import (
     changed,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipelines.errors import Check
-from pipelines.quality.columns_first import columns_first
+from pipelines.quality.checks import columns_first
 
 SIGN = Check.of("S14", "warn", "the torque of joint 1 looks flipped", where="b.h5", remedy="change the sign", gate=True)
 SCALE = Check.of("S15", "ok", "torque over that of the described links: 1", where="a.h5")

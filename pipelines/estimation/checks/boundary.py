@@ -39,8 +39,8 @@ from pipelines.io.robot import RobotDescription
 from pipelines.io.schema import joint_unit
 from pipelines.model.rigid.chain import standard_parameters
 from pipelines.model.row_fit import Sampled, sample_motion
-from pipelines.quality.checks_subject import Subject
 from pipelines.quality.segments import Usable
+from pipelines.quality.subject import Subject
 
 __all__ = [
     "STANDARD_GRAVITY",

@@ -23,7 +23,7 @@ from pipelines.model.estimation.logs import Motions, Recipe, equations_of, fit_l
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Array
-from pipelines.quality.faults import Mask
+from pipelines.quality.segments import Mask
 
 __all__ = ["RestConfig", "rests", "without_stiction"]
 

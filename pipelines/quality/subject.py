@@ -1,10 +1,11 @@
-"""What every check of one log looks at: the log as recorded, and what of it is usable, worked out once."""
+"""Hold one log for its checks: as recorded, and what of it can be used."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar, TypedDict, Unpack
 
 import numpy as np
 
@@ -12,15 +13,24 @@ from pipelines.errors import Check, Level, clean
 from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.limits import FEWEST
 from pipelines.io.schema import joint_unit
-from pipelines.quality.segments import Usable, usable
+from pipelines.quality.segments import Indices, Mask, Usable, usable
 
-__all__ = ["NotTested", "Subject", "many", "spread"]
+__all__ = ["NotTested", "Place", "Subject", "flagged", "many", "spread"]
+
+
+class Place(TypedDict, total=False):
+    """Where in a log something was found."""
+
+    signal: str
+    joint: int | None  # from 0
+    sample: int | None  # of the recording
 
 
 @dataclass(frozen=True)
 class NotTested:
     """A check that this log gives nothing to judge by: neither passed nor failed."""
 
+    level: ClassVar = "untested"
     code: str  # with prefix: "RRID-S15"
     where: str
     reason: str
@@ -37,17 +47,13 @@ class Subject:
         return usable(self.log)
 
     @property
-    def planned(self) -> bool:
-        return self.log.origin == "planned"
-
-    @property
     def sampled(self) -> bool:
-        """Return whether there are signals to judge; of fewer samples T08 says all there is to say."""
-        return not self.planned and self.log.n_samples >= FEWEST
+        """Return whether there are signals to judge; T08 is of logs with fewer samples."""
+        return self.log.origin != "planned" and self.log.n_samples >= FEWEST
 
     @property
     def steps(self) -> tuple[float | None, ...]:
-        """Step in which each encoder counts, where it can be seen. [rad]"""
+        """Step in which each encoder counts, where it is visible. [rad]"""
         return self.good.steps
 
     @cached_property
@@ -71,15 +77,19 @@ class Subject:
         return joint_unit(signal, self.log.robot.joints[joint].revolute).replace("^2", "²")
 
     def with_units(self, signal: str, values: Iterable[float | None]) -> str:
-        """A number for each joint: "4.82, 2.18 rad/s", or "4.82 rad/s, 0.3 m/s" where some turn and some slide."""
-        units = [self.unit(signal, joint) for joint in range(self.log.n_joints)]
-        told = ["not visible" if value is None or np.isnan(value) else f"{value:.3g}" for value in values]
-        if len(set(units)) == 1 and told[-1] != "not visible":
-            return f"{', '.join(told)} {units[0]}"
-        return ", ".join(word if word == "not visible" else f"{word} {unit}" for word, unit in zip(told, units, strict=True))
+        """Return a number for each joint: "4.82, 2.18 rad/s"; with units "4.8 rad/s, 0.3 m/s"."""
+        words, units = [], [self.unit(signal, joint) for joint in range(self.log.n_joints)]
+        for j, value in enumerate(values):
+            shown = value is not None and not np.isnan(value)
+            alike = j + 1 < len(units) and len(set(units)) == 1
+            unit = "" if alike else f" {units[j]}"
+            words.append(f"{value:.3g}{unit}" if shown else "not visible")
+        return ", ".join(words)
 
-    def place(self, signal: str = "", joint: int | None = None, sample: int | None = None) -> str:
-        """Where: file, signal, joint (from 0), sample of the recording."""
+    def place(
+        self, *, signal: str = "", joint: int | None = None, sample: int | None = None
+    ) -> str:
+        """Return where: file, signal, joint (from 0), sample of the recording."""
         parts = [self.log.source or self.log.name]
         parts += [f"signal {signal}"] if signal else []
         parts += [f"joint {joint + 1}"] if joint is not None else []
@@ -87,26 +97,39 @@ class Subject:
             parts.append(f"sample {sample}, t = {self.log.t[sample]:.6g} s")
         return ", ".join(parts)
 
-    def say(self, code: str, level: Level, message: str, *, signal: str = "", joint: int | None = None, sample: int | None = None,
-            remedy: str = "", gate: bool = False) -> Check:
-        return Check.of(code, level, message, where=self.place(signal, joint, sample), remedy=remedy, gate=gate)
+    def say(
+        self,
+        code: str,
+        level: Level,
+        message: str,
+        remedy: str = "",
+        gate: bool = False,
+        **place: Unpack[Place],
+    ) -> Check:
+        return Check.of(code, level, message, where=self.place(**place), remedy=remedy, gate=gate)
 
     def ok(self, code: str, message: str, *, signal: str = "") -> list[Check]:
         return [self.say(code, "ok", message, signal=signal)]
 
     def cannot_tell(self, code: str, reason: str, *, signal: str = "") -> list[NotTested]:
-        """What this log cannot show is said, and not counted as passed."""
-        return [NotTested(f"RRID-{code}", clean(self.place(signal)), clean(reason))]
+        """Return what this log cannot show, which is not counted as passed."""
+        return [NotTested(f"RRID-{code}", clean(self.place(signal=signal)), clean(reason))]
 
 
 def many(number: int, thing: str) -> str:
-    """"1 gap", "2 gaps"."""
+    """Return "1 gap", "2 gaps"."""
     return f"{number} {thing}{'' if number == 1 else 's'}"
 
 
 def spread(x: Array) -> Array:
-    """(joints,) largest minus smallest finite sample of each column."""
+    """Return the largest minus the smallest finite sample of each column (joints,)."""
     finite = np.isfinite(x)
     high = np.max(np.where(finite, x, -np.inf), axis=0, initial=-np.inf)
     low = np.min(np.where(finite, x, np.inf), axis=0, initial=np.inf)
     return np.asarray(np.maximum(high - low, 0.0))
+
+
+def flagged(mask: Mask) -> Iterator[tuple[int, Indices]]:
+    """Yield each joint (from 0) that `mask` (samples, joints) marks, and its samples."""
+    for joint in np.flatnonzero(mask.any(axis=0)).tolist():
+        yield joint, np.flatnonzero(mask[:, joint])

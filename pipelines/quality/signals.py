@@ -1,0 +1,200 @@
+"""Check the samples of a log: missing, absurd, constant, saturated, glitches, wraps, copies."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+import numpy as np
+
+from pipelines.errors import Check, Level
+from pipelines.io import schema
+from pipelines.io.limits import ABSURD, GAP_LIMIT, percent, sentinels
+from pipelines.io.order_statistics import distinct
+from pipelines.quality.config import CONFIG
+from pipelines.quality.segments import long_blocks, torque_limit
+from pipelines.quality.subject import NotTested, Place, Subject, flagged, many, spread
+
+__all__ = ["SIGNAL_CHECKS"]
+
+_REPAIR = "look at this channel's cable and its place in the recorder, and record again"
+
+
+def missing_samples(s: Subject) -> list[Check]:
+    """D01, D02: a few samples may be missing (NaN); of a signal that no fit needs, all."""
+    needed = ("q", "tau", "v") if s.log.experiment == "frf" else ("q", "tau")
+    found = []
+    for name in (name for name in s.log.signals if name in schema.SIGNALS and name != "t"):
+        undefined = np.isnan(s.log[name])
+        for j, at in flagged(undefined):
+            place = Place(signal=name, joint=j, sample=int(at[0]))
+            whole, blocks = at.size == len(undefined), len(long_blocks(undefined[:, j]))
+            words = f"{name} of joint {j + 1}: {at.size} of {len(undefined)} samples are missing"
+            if whole:
+                words = f"{name} of joint {j + 1}: there is no measurement at all"
+            if name not in needed:
+                code, remedy = "D02" if whole else "D01", "leave the signal out, or record it again"
+                found.append(s.say(code, "warn", words, remedy, whole, **place))
+            elif at.size > CONFIG.gone * len(undefined):
+                found.append(s.say("D02", "reject", words, _REPAIR, **place))
+            elif blocks:
+                words = (
+                    f"{at.size} samples of {name} are missing, {many(blocks, 'time')} more than "
+                )
+                words += f"{GAP_LIMIT} in a row; the log is split there"
+                found.append(s.say("D02", "repair", words, _REPAIR, **place))
+            else:
+                words = f"{many(at.size, 'sample')} of {name} missing, never more than {GAP_LIMIT} "
+                words += "in a row; treated as not measured"
+                found.append(s.say("D01", "repair", words, "none needed if few", **place))
+    return found or s.ok("D01", "no sample is missing")
+
+
+def absurd_samples(s: Subject) -> list[Check]:
+    """D03: infinite, astronomically large, and filler values such as -999."""
+    found = []
+    for name in (name for name in s.log.signals if name != "t"):
+        x = s.log[name]
+        bad = np.abs(x) >= ABSURD
+        if name in ("q", "tau"):
+            bad |= sentinels(x)
+        for j, at in flagged(bad):
+            values = ", ".join(f"{v:g}" for v in distinct(x[at, j])[:4])
+            samples = ", ".join(map(str, at[:8]))
+            words = f"{many(at.size, 'sample')} of {name} with the value {values}, which is no "
+            words += f"measurement (samples {samples}{', …' * bool(at[8:].size)})"
+            remedy = "mark what was not measured as NaN, or look at the sensor"
+            level: Level = "repair" if at.size <= CONFIG.few * s.log.n_samples else "reject"
+            place = Place(signal=name, joint=j, sample=int(at[0]))
+            found.append(s.say("D03", level, words, remedy, **place))
+    return found or s.ok("D03", "no infinite, astronomical or filler value")
+
+
+def constant_channels(s: Subject) -> list[Check]:
+    """D04: what this experiment has to move does move."""
+    log, found = s.good.log, []
+    reference = spread(log["q_ref"]) if "q_ref" in log else np.zeros(log.n_joints)
+    torque = spread(log.tau)
+    for j in range(log.n_joints):
+        tau, q = (x[np.isfinite(x[:, j]), j] for x in (log.tau, log.q))
+        if not tau.size or not q.size:
+            continue  # D02 is of it
+        asked = j in s.moving or (reference[j] > CONFIG.travel and log.experiment != "hold")
+        if s.travel[j] == 0.0 and asked:
+            words = f"q of joint {j + 1} is constant ({q[0]:.6g})"
+            found.append(s.say("D04", "reject", words, _REPAIR, signal="q", joint=j))
+        moves = j in s.moving or s.travel[j] > CONFIG.moved
+        steady = (
+            log.experiment == "friction" and tau[0] != 0.0
+        )  # a constant torque drives the joint
+        if torque[j] == 0.0 and moves and not steady:
+            words = f"tau of joint {j + 1} is constant ({tau[0]:.6g}) while the joint moves"
+            found.append(s.say("D04", "reject", words, _REPAIR, signal="tau", joint=j))
+    return found or s.ok("D04", "every channel that has to move does")
+
+
+def saturation(s: Subject) -> list[Check]:
+    """D05: the drive could give the torque that was commanded."""
+    found, tau, limits = [], np.abs(s.good.log.tau), torque_limit(s.log)
+    for j, at in flagged(s.good.saturated):
+        least, peak, limit = float(tau[at, j].min()), float(tau[at, j].max()), limits[j]
+        where = f"at the described limit of {limit:.4g}"
+        if least < 0.99 * limit:
+            where = f"at a flat top at {least:.4g}"
+        elif peak > CONFIG.beyond * limit:  # commands, which the drive cuts
+            where = f"at or beyond the described limit of {limit:.4g}, up to {peak:.4g}"
+        share, unit = at.size / len(tau), s.unit("tau", j)
+        words = f"{percent(share, 2)} of the torque samples lie {where} {unit}; no fit uses them"
+        remedy = "move slower or with less acceleration; a saturated drive hides what the arm needs"
+        if peak > CONFIG.twice * limit:
+            remedy += (
+                f"; if no command was {peak / limit:.2g} times the limit, look for a gear ratio "
+            )
+            remedy += "or torque constant applied twice, or correct the robot's description"
+        place = Place(signal="tau", joint=j, sample=int(s.good.kept[at[0]]))
+        found.append(s.say("D05", "warn", words, remedy, share > CONFIG.saturated, **place))
+    peaks = s.with_units("tau", np.nanmax(tau, axis=0, initial=0.0).tolist())
+    return found or s.ok("D05", f"the torque stays below its limits, at most {peaks}", signal="tau")
+
+
+def glitches(s: Subject) -> list[Check]:
+    """D06: single samples far from their neighbours."""
+    found, remedy = [], "look at the shielding of the encoder and at the recorder's transmission"
+    for name, flags in (("q", s.good.position_spikes), ("tau", s.good.torque_spikes)):
+        for j, at in flagged(flags):
+            words = f"{many(at.size, 'sample')} of {name} too far from the neighbours; left out"
+            place = Place(signal=name, joint=j, sample=int(s.good.kept[at[0]]))
+            found.append(s.say("D06", "repair", words, remedy, **place))
+    return found or s.ok("D06", "no sample is far from its neighbours")
+
+
+def wraps(s: Subject) -> list[Check]:
+    """D07: the position does not jump, by a turn or otherwise."""
+    found = []
+    wrapped, jumped = np.diff(s.good.wrapped, axis=0), np.diff(s.good.log.q, axis=0)
+    for j, at in flagged(wrapped != 0.0):
+        by = f"{abs(wrapped[at[0], j]):.6g} {s.unit('q', j)}"
+        words = f"the encoder wraps {many(at.size, 'time')} by {by}; unwrapped"
+        place = Place(signal="q", joint=j, sample=int(s.good.kept[at[0] + 1]))
+        found.append(s.say("D07", "warn", words, "let the recorder count turns", **place))
+    for j, at in flagged(s.good.jumped[1:]):
+        by = f"{jumped[at[0], j]:.4g} {s.unit('q', j)}"
+        words = (
+            f"the position jumps {many(at.size, 'time')}, first by {by}, which is no turn and no "
+        )
+        words += "counter's range; the log is split there"
+        place = Place(signal="q", joint=j, sample=int(s.good.kept[at[0] + 1]))
+        remedy = "look at the encoder: it loses counts"
+        found.append(s.say("D07", "warn", words, remedy, True, **place))
+    return found or s.ok("D07", "the position neither wraps nor jumps", signal="q")
+
+
+def resolution(s: Subject) -> Sequence[Check | NotTested]:
+    """D08: encoders count as finely as described; the observer's noise is R = δ² / 12."""
+    found: list[Check | NotTested] = []
+    hidden = ", ".join(str(j + 1) for j, step in enumerate(s.steps) if step is None)
+    for j, step in enumerate(s.steps):
+        declared, q = s.log.robot.joints[j].encoder_resolution, s.good.log.q[:, j]
+        if step is None or distinct(q[np.isfinite(q)]).size < CONFIG.distinct:
+            continue
+        coarse, told = s.travel[j] < CONFIG.few_steps * step, f"{s.travel[j] / step:.0f} in all"
+        if declared:
+            coarse, told = step > CONFIG.coarse * declared, f"the description says {declared:.3g}"
+        if coarse:
+            unit = s.unit("q", j)
+            words = f"the encoder counts in steps of {step:.3g} {unit}, {told}; noise is set to "
+            words += f"R = δ²/12 = {step**2 / 12.0:.3g} {unit}² from the data"
+            remedy = "correct encoder_resolution, or look for bits lost on the way"
+            found.append(s.say("D08", "warn", words, remedy, signal="q", joint=j))
+    if not found and any(s.steps):
+        found += s.ok("D08", f"encoder steps: {s.with_units('q', s.steps)}", signal="q")
+    if hidden:
+        words = f"no step of the encoder shows in the positions of joint {hidden}"
+        found += s.cannot_tell("D08", words, signal="q")
+    return found
+
+
+def identical(s: Subject) -> list[Check]:
+    """S13: no two channels hold the same samples; two sensors never do."""
+    alike: dict[bytes, list[tuple[str, int]]] = defaultdict(list)
+    for name in ("q", "tau"):
+        for j in np.flatnonzero(spread(s.log[name]) > 0).tolist():
+            alike[s.log[name][:, j].tobytes()].append((name, j))
+    found, remedy = [], "correct the column map of the import: one column serves two channels"
+    for group in (group for group in alike.values() if len(group) > 1):
+        names, (signal, j) = [f"{name} of joint {j + 1}" for name, j in group], group[-1]
+        words = f"{' and '.join(names)} are the same, sample for sample"
+        found.append(s.say("S13", "warn", words, remedy, True, signal=signal, joint=j))
+    return found
+
+
+SIGNAL_CHECKS = (
+    missing_samples,
+    absurd_samples,
+    constant_channels,
+    saturation,
+    glitches,
+    wraps,
+    resolution,
+    identical,
+)
