@@ -52,7 +52,7 @@ from pipelines.model.motion import Reconstructed, for_equations, reconstruct
 from pipelines.model.parameter import Uncertainty
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
-from pipelines.quality.checks import Subject, check_log
+from pipelines.quality.checks import Subject, accepted
 from pipelines.report.bps_report import bps_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
@@ -158,10 +158,7 @@ def _accepted(logs: list[ExperimentLog]) -> list[tuple[Subject, list[Check]]]:
     subjects = []
     for log in logs:
         subject = Subject(recording(log))
-        checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
-        if reject := next((check for check in checks if check.level == "reject"), None):
-            raise reject.as_error()
-        subjects.append((subject, checks))
+        subjects.append((subject, accepted(subject)))
     return subjects
 
 

@@ -45,7 +45,7 @@ from pipelines.model.parameter import Parameter
 from pipelines.model.rigid.body import Array
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
-from pipelines.quality.checks import Subject, check_log
+from pipelines.quality.checks import Subject, accepted
 from pipelines.report.friction_report import friction_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
@@ -146,9 +146,7 @@ def _examined(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[list[
     seen, said = [], []
     for log in logs:
         subject = Subject(recording(log))
-        checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
-        if reject := next((check for check in checks if check.level == "reject"), None):
-            raise reject.as_error()
+        checks = accepted(subject)
         seen.append((log, reconstruct(log, how, subject.good)))
         said += checks
     return seen, tuple(said)

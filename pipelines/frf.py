@@ -38,7 +38,7 @@ from pipelines.model.frf.result import (
     posture_of,
     undecided,
 )
-from pipelines.quality.checks import Subject, check_log
+from pipelines.quality.checks import Subject, accepted
 from pipelines.report.frf_report import frf_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, Uses, read_logs
@@ -114,7 +114,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     _refuse_no_posture(settings, 0)
     logs = _chosen(inputs)
     arm = inputs.material if isinstance(inputs.material, Arm) and inputs.material.n_joints == logs[0].n_joints else None
-    said = tuple(check for log in logs for check in _examined(log))
+    said = tuple(check for log in logs for check in accepted(Subject(log)))
     found = frf_findings(logs, arm, How(settings.estimator, settings.resolution), (settings.low, settings.high))
     postures = tuple(posture_of(seen) for seen in found.seen)
     _refuse_no_posture(settings, max(Counter(posture.joint for posture in postures).values(), default=0))
@@ -141,13 +141,6 @@ def _chosen(inputs: Inputs) -> list[ExperimentLog]:
         raise UsageError("C02", "logs of several robots", where=inputs.label,
                          remedy="name the logs of one; 'rrrid run' takes a folder of several apart")
     return now
-
-
-def _examined(log: ExperimentLog) -> list[Check]:
-    checks = [check for check in check_log(Subject(log)) if check.level != "ok"]
-    if reject := next((check for check in checks if check.level == "reject"), None):
-        raise reject.as_error()
-    return checks
 
 
 def _complaints(found: Findings, settings: Settings) -> list[Check]:

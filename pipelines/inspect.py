@@ -32,6 +32,7 @@ from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import quantum
 from pipelines.quality.subject import many
 from pipelines.quality.units import TRUSTED
+from pipelines.report.config import REPORT
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.sections import boundary_card, checks_table, level_tone
@@ -132,7 +133,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
         found += checks
         untested += [item for item in items if isinstance(item, NotTested)]
         logs.append(_summary(opened, subject, (*opened.checks, *checks)))
-        if len(previews) < CONFIG.previews and subject.sampled:
+        if len(previews) < REPORT.previews and subject.sampled:
             previews.append(log_preview(subject))
     together = check_together(inputs.logs, subjects)
     found += [c for c in together if not (settings.allow_overlap and c.code == "RRID-D14")]
@@ -324,9 +325,9 @@ def _verdict(result: Result, found: list[Check]) -> str:
 
 
 def _found_section(found: list[Check]) -> Section:
-    more = len(found) - CONFIG.listed
+    more = len(found) - REPORT.findings
     text = (f"{more} more are in result.json.",) if more > 0 else ()
-    return Section("Findings", text, (checks_table(found[: CONFIG.listed], as_given=True),))
+    return Section("Findings", text, (checks_table(found[: REPORT.findings], as_given=True),))
 
 
 def _passed_section(result: Result) -> Section:
@@ -371,7 +372,7 @@ def _logs_section(result: Result) -> Section:
 def _log_section(log: LogSummary, preview: Preview) -> Section:
     rows = tuple((r.signal, r.joint, r.low, r.high, r.unit) for r in log.ranges)
     tables = (Table(("signal", "joint", "lowest", "highest", "unit"), rows),) if rows else ()
-    uneven = log.jitter > CONFIG.visible_jitter or log.dropped_samples > 0 or bool(log.gaps)
+    uneven = log.jitter > REPORT.visible_jitter or log.dropped_samples > 0 or bool(log.gaps)
     steps = ("not visible" if step is None else f"{step:.3g}" for step in log.encoder_step)
     text = f"{log.usable_samples} of {log.samples} samples can be used. Encoder steps [rad]: "
     # a hyphen and a blank at which no line is broken

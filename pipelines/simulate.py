@@ -1,11 +1,12 @@
 """Simulate a model in the experiment of a log, optionally with a fault.
 
 Reads    a model file, and the logs to imitate: any but plans whose controller is not described
-Writes   logs/<name>.h5 or .parquet as the model would have produced them, result.json, result.h5, report.html
-Source   Kostić et al. 2004, eq. (4), (23)-(27); the classical Runge-Kutta method, its step chosen by halving
+Writes   logs/<name>.h5 or .parquet as the model would have produced them, result.json, result.h5
+Source   Kostić et al. 2004, eq. (4), (23)-(27); classical Runge-Kutta method, step by halving
 
-A log that says what its controller did is simulated in closed loop: same controller, references, encoders. Any other is simulated
-in short windows, from the reconstructed state under the logged torque; windows make no log.
+A log that describes its controller is simulated in closed loop: same controller, references,
+encoders. Any other is simulated in short windows, from the reconstructed state under the logged
+torque; windows make no log.
 """
 
 from __future__ import annotations
@@ -18,35 +19,47 @@ import numpy as np
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.io.derive import recording
 from pipelines.io.experiment import Array, ExperimentLog
-from pipelines.io.files import Opened, write_log
+from pipelines.io.files import write_log
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.named_cause import acting_cause
 from pipelines.model.simulation.imitate import How, Imitation, imitate
-from pipelines.quality.checks import Subject, check_log
+from pipelines.quality.checks import Subject, accepted
+from pipelines.report.config import REPORT
 from pipelines.report.report import Report
 from pipelines.report.simulation_report import simulation_report
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
-_DRAWN = 4  # logs whose series are kept for figures
+_NAME_ONE = "name one: --replay LOG"
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Which model, what ails it, and how its logs are imitated."""
+    """Choose the model, its faults, and how the logs are imitated."""
 
     model: str = option("", "The model.json of estimate-bps, or the shipped 'rrr'.", "MODEL")
-    fault: tuple[str, ...] = option((), "CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes are listed below; a wrong NAME is refused with a list of the right ones.", causes=True)
+    fault: tuple[str, ...] = option(
+        (),
+        "CAUSE:JOINT:NAME=VALUE,…: quadratic_drag:2:coefficient=0.1. Repeatable. All causes are "
+        "listed below; a wrong NAME is refused with a list of the right ones.",
+        causes=True,
+    )
     replicas: int = option(1, "Simulations that differ in their noise; windows have one.")
     seed: int = option(1, "Seed of the first one's noise.")
-    noise: tuple[float, ...] = option((), "Torque noise of the drives, std [N m], one or one a joint: 0.02,0.01,0.005. Windows have none. [0]")
+    noise: tuple[float, ...] = option(
+        (),
+        "Torque noise of the drives, std [N m], one or one a joint: 0.02,0.01,0.005. Windows have "
+        "none. [0]",
+    )
     windowed: bool = option(False, "In short windows, though the controller is known.")
     window: float = option(0.1, "Length of such a window [s].")
-    steps: int | None = option(None, "Runge-Kutta steps a sample; 1 to 1000. [as few as the error allows]")
+    steps: int | None = option(
+        None, "Runge-Kutta steps a sample; 1 to 1000. [as few as the error allows]"
+    )
 
     @property
     def how(self) -> How:
@@ -55,33 +68,36 @@ class Settings:
 
 @dataclass(frozen=True)
 class Result:
-    """Every log that was imitated."""
+    """All logs that were imitated."""
 
     model: str
     others: tuple[str, ...]  # robots of the logs that are not the model's
     faults: tuple[str, ...]  # as they were written
     logs: tuple[Imitation, ...]
-    tracking_rms: tuple[Array | None, ...]  # [rad] measured minus reference, of each log that was simulated in closed loop
+    # [rad] measured minus reference, of each log that was simulated in closed loop
+    tracking_rms: tuple[Array | None, ...]
     data_quality: tuple[Check, ...]  # what the logs are like
 
 
 def read(request: Request, settings: Settings) -> Inputs:
-    """The model, and the logs to imitate.
+    """Read the model, and the logs to imitate.
 
     Raises:
         UsageError: C02, no model was named, or one without inertia; C04, no such file.
     """
     if not settings.model:
-        raise UsageError("C02", "no model", where="simulate", remedy="name a model.json, or the shipped 'rrr'")
+        remedy = "name a model.json, or the shipped 'rrr'"
+        raise UsageError("C02", "no model", where="simulate", remedy=remedy)
     if not request.paths:
-        raise UsageError("C02", "no log to imitate", where="simulate", remedy="name one: --replay LOG")
+        raise UsageError("C02", "no log to imitate", where="simulate", remedy=_NAME_ONE)
     inputs = read_logs(request, settings)
     path = Path(settings.model).absolute()
     sources = (path,) if path.is_file() else ()  # a shipped model is not one of the user's files
     arm = Arm.from_model(read_model(settings.model), path)
     if not arm.p.any() and not arm.effects:
-        raise UsageError("C02", f"the model {path.name} holds friction alone, no inertia", where="simulate",
-                         remedy="name the model.json of estimate-bps")
+        words = f"the model {path.name} holds friction alone, no inertia"
+        remedy = "name the model.json of estimate-bps"
+        raise UsageError("C02", words, where="simulate", remedy=remedy)
     return replace(inputs, sources=(*inputs.sources, *sources), material=arm)
 
 
@@ -91,61 +107,64 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     Raises:
         NothingMatched: C06, there is no log.
         UsageError: C01, C02, settings, faults or a model that do not fit.
-        InputRejected: D17, the simulated arm runs away; S22, a plan whose controller is not described; what a log lacks.
+        InputRejected: D17, the simulated arm runs away; S22, a plan whose controller is not
+            described; what a log lacks.
     """
     if not inputs.logs:
-        raise NothingMatched("C06", "no log to imitate", where=inputs.label, remedy="name one: --replay LOG")
+        raise NothingMatched("C06", "no log to imitate", where=inputs.label, remedy=_NAME_ONE)
     nominal: Arm = inputs.material
     arm = nominal.extended(*(acting_cause(text, nominal.robot.revolute) for text in settings.fault))
-    told = encode(replace(settings, model=Path(settings.model).name))[0]
+    recorded = encode(replace(settings, model=Path(settings.model).name))[0]
     found: list[Imitation] = []
-    said: list[Check] = []
+    checks: list[Check] = []
     taken: set[str] = set()
     for opened in inputs.logs:
         stem = slug(opened.path.stem)
         while taken & (names := _names(stem, settings.replicas)):
             stem += "+"
         taken |= names
-        said += _examined(opened)
-        one = imitate(opened.log, arm, settings.how, f"logs/{stem}", told, len(found) < _DRAWN)
+        if opened.log.origin != "planned":
+            checks += accepted(Subject(recording(opened.log)))
+        drawn = len(found) < REPORT.simulated
+        one = imitate(opened.log, arm, settings.how, f"logs/{stem}", recorded, drawn)
         found.append(replace(one, source=opened.path.name))
-    tracking = tuple(_tracking(opened.log, one) for opened, one in zip(inputs.logs, found, strict=True))
-    others = sorted({opened.log.robot.name for opened in inputs.logs} - {nominal.robot.name})
-    return Result(nominal.name, tuple(others), settings.fault, tuple(found), tracking, tuple(said))
+    pairs = zip(inputs.logs, found, strict=True)
+    return Result(
+        model=nominal.name,
+        others=tuple(sorted({o.log.robot.name for o in inputs.logs} - {nominal.robot.name})),
+        faults=settings.fault,
+        logs=tuple(found),
+        tracking_rms=tuple(_tracking(opened.log, one) for opened, one in pairs),
+        data_quality=tuple(checks),
+    )
 
 
 def _names(stem: str, replicas: int) -> set[str]:
-    """What the simulated logs of one log are called: replicas of "run" could be called as another log is, "run-2"."""
+    """Return the names of the simulated logs of one log, which another log could have: "run-2"."""
     return {stem, *(f"{stem}-{k + 1}" for k in range(1, replicas))}
 
 
 def _tracking(log: ExperimentLog, one: Imitation) -> Array | None:
-    """Root mean square (joints,) of measured minus reference position: feedback hides a model's error behind this one."""
-    if one.position_rms is None or one.simulation == "windowed" or one.law == "open-loop" or "q_ref" not in log:
+    """Return the RMS (joints,) of measured minus reference position; feedback keeps it small."""
+    feedback = one.simulation != "windowed" and one.law != "open-loop" and "q_ref" in log
+    if one.position_rms is None or not feedback:
         return None
-    return np.asarray(np.sqrt(np.nanmean((log.q - log["q_ref"])**2, axis=0)))
-
-
-def _examined(opened: Opened) -> list[Check]:
-    """What the doctor says of a recording."""
-    if opened.log.origin == "planned":
-        return []
-    checks = [check for check in check_log(Subject(recording(opened.log))) if check.level != "ok"]
-    if reject := next((check for check in checks if check.level == "reject"), None):
-        raise reject.as_error()
-    return checks
+    return np.asarray(np.sqrt(np.nanmean((log.q - log["q_ref"]) ** 2, axis=0)))
 
 
 def _checks(result: Result) -> tuple[Check, ...]:
-    """What the doctor said, and why a log could not be simulated in closed loop."""
-    why = (Check.of("S22", "warn", f"simulated in windows of {one.window:.3g} s: {one.reason}", where=one.source,
-                    remedy="describe the controller in the log to simulate it in closed loop")
-           for one in result.logs if one.simulation == "windowed" and one.reason != "asked for")
-    return (*result.data_quality, *why)
+    """Return the checks of the logs, and why a log could not be simulated in closed loop."""
+    found = list(result.data_quality)
+    for one in result.logs:
+        if one.simulation == "windowed" and one.reason != "asked for":
+            words = f"simulated in windows of {one.window:.3g} s: {one.reason}"
+            remedy = "describe the controller in the log to simulate it in closed loop"
+            found.append(Check.of("S22", "warn", words, where=one.source, remedy=remedy))
+    return tuple(found)
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
-    """Every simulated log, in the container asked for."""
+    """Write every simulated log, in the container that `request` names."""
     for one in result.logs:
         for file, log in zip(one.files, one.logs, strict=True):
             request.tell(f"writing {file}")
@@ -153,9 +172,21 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 
 def report(result: Result) -> Report:
-    """Measured over simulated position, speed and torque, their difference and its spectrum."""
-    model = result.model if not result.others else f"{result.model} in logs of {', '.join(result.others)}"
+    """Return measured and simulated position, speed and torque, their difference, its spectrum."""
+    model = result.model
+    if result.others:
+        model += f" in logs of {', '.join(result.others)}"
     return simulation_report(model, result.faults, result.logs, result.tracking_rms)
 
 
-STAGE = Stage("simulate", "Simulate a model", Settings, compute, report, read, write, checks=_checks, sessions="folder")
+STAGE = Stage(
+    "simulate",
+    "Simulate a model",
+    Settings,
+    compute,
+    report,
+    read,
+    write,
+    checks=_checks,
+    sessions="folder",
+)

@@ -26,8 +26,8 @@ from pipelines.quality.signals import SIGNAL_CHECKS
 from pipelines.quality.subject import NotTested, Subject
 from pipelines.quality.units import UNIT_CHECKS
 
-__all__ = ["CHECKS", "LogCheck", "NotTested", "Subject", "check_log", "check_together"]
-__all__ += ["columns_first", "findings"]
+__all__ = ["CHECKS", "LogCheck", "NotTested", "Subject", "accepted", "check_log"]
+__all__ += ["check_together", "columns_first", "findings"]
 
 LogCheck = Callable[[Subject], Sequence[Check | NotTested]]
 
@@ -48,6 +48,19 @@ def check_log(log: ExperimentLog | Subject, trusted: tuple[str, ...] = ()) -> tu
     """Return the checks of one log, but for the codes in `trusted`, which the user vouches for."""
     subject = log if isinstance(log, Subject) else Subject(log)
     return tuple(item for item in findings(subject, trusted) if isinstance(item, Check))
+
+
+def accepted(subject: Subject) -> list[Check]:
+    """Return the checks that found something.
+
+    Raises:
+        InputRejected: the first reason to reject the log.
+    """
+    checks = [check for check in check_log(subject) if check.level != "ok"]
+    for check in checks:
+        if check.level == "reject":
+            raise check.as_error()
+    return checks
 
 
 def findings(subject: Subject, trusted: tuple[str, ...] = ()) -> tuple[Check | NotTested, ...]:

@@ -76,10 +76,6 @@ class QualityConfig:
     creeps: float = 0.02  # [rad/s] a degree a second, at the fastest joint's fastest
     usual_speed: tuple[float, float] = (0.1, 30.0)  # [rad/s] fastest joint of an identified arm
     usual_hz: tuple[float, float] = (20.0, 1e5)  # rates of recorders
-    # report
-    previews: int = 8  # logs whose signals are drawn
-    listed: int = 200  # findings in the report; all are in result.json
-    visible_jitter: float = 1e-3  # rms, in sample times, from which the intervals are drawn
 
 
 CONFIG = QualityConfig()

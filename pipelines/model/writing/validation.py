@@ -25,7 +25,7 @@ from pipelines.model.writing.first_validation import (
 )
 from pipelines.model.writing.result import Gates, TorqueError, pooled
 from pipelines.model.writing.simulated_cases import Draws, possible, simulated_cases, why_not
-from pipelines.quality.checks import Subject, check_log
+from pipelines.quality.checks import Subject, accepted
 
 __all__ = ["Effort", "Validated", "validate"]
 
@@ -86,9 +86,7 @@ def _examined(logs: list[ExperimentLog]) -> tuple[Pairs, tuple[Check, ...]]:
     pairs, said = [], []
     for log in logs:
         subject = Subject(recording(log))
-        checks = [check for check in check_log(subject) if check.level != "ok" and check.code != "RRID-D09"]
-        if reject := next((check for check in checks if check.level == "reject"), None):
-            raise reject.as_error()
+        checks = accepted(subject)
         pairs.append((log, reconstruct(log, Reconstruction(), subject.good)))
         said += checks
     return pairs, tuple(said)
