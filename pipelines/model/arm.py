@@ -88,6 +88,7 @@ class Arm:
     effects: tuple[Acting, ...] = ()  # in the order they were accepted: each acts around those before it
     # of a fit, by the names of `parameters`; no model file holds it
     uncertainty: Uncertainty | None = field(default=None, compare=False, repr=False)
+    extends: Arm | None = field(default=None, compare=False, repr=False)  # without its effects, as it was before `extended`
 
     @property
     def robot(self) -> RobotDescription:
@@ -111,7 +112,12 @@ class Arm:
     @property
     def nominal(self) -> Arm:
         """The arm without its further effects: rigid body and friction."""
-        return replace(self, effects=()) if self.effects else self
+        if not self.effects:
+            return self
+        same = ((getattr(self, name), getattr(self.extends, name, None)) for name in ("body", "base", "friction"))
+        if self.extends is not None and all(own is known for own, known in same):
+            return self.extends  # one object: what is kept with a motion is found again
+        return replace(self, effects=(), extends=None)
 
     def with_body(self, body: RigidBody, p: Array) -> Arm:
         """The same arm with another rigid body; its base parameters then are assumed."""
@@ -123,7 +129,7 @@ class Arm:
         """With more effects, each around those before it; what misreads an angle around all that act there, what all torque of a
         joint comes through around that, and what changes the record outermost."""
         outer = sorted((*self.effects, *more), key=lambda acting: _ORDER.index(acting.effect.acts_on))
-        return replace(self, effects=tuple(outer))
+        return replace(self, effects=tuple(outer), extends=self.nominal)
 
     def torque(self, motion: Motion, inside: Callable[[Motion, ArmModel], Array] | None = None) -> Array:
         """Torque (samples, joints) [N m] that a log of this motion should show.

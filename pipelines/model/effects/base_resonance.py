@@ -26,6 +26,7 @@ from pipelines.model.rigid.perturbation import (
     oscillation,
     perturbed_by,
     rigid_slopes,
+    rigid_torque,
     shifted,
 )
 
@@ -86,9 +87,10 @@ class BaseResonance(Fast):
         inertia, w = values["inertia"], 2.0 * pi * values["frequency"]
         if not isfinite(inertia):
             return without
-        rigid = _rigid(arm)
-        x = deflection(rigid, motion, _FIRST, inertia * w * w, 2.0 * values["damping_ratio"] * w * inertia, inertia)
-        return np.asarray(without + (rigid(shifted(motion, _FIRST, *x)) - rigid(motion)))
+        rigid, slopes = _rigid(arm), rigid_slopes(arm.body, arm.p, motion, _FIRST)
+        damping = 2.0 * values["damping_ratio"] * w * inertia
+        x = deflection(rigid, slopes, motion, _FIRST, inertia * w * w, damping, inertia)
+        return np.asarray(without + (rigid(shifted(motion, _FIRST, *x)) - rigid_torque(arm.body, arm.p, motion)))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """The arm's first angle is the true one, against the ground; angle and speed of the base are two states."""

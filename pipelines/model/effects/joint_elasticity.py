@@ -27,6 +27,7 @@ from pipelines.model.rigid.perturbation import (
     perturbed_by,
     rate_of,
     rigid_slopes,
+    rigid_torque,
     shifted,
 )
 
@@ -102,9 +103,10 @@ class JointElasticity(Fast):
         without = predict(motion, arm) if predict is not None else arm.torque(motion)
         if not isfinite(values["stiffness"]):
             return without
-        rigid, motor = _rigid(arm), values["motor_inertia"]
-        x, rate, second = deflection(rigid, motion, self._index, values["stiffness"], values["damping"], -motor)
-        more = rigid(shifted(motion, self._index, x, rate, second)) - rigid(motion)
+        rigid, motor, spring = _rigid(arm), values["motor_inertia"], (values["stiffness"], values["damping"])
+        slopes = rigid_slopes(arm.body, arm.p, motion, self._index)
+        x, rate, second = deflection(rigid, slopes, motion, self._index, *spring, -motor)
+        more = rigid(shifted(motion, self._index, x, rate, second)) - rigid_torque(arm.body, arm.p, motion)
         more[:, self._index] -= motor * second
         return np.asarray(without + more)
 

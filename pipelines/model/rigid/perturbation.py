@@ -16,7 +16,8 @@ import numpy as np
 
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["arm_slopes", "deflection", "oscillation", "perturbed_by", "perturbed_torque", "rate_of", "rigid_slopes", "shifted"]
+__all__ = ["arm_slopes", "deflection", "oscillation", "perturbed_by", "perturbed_torque", "rate_of", "rigid_slopes", "rigid_torque",
+           "shifted", "torque_slopes"]
 
 Torque = Callable[[Motion], Array]
 
@@ -75,6 +76,11 @@ def arm_slopes(arm: Moving, motion: Motion, index: int) -> Array:
     return motion.kept(("slopes of the arm", arm, index), lambda: torque_slopes(arm.torque, motion, index))
 
 
+def rigid_torque(body: RigidBody, p: Array, motion: Motion) -> Array:
+    """Return the torque (samples, joints) of the rigid arm alone, kept with the motion."""
+    return motion.kept(("torque of the body", body, p), lambda: body.torque(motion.q, motion.dq, motion.ddq, p))
+
+
 def rigid_slopes(body: RigidBody, p: Array, motion: Motion, index: int) -> Array:
     """Return K_j, C_j, M_j (3, samples, joints) of the rigid arm alone, kept with the motion."""
     def torque(there: Motion) -> Array:
@@ -83,19 +89,19 @@ def rigid_slopes(body: RigidBody, p: Array, motion: Motion, index: int) -> Array
     return motion.kept(("slopes of the body", body, p, index), lambda: torque_slopes(torque, motion, index))
 
 
-def deflection(torque: Torque, motion: Motion, index: int, stiffness: float, damping: float,
+def deflection(torque: Torque, slopes: Array, motion: Motion, index: int, stiffness: float, damping: float,
                inertia: float) -> tuple[Array, Array, Array]:
     """x, ẋ, ẍ (samples,) by which a joint on a spring gives way: exactly, with what it then needs.
 
         k x + d ẋ + I (q̈ + ẍ) + τ_j(q + x) = 0          for I < 0: a motor that was counted with its link
         k x + d ẋ + I ẍ + τ_j(q + x) = 0                 for I > 0: a base below the joint
 
-    `torque` is that of the rigid arm. Newton's method: what is linear in x has coefficients that vary with time and is
+    `torque` is that of the rigid arm, `slopes` (3, samples, joints) are its `torque_slopes`. Newton's method: what is linear in x has coefficients that vary with time and is
     solved from sample to sample.
     """
     base, own = inertia > 0.0, motion.ddq[:, index]
     zero = np.zeros(len(motion.t))
-    spring, drag, mass = torque_slopes(torque, motion, index)[..., index]
+    spring, drag, mass = slopes[..., index]
     mass = np.maximum(mass + inertia, _LEAST * mass)
     drag, spring = drag + damping, np.maximum(spring + stiffness, 0.5 * stiffness)
     x = rate = second = zero
