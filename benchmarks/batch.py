@@ -28,7 +28,6 @@ from pathlib import Path
 from pipelines.batch.plan import load_stage, module_of
 from pipelines.batch.process import economise
 from pipelines.io.files import open_log, write_log
-from pipelines.io.log_reader import end_reader
 from pipelines.stage import Request, run_stage
 
 REPO = Path(__file__).resolve().parents[1]
@@ -49,7 +48,6 @@ def lay(root: Path, count: int, seconds: float = 10.0) -> None:
 
 def batch(root: Path, out: Path, stage: str, jobs: int) -> tuple[float, float]:
     """[s] CPU of a batch, all its processes together, and by the clock."""
-    end_reader()  # our own reading child would be waited for
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
     subprocess.run([*RRRID, "batch", str(root), "--stage", stage, "--jobs", str(jobs), "--no-report", "-q", "--out", str(out)],
                    check=False, cwd=REPO)

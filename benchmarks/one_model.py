@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.diagnosis.engine import Diagnosis, diagnose
-from pipelines.io.hdf5 import read_parts
+from pipelines.io.files import read_unguarded
 
 __all__ = ["answer", "diagnosed"]
 
 
 def diagnosed(folder: Path, exclude: Sequence[str] = ()) -> Diagnosis:
     """Return the diagnosis of the HDF5 logs of a folder."""
-    return diagnose([read_parts(path)[0] for path in sorted(folder.glob("*.h5"))], exclude=exclude)
+    return diagnose([read_unguarded(path) for path in sorted(folder.glob("*.h5"))], exclude=exclude)
 
 
 def answer(folder: Path, exclude: tuple[str, ...]) -> dict[str, Any]:

@@ -71,7 +71,7 @@ def main(samples: int) -> None:
             select = partial(fancy, sorted(chosen))
 
             peer_error = float(np.abs(select() - wanted[:, by_place]).max())
-            for read in (lambda: read_parts(ours, ("t", "q", "tau"))[0], lambda: open_log(ours, only=()).log):
+            for read in (lambda: read_parts(ours, ("t", "q", "tau")), lambda: open_log(ours, only=()).log):
                 found = read()
                 error = float(np.abs(np.hstack([found.q, found.tau]) - wanted).max())
                 print(side_by_side.row(words, side_by_side.race(read, select, repeats=5), error, peer_error))

@@ -15,7 +15,6 @@ Takes some 10 s for three joints and two minutes of motion.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -213,22 +212,6 @@ def report(result: Extension) -> Report:
     return extension_report(result)
 
 
-def _other_model(result: Extension, folder: Path) -> tuple[str, ...]:
-    """The causes in the model that an earlier extension has left in `folder`, where this one does not make it anew: its own model
-    has others, or there is none. Nothing else says what that model was, and the next fit would have to find it again.
-
-    What was asked for and refused is in neither of the two, and does not count.
-    """
-    try:
-        earlier = tuple(place_of(one["cause"], one["joint"])
-                        for one in json.loads((folder / "result.json").read_text(encoding="utf-8"))["findings"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
-        return ()
-    now = (place_of(one.cause, one.joint) for one in result.findings)
-    anew = result.model is not None and sorted(earlier) == sorted(now)
-    return () if anew or not (folder / "model.json").is_file() else earlier
-
-
 STAGE = Stage("extend", "Extend the model by named causes", Settings, compute, report, read, write,
               lambda result, check: int(check and not result.accepted), lambda result: result.data_quality, uses=Uses(before=True),
-              spare=_other_model, sessions="one")
+              sessions="one")

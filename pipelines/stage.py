@@ -22,31 +22,44 @@ from typing import Any, Generic, Literal, TypeVar
 
 from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, RrridError, clean
-from pipelines.io.atomic import environment_faults, remove_folder, staging_place, write_file
-from pipelines.io.earlier import Coming, put_in_place
-from pipelines.io.experiment import ExperimentLog
-from pipelines.io.files import PROVENANCE, expanded, hash_file
-from pipelines.io.inputs import Inputs, Rejected, Request, read_by_role, read_logs
-from pipelines.io.mixed import check_alike, of_one_session, refuse_mixed
-from pipelines.io.places import (
+from pipelines.io.files import expanded
+from pipelines.io.log import ExperimentLog
+from pipelines.io.output import (
+    PROVENANCE,
+    environment_faults,
     given_names,
+    hash_file,
     keep_apart,
     refuse_foreign,
     refuse_unwritable,
+    remove_folder,
     renamed,
+    replace_folder,
     short_names,
     slug,
+    staging_place,
     tilde,
     told_apart,
+    write_file,
+    write_text,
 )
 from pipelines.io.results import encode, headed, json_text, write_series
 from pipelines.io.robot_files import robot_sources
+from pipelines.io.sessions import (
+    Inputs,
+    Rejected,
+    Request,
+    check_alike,
+    of_one_session,
+    read_by_role,
+    read_logs,
+    refuse_mixed,
+)
 from pipelines.report.report import Report
 
 __all__ = ["Beside", "Inputs", "Outcome", "Rejected", "Request", "Stage", "Uses", "default_out", "footer_of", "read_by_role",
            "read_logs", "refuse_foreign", "result_type", "run_stage", "slug", "tilde"]
 
-_SHARED = ("validate", "reference")  # roles of logs that results of other data may have as well
 _LISTED = 40  # inputs, at the foot of a report
 
 S = TypeVar("S")
@@ -95,8 +108,6 @@ class Stage(Generic[S, R]):
     in_run: S | None = None  # settings within `run`, where they are others than by default
     durations: Callable[[R], dict[str, float]] = lambda result: {}  # [s] of parts of compute, for provenance.json alone
     remakes: Callable[[str], bool] = lambda name: False  # own files that are made again where they were changed (P10)
-    # what the earlier output in `folder` is of, where it must not be lost to this one: ("cogging:2",)
-    spare: Callable[[R, Path], tuple[str, ...]] = lambda result, folder: ()
     ended: Callable[[Inputs, bool], None] = lambda inputs, finished: None  # told at the end; `finished`: not by a signal
     sessions: Literal["", "folder", "one"] = ""  # which logs must be of one robot and day: those of a folder, or all
 
@@ -148,7 +159,7 @@ def _run(stage: Stage[S, R], request: Request, settings: S) -> Outcome[R]:
     if request.out is not None:
         keep_apart(request.out, (), request.paths)
         refuse_unwritable(request.out)
-        refuse_foreign(request.out, request.force, stage.remakes)
+        refuse_foreign(request.out, request.force, stage.remakes, stage.name)
     described = _hashes(robot_sources(request.robot), {}) if request.robot is not None else {}
     inputs = stage.read(request, settings)
     if stage.sessions == "folder":
@@ -170,7 +181,7 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
     out = request.out or default_out(inputs, stage.name)
     keep_apart(out, (*inputs.sources, *described), (*request.paths, *inputs.folders))
     refuse_unwritable(out)
-    changed = refuse_foreign(out, request.force, stage.remakes)
+    changed = refuse_foreign(out, request.force, stage.remakes, stage.name)
     hashes = _hashes(inputs.sources, inputs.hashes) | described
     # Equal inputs give equal bytes, wherever they lie: no path of this machine goes into a result.
     names = short_names(request.named)
@@ -189,14 +200,13 @@ def _outcome(stage: Stage[S, R], request: Request, settings: S, inputs: Inputs, 
             _fill(staging, stage, result, report, object_, series, request, hashes)
             _unchanged(hashes)
             _provenance(staging, stage, settings, request, hashes, started, stage.durations(result))
-            moved = put_in_place(staging, out, Coming(stage.name, request.out is not None, request.force,
-                                                      _data_of(inputs, hashes), stage.spare(result, out)))
+            replace_folder(staging, out)
     except EnvironmentFault as problem:
         problem.where = renamed(problem.where, {str(staging): str(out)})  # the user knows of no hidden folder
         raise
     finally:
         remove_folder(staging)
-    return Outcome(result, object_, report, out, stage.exit_code(result, request.check), (*moved, *renamed(checks, names)))
+    return Outcome(result, object_, report, out, stage.exit_code(result, request.check), renamed(checks, names))
 
 
 def _remade(changed: Iterable[str]) -> Iterable[Check]:
@@ -208,7 +218,7 @@ def _remade(changed: Iterable[str]) -> Iterable[Check]:
 
 def _fill(folder: Path, stage: Stage[S, R], result: R, report: Report, object_: dict[str, Any], series: dict[str, Any],
           request: Request, hashes: dict[Path, str]) -> None:
-    write_file(folder / "result.json", lambda draft: _text(draft, json_text(object_)))
+    write_text(folder / "result.json", json_text(object_))
     if series:
         write_file(folder / "result.h5", lambda draft: write_series(draft, series))
     if stage.write is not None:
@@ -229,23 +239,10 @@ def footer_of(command: str, inputs: Mapping[str, str]) -> dict[str, str]:
     return {"command": f"rrrid {command}", "version": __version__} | named
 
 
-def _text(path: Path, text: str) -> None:
-    path.write_text(text, encoding="utf-8")
-
-
 def _hashes(sources: Iterable[Path], known: Mapping[Path, str]) -> dict[Path, str]:
     """The hash of every readable source: of the very bytes that were read, where the reader took it."""
     readable = [path for path in sources if path in known or (path.is_file() and os.access(path, os.R_OK))]
     return {path: known[path] if path in known else hash_file(path) for path in readable}
-
-
-def _data_of(inputs: Inputs, hashes: Mapping[Path, str]) -> frozenset[str]:
-    """The hashes and places of the logs, without those that sessions share: what judges, and what the arm was. Of who reads none,
-    an import say, those of all that it reads."""
-    own = [opened.path for opened in inputs.logs if opened.log.role not in _SHARED] or [opened.path for opened in inputs.logs]
-    logs = [*own, *(rejected.path for rejected in inputs.rejected)]
-    read = {str(path): hashes[path] for path in logs or inputs.sources if path in hashes}
-    return frozenset((*tilde(read), *read.values()))
 
 
 def _unchanged(hashes: dict[Path, str]) -> None:
@@ -269,7 +266,7 @@ def _provenance(folder: Path, stage: Stage[S, R], settings: S, request: Request,
         "python": platform.python_version(), "libraries": _libraries(),
         "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(started)), "duration": time.time() - started,
     } | ({"durations": durations} if durations else {})
-    write_file(folder / PROVENANCE, lambda draft: _text(draft, json_text(tilde(about))))
+    write_text(folder / PROVENANCE, json_text(tilde(about)))
 
 
 def _libraries() -> dict[str, str]:

@@ -332,7 +332,8 @@ def _demo(name: str, given: Mapping[str, Any]) -> int:
     out, words = common.out or Path("demo"), sys.stderr if common.json else sys.stdout
     shared = {key: value for key, value in given.items() if key.startswith("common_")}
     workflow, _, its_settings, _ = _read("run", shared)
-    refuse_foreign(out / "run", common.force, workflow.remakes)  # before the arm is simulated
+    # before the arm is simulated
+    refuse_foreign(out / "run", common.force, workflow.remakes, "run")
     with request.tell:
         request.tell("simulating the arm")
         recording = replace(request, out=out / "recording", no_report=True)

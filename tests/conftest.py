@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-from pipelines.io.log_reader import end_reader
 
 _REPO = Path(__file__).resolve().parents[1]
 
@@ -32,18 +29,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """The sealed cases early: they take minutes, in which the other workers would have nothing left to do. Before them what forks,
     for children have the memory of their worker, which the mutations bound."""
     items.sort(key=lambda item: _FIRST.index(item.path.name) if item.path.name in _FIRST else len(_FIRST))
-
-
-@pytest.fixture(autouse=True)
-def _fresh_reader(request: pytest.FixtureRequest) -> Iterator[None]:
-    """A test that changes this process begins as a program does, and leaves no child that has its changes: one costs 30 ms."""
-    folder = request.path.parent.name
-    changes = "monkeypatch" in request.fixturenames or folder in ("io", "importers", "quality", "rows", "mutation")
-    if changes:
-        end_reader()
-    yield
-    if changes:
-        end_reader()
 
 
 @pytest.fixture(scope="session")

@@ -41,7 +41,7 @@ DOORS: dict[str, str | tuple[str, ...]] = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": FILES,
     "pandas": FILES, "pyarrow": FILES, "filterpy": "pipelines.signal.kalman", "mujoco": "bench",
     "pinocchio": "nobody", "yaml": "nobody", "pickle": "nobody", "pydantic": FILES, "pydantic_core": FILES,
-    "tomllib": "pipelines.io.toml_text",
+    "tomllib": "pipelines.io.sandbox",
     "rich": "rrrid_cli", "pebble": "pipelines.batch", "dask": "pipelines.batch", "distributed": "pipelines.batch",
 }
 NOT_IN = {"scipy": "pipelines.model"}  # the equations of the arm stand on NumPy alone

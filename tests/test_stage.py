@@ -160,7 +160,7 @@ def test_a_folder_that_cannot_be_made_is_refused_before_the_work(
     def work(inputs: Inputs, settings: _Nothing) -> _Nothing:
         raise AssertionError("it was begun")
 
-    monkeypatch.setattr("pipelines.io.places.os.access", lambda path, mode: allowed)
+    monkeypatch.setattr("pipelines.io.output.os.access", lambda path, mode: allowed)
     with pytest.raises(RrridError, match=code):
         run_stage(_stage(work), Request((logs / "a.h5",), out=logs.parent / out), _Nothing())
 
@@ -175,27 +175,6 @@ def _stage(compute: object, **more: object) -> Stage[_Nothing, _Nothing]:
                  **more)
 
 
-def test_an_output_that_is_not_made_anew_is_moved_or_named(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """C05: in the default folder an earlier model goes aside as a whole, twice under two names; a folder that the user has named is
-    replaced, and that is said."""
-    monkeypatch.chdir(logs.parent)
-    request = Request((logs,))
-    first = run_stage(_stage(lambda inputs, settings: _Nothing()), request, _Nothing())
-    kept = _contents(first.folder)
-    sparing = _stage(lambda inputs, settings: _Nothing(),
-                     spare=lambda result, folder: ("cogging:2", "spring:1") if folder.exists() else ())
-    for name in ("convert-cogging-2-spring-1", "convert-cogging-2-spring-1-2"):
-        done = run_stage(sparing, request, _Nothing())
-        aside = first.folder.with_name(name)
-        assert (done.folder, (aside / "provenance.json").is_file()) == (first.folder, True)
-        assert [(c.code, str(aside) in c.message) for c in done.checks if c.level != "ok"] == [("RRID-C05", True)]
-    assert _contents(first.folder.with_name("convert-cogging-2-spring-1")) == kept
-    for number in range(2):
-        named = run_stage(sparing, _request(logs), _Nothing())
-        assert ["was replaced" in c.message for c in named.checks if c.level != "ok"] == [True] * number
-    assert sorted(path.name for path in logs.parent.iterdir()) == ["logs", "out", "runs"]
-
-
 def test_an_earlier_output_does_not_go_aside_for_one_that_cannot_come(logs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The disk fails between the two moves: what lay there lies there again, and nothing beside it."""
     monkeypatch.chdir(logs.parent)
@@ -204,14 +183,13 @@ def test_an_earlier_output_does_not_go_aside_for_one_that_cannot_come(logs: Path
     move = os.replace
 
     def fail(source: Path, target: Path) -> None:
-        if target == first.folder and ".rrrid-tmp-" in source.name:
+        if target == first.folder and "-of-" not in source.name:
             raise OSError(errno.EIO, "the disk fails")
         move(source, target)
 
-    monkeypatch.setattr("pipelines.io.atomic.os.replace", fail)
-    sparing = _stage(lambda inputs, settings: _Nothing(), spare=lambda result, folder: ("cogging:2",))
+    monkeypatch.setattr("pipelines.io.output.os.replace", fail)
     with pytest.raises(RrridError, match="RRID-P02"):
-        run_stage(sparing, Request((logs,)), _Nothing())
+        run_stage(_stage(lambda inputs, settings: _Nothing()), Request((logs,)), _Nothing())
     assert [path.name for path in first.folder.parent.iterdir()] == ["convert"]
     assert _contents(first.folder) == kept
 

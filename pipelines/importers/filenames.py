@@ -8,9 +8,8 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
-from pipelines.errors import EnvironmentFault, UsageError
-from pipelines.io.guard_answer import Answer
-from pipelines.io.guard_child import Child, Lost
+from pipelines.errors import EnvironmentFault, InputRejected, UsageError
+from pipelines.io.sandbox import Answer, guarded
 
 __all__ = ["files_below", "fill", "inside", "lying_there", "match", "matches", "unique"]
 
@@ -80,10 +79,9 @@ def matches(
 
     if all(":" not in p and len(re.findall(r"\{|\*+", p)) <= _SIMPLE for p in flat):
         return work()
-    child = Child(lambda _: Answer({"found": work()}, {}))
     try:
-        answer = child.ask(None, where, _SECONDS, _MEMORY, _MEMORY, last=True)
-    except Lost:
+        answer = guarded(lambda: Answer({"found": work()}, {}), where, seconds=_SECONDS, memory=_MEMORY)
+    except InputRejected:
         message = f"a pattern takes more than {_SECONDS:.0f} s: {', '.join(flat)}"
         remedy = "write fewer wildcards, and no repetition inside another, such as (a+)+"
         raise UsageError("C02", message, where=where, remedy=remedy) from None

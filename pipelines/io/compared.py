@@ -37,8 +37,8 @@ def label_of(a: StoredResult, b: StoredResult) -> str:
     tail = len(tuple(takewhile(_alike, zip(own[:0:-1], other[:0:-1], strict=False))))
     if not own or not other:
         return f"{'-'.join(first)}-and-{'-'.join(second)}"
-    apart = "-and-".join("-".join(part[:len(part) - tail]) for part in (own, other))
-    return "-".join((*first[:head], apart, *own[len(own) - tail:]))
+    apart = "-and-".join("-".join(part[: len(part) - tail]) for part in (own, other))
+    return "-".join((*first[:head], apart, *own[len(own) - tail :]))
 
 
 def _alike(pair: tuple[str, str]) -> bool:
@@ -50,28 +50,46 @@ def _belonging(one: StoredResult) -> tuple[str, ...]:
 
     In runs/ROBOT/LABEL/COMMAND it is of the logs LABEL; beside that lies what `extend` has moved aside, COMMAND-CAUSE.
     """
-    owner = next((folder for folder in (one.folder, *one.folder.parents[:2]) if written_by(folder)), one.folder)
+    owner = next(
+        (folder for folder in (one.folder, *one.folder.parents[:2]) if written_by(folder)),
+        one.folder,
+    )
     command = written_by(owner)
     usual = bool(command) and (owner.name == command or owner.name.startswith(f"{command}-"))
-    parts = ((owner.parent.name,) if usual else ()) + (owner.name, *one.folder.relative_to(owner).parts)
+    parts = ((owner.parent.name,) if usual else ()) + (
+        owner.name,
+        *one.folder.relative_to(owner).parts,
+    )
     return parts if one.path.name == _RESULT else (*parts, one.path.stem)
 
 
 def of_other_commands(a: StoredResult, b: StoredResult) -> UsageError:
     """C02, with what can be compared of the two instead: a stage within a run, or the models that both have left."""
-    return UsageError("C02", f"results of different commands: {a.command} and {b.command}", where="compare",
-                      remedy=_instead(a, b) or _instead(b, a) or _models(a, b))
+    return UsageError(
+        "C02",
+        f"results of different commands: {a.command} and {b.command}",
+        where="compare",
+        remedy=_instead(a, b) or _instead(b, a) or _models(a, b),
+    )
 
 
 def _instead(run: StoredResult, other: StoredResult) -> str:
     """The stage of a run that the other is a result of."""
-    names = [one.get("name") for one in run.object.get("stages") or ()] if run.command == "run" else []
-    return f"name that stage of the run: {run.folder / other.command}" if other.command in names else ""
+    names = (
+        [one.get("name") for one in run.object.get("stages") or ()] if run.command == "run" else []
+    )
+    return (
+        f"name that stage of the run: {run.folder / other.command}"
+        if other.command in names
+        else ""
+    )
 
 
 def _models(a: StoredResult, b: StoredResult) -> str:
     files = [one.path if one.command == "model" else one.folder / _MODEL for one in (a, b)]
-    without = sorted({one.command for one, file in zip((a, b), files, strict=True) if not file.is_file()})
+    without = sorted(
+        {one.command for one, file in zip((a, b), files, strict=True) if not file.is_file()}
+    )
     if not without and files[0] == files[1]:
         return "compare two of one command, or this model.json with that of another result"
     if not without:

@@ -1,54 +1,91 @@
-"""Open, find and write logs: the one door between files on disk and `ExperimentLog`.
+"""Open, find and write logs: the door between files on disk and `ExperimentLog`.
 
-    opened = open_log(path)         guarded, checked against digest, manifest and format; .log is in SI
-    paths, checks = find_logs([..]) the logs among files and folders
-    write_log(path, log)            .h5 or .parquet, atomically
+opened = open_log(path)         guarded, checked against digest, manifest and format; in SI
+paths, checks = find_logs([..]) the logs among files and folders
+write_log(path, log)            .h5 or .parquet, atomically
 """
 
 from __future__ import annotations
 
 import contextlib
-import errno
 import glob
-import hashlib
 import json
 import os
 import shlex
-import stat
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from pipelines.errors import Check, EnvironmentFault, InputRejected, NothingMatched, UsageError
-from pipelines.io.atomic import environment_faults, fault_of, write_file
-from pipelines.io.experiment import ExperimentLog
-from pipelines.io.joints import chosen
-from pipelines.io.log_reader import read_guarded
+import numpy as np
+
+from pipelines.errors import (
+    Check,
+    EnvironmentFault,
+    InputRejected,
+    NothingMatched,
+    UsageError,
+    clean,
+    did_you_mean,
+)
+from pipelines.io import hdf5, parquet, schema
+from pipelines.io.log import (
+    PER_JOINT,
+    ExperimentLog,
+    Signal,
+    assembled,
+    attributes_of,
+    columns_in,
+    digest_of,
+    parts_of,
+    select_joints,
+    with_robot,
+)
+from pipelines.io.output import PROVENANCE, environment_faults, fault_of, hash_file, write_file
 from pipelines.io.robot import RobotDescription
-from pipelines.io.structure import conform, refuse_bad_urdf, refuse_unlike_format
+from pipelines.io.sandbox import Answer, guarded, regular_file
+from pipelines.io.units import to_si
 
-__all__ = ["ENDINGS", "PROVENANCE", "RECORDINGS", "Opened", "entries", "expanded", "find_logs", "hash_file", "nothing_there",
-           "open_log", "regular_file", "write_log"]
+__all__ = [
+    "ENDINGS",
+    "PROVENANCE",
+    "RECORDINGS",
+    "Opened",
+    "entries",
+    "expanded",
+    "find_logs",
+    "hash_file",
+    "nothing_there",
+    "open_log",
+    "read_unguarded",
+    "refuse_unlike_format",
+    "regular_file",
+    "write_csv",
+    "write_log",
+]
 
-RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".npz", ".jsonl")  # `import` reads JSON too, but so are results
+# `import` reads JSON too, but so are results
+RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".npz", ".jsonl")
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}
+PLANS = ("trajectory.h5", "trajectory.parquet")  # of design-excitation, beside its logs/
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _PARQUET_MAGIC = b"PAR1"
 _ARCHIVES = (b"PK\x03\x04", b"\x1f\x8b", b"7z\xbc\xaf", b"BZh", b"\xfd7zXZ")
-PROVENANCE = "provenance.json"
-PLANS = ("trajectory.h5", "trajectory.parquet")  # of design-excitation, beside its logs/
+_RECIPE = (
+    "a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe, "
+    "which 'rrrid import --guess FILE' drafts"
+)
 
 
 @dataclass(frozen=True)
 class Opened:
-    """A log, the file it came from, and what had to be said or mended on the way."""
+    """A log, the file it came from, and what was changed or remarked on the way."""
 
     path: Path
     sha256: str
     log: ExperimentLog
     checks: tuple[Check, ...]
-    container: str = "hdf5"  # or "parquet": what the content is, whatever the file's name says
+    container: str = "hdf5"  # or "parquet": what the content is, whatever the file is called
 
 
 def write_log(path: Path | str, log: ExperimentLog) -> None:
@@ -57,28 +94,44 @@ def write_log(path: Path | str, log: ExperimentLog) -> None:
     Raises:
         InputRejected: the log is not what the format says.
         UsageError: C02, the ending names no container.
-        EnvironmentFault: disk full, no permission; what stood at `path` is untouched.
+        EnvironmentFault: disk full, no permission; the old file at `path` is untouched.
     """
     path = Path(path)
     container = ENDINGS.get(path.suffix.lower())
     if container is None:
-        raise UsageError("C02", f"'{path.suffix}' names no container", where=path, remedy="end the name in .h5 or .parquet")
+        words, remedy = f"'{path.suffix}' names no container", "end the name in .h5 or .parquet"
+        raise UsageError("C02", words, where=path, remedy=remedy)
     refuse_unlike_format(log)
-    if container == "hdf5":
-        from pipelines.io.hdf5 import write
-    else:
-        from pipelines.io.parquet import write
-    write_file(path, lambda draft: write(draft, log))
+    write = hdf5.write if container == "hdf5" else parquet.write
+    write_file(path, lambda draft: write(draft, parts_of(log)))
 
 
-def open_log(path: Path | str, *, assume_units: bool = False, only: Collection[str] | None = None, joints: tuple[int, ...] = (),
-             robot: RobotDescription | None = None) -> Opened:
-    """Read the log in `path`, in a guarded child, and hold it against its digest, its manifest and the format.
+def write_csv(path: Path, log: ExperimentLog) -> None:
+    """Write the signals of `log` as one flat CSV table, each number with all its digits."""
+    import pandas as pd
+
+    columns = {}
+    for name, signal in log.signals.items():
+        for column, values in parquet.columns_of({name: signal.values}).items():
+            columns[f"{column} [{signal.units}]"] = values
+    table = pd.DataFrame(columns)
+    write_file(path, lambda draft: table.to_csv(draft, index=False, na_rep="nan"))
+
+
+def open_log(
+    path: Path | str,
+    *,
+    assume_units: bool = False,
+    only: Collection[str] | None = None,
+    joints: tuple[int, ...] = (),
+    robot: RobotDescription | None = None,
+) -> Opened:
+    """Read the log in `path`, in a guarded child, and check it against digest and format.
 
     Args:
         assume_units: take signals without units as SI (S04).
-        only: the signals to read, t, q and tau always among them; default all. A part cannot be held against the
-            digest of the whole: what vouches for it then are the checksums of its own chunks and pages.
+        only: the signals to read, t, q and tau always among them; default all. A part is not
+            checked against the digest, but by the checksums of its own chunks and pages.
         joints: the joints to take, 1-based, in this order; default all (S02).
         robot: the description to use instead of the log's own.
 
@@ -86,140 +139,311 @@ def open_log(path: Path | str, *, assume_units: bool = False, only: Collection[s
         InputRejected: the file is damaged, hostile or not a log.
         EnvironmentFault: no permission, or another program is writing it.
     """
-    return _open(Path(path), assume_units, only, joints, robot)
-
-
-def _open(path: Path, assume_units: bool, only: Collection[str] | None, joints: tuple[int, ...],
-          robot: RobotDescription | None) -> Opened:
+    path = Path(path)
     status = regular_file(path)
+    wanted = None if only is None else {"t", "q", "tau", *only}
     with environment_faults(path), _reading(path) as handle:
         sha256 = hash_file(path)
         container, checks = _container(path, os.pread(handle, 8, 0), status.st_size)
-        _against_manifest(path, sha256)
-        log, digest = read_guarded(path, container, only, lambda: _refuse_modified(path, handle, status))
-    if digest is None:
-        checks.append(Check.of("F05", "warn", "no integrity data: nothing would notice a flipped bit", where=path,
-                               remedy="'rrrid convert' writes a copy that has them"))
-    log, choice = chosen(log, joints, robot)
-    conformed, changes = conform(log, assume_units=assume_units)
-    refuse_bad_urdf(conformed, path)
-    return Opened(path, sha256, conformed, (*checks, *choice, *changes), container)
+        _refuse_unlisted(path, sha256)
+        try:
+            parts = guarded(lambda: _parts(path, container, wanted), path)
+        finally:  # before its content is blamed
+            _refuse_modified(path, handle, status)
+    log = _verified(parts, path, whole=only is None)
+    if parts.about["digest"] is None:
+        words = "no integrity data: nothing would notice a flipped bit"
+        remedy = "'rrrid convert' writes a copy that has them"
+        checks.append(Check.of("F05", "warn", words, where=path, remedy=remedy))
+    if joints:
+        names, columns = ", ".join(map(str, joints)), columns_in(log)
+        words = f"joints {names} of {columns} are used, as --joints says"
+        remedy = "leave --joints out to use all"
+        checks.append(Check.of("S02", "warn", words, where=path, remedy=remedy))
+        log = select_joints(log, joints, robot)
+    if robot is not None:
+        log = with_robot(log, robot)
+    log = _conform(log, assume_units, checks)
+    _refuse_bad_urdf(log)
+    return Opened(path, sha256, log, tuple(checks), container)
+
+
+def read_unguarded(path: Path) -> ExperimentLog:
+    """Return the log in a file that is trusted, without any child process."""
+    container = ENDINGS[path.suffix.lower()]
+    return _verified(_parts(path, container, None), path, whole=True)
+
+
+def _parts(path: Path, container: str, only: Collection[str] | None) -> Answer:
+    read = hdf5.read_parts if container == "hdf5" else parquet.read_parts
+    return read(path, only)
+
+
+def _verified(parts: Answer, path: Path, *, whole: bool) -> ExperimentLog:
+    """Return the log as it is written, checked against the digest that it carries."""
+    log, digest = assembled(parts, str(path)), parts.about["digest"]
+    if digest is not None and not isinstance(digest, str):
+        remedy = "write it as a text, or leave it out"
+        words = "attribute 'digest' is not a text"
+        raise InputRejected("S20", words, where=path, remedy=remedy)
+    if whole and digest is not None and digest != digest_of(log):
+        remedy = (
+            "copy the file again from where it was recorded; if it was edited on purpose, "
+            "delete its attribute digest, which may be left out"
+        )
+        words = "checksum mismatch: the content does not fit its digest"
+        raise InputRejected("F04", words, where=path, remedy=remedy)
+    return log
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[int]:
+    """Open with a shared lock, which fails at once where a program is writing (F15)."""
+    import fcntl
+
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except OSError as problem:
+        raise fault_of(problem, path) from None
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        words, remedy = "in use by another process", "wait until the recording is finished"
+        raise EnvironmentFault("F15", words, where=path, remedy=remedy) from None
+    except OSError:
+        pass  # a file system without locks
+    try:
+        yield handle
+    finally:
+        os.close(handle)
 
 
 def _refuse_modified(path: Path, handle: int, before: os.stat_result) -> None:
-    """F14: the open file, or what now stands under its name, is not what it was."""
+    """Refuse a file that is not what it was when it was opened (F14)."""
     for now in (os.fstat(handle), path.stat()):
-        if (now.st_size, now.st_mtime_ns, now.st_ino) != (before.st_size, before.st_mtime_ns, before.st_ino):
-            raise InputRejected("F14", "was modified while it was read", where=path, remedy="wait until the recording is finished")
-
-
-def regular_file(path: Path, *, what: str = "a log, or a folder of logs", empty: bool = False) -> os.stat_result:
-    """The status of `path`, which must be a regular file (F12, F13) and hold something unless `empty` (F01)."""
-    try:
-        status = path.stat()
-    except FileNotFoundError:
-        raise UsageError("C04", "no such file", where=path, remedy="check the path") from None
-    except (OSError, ValueError) as problem:
-        if isinstance(problem, ValueError) or problem.errno in (errno.ENAMETOOLONG, errno.ELOOP):
-            raise UsageError("C07", "not a path of this system", where=path, remedy="check the path") from None
-        raise fault_of(problem, path) from None
-    if not stat.S_ISREG(status.st_mode):
-        raise InputRejected("F12", "not a regular file", where=path, remedy=f"give {what}")
-    if not os.access(path, os.R_OK):
-        raise EnvironmentFault("F13", "permission denied", where=path, remedy="change its permissions")
-    if status.st_size == 0 and not empty:
-        raise InputRejected("F01", "empty file", where=path, remedy="copy it again, or record again")
-    return status
-
-
-class _reading:
-    """An open handle with a shared lock, which fails at once where a program is writing (F15)."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __enter__(self) -> int:
-        import fcntl
-
-        try:
-            self.handle = os.open(self.path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-        except OSError as problem:
-            raise fault_of(problem, self.path) from None
-        try:
-            fcntl.flock(self.handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            os.close(self.handle)
-            raise EnvironmentFault("F15", "in use by another process", where=self.path,
-                                   remedy="wait until the recording is finished") from None
-        except OSError:
-            pass  # a file system without locks cannot say; the digest will
-        return self.handle
-
-    def __exit__(self, *_: object) -> None:
-        os.close(self.handle)
-
-
-def hash_file(path: Path) -> str:
-    """SHA-256 of the bytes of `path`, in hexadecimal."""
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as problem:
-        raise fault_of(problem, path) from None
+        same = (now.st_size, now.st_mtime_ns, now.st_ino)
+        if same != (before.st_size, before.st_mtime_ns, before.st_ino):
+            words, remedy = "was modified while it was read", "wait until the recording is finished"
+            raise InputRejected("F14", words, where=path, remedy=remedy)
 
 
 def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
-    """What the content says it is (F06); the name is only worth a warning."""
+    """Return what the content says it is; the file's name is only worth a warning (F06).
+
+    The library that reads it is imported here, before the fork: every child has it then.
+    """
     if magic == _HDF5_MAGIC:
+        import h5py  # noqa: F401
+
         container = "hdf5"
-        import h5py  # noqa: F401  imported before the fork, so that every child has it
     elif magic[:4] == _PARQUET_MAGIC:
-        container = "parquet"
         import pyarrow.parquet  # noqa: F401
+
+        container = "parquet"
         with path.open("rb") as file:
             file.seek(max(0, size - 4))
             if file.read() != _PARQUET_MAGIC:
-                raise InputRejected("F07", "truncated: no footer", where=path,
-                                    remedy="copy the file again from where it was recorded")
+                remedy = "copy the file again from where it was recorded"
+                raise InputRejected("F07", "truncated: no footer", where=path, remedy=remedy)
     elif magic.startswith(_ARCHIVES) and path.suffix.lower() not in ENDINGS:
-        raise UsageError("X12", "an archive, which is not opened", where=path,
-                         remedy="unpack it, and give the logs or their folder")
+        remedy = "unpack it, and give the logs or their folder"
+        raise UsageError("X12", "an archive, which is not opened", where=path, remedy=remedy)
     else:
-        raise InputRejected("F06", "neither HDF5 nor Parquet", where=path,
-                            remedy="a log is .h5 or .parquet; 'rrrid import' makes one of .csv, .txt, .mat and .npy by a recipe, "
-                            "which 'rrrid import --guess FILE' drafts")
+        raise InputRejected("F06", "neither HDF5 nor Parquet", where=path, remedy=_RECIPE)
     if ENDINGS.get(path.suffix.lower()) == container:
         return container, []
-    return container, [Check.of("F06", "warn", f"named '{path.suffix}', but its content is {container}; read as that", where=path,
-                                remedy="rename it")]
+    words = f"named '{path.suffix}', but its content is {container}; read as that"
+    return container, [Check.of("F06", "warn", words, where=path, remedy="rename it")]
 
 
-def _against_manifest(path: Path, sha256: str) -> None:
-    """F05: a provenance.json or SHA256SUMS beside the file, or one folder up, may say what its bytes must be."""
+def _refuse_unlisted(path: Path, sha256: str) -> None:
+    """Refuse a file that differs from a manifest beside it or one folder up (F05)."""
     for folder in (path.parent, path.parent.parent):
-        expected = _listed(folder, path)
-        if expected is not None and expected != sha256:
-            raise InputRejected("F05", f"sha256 differs from the manifest in {folder.name or folder}", where=path,
-                                remedy="copy the file again, or run the command that wrote it again")
+        name, expected = path.relative_to(folder).as_posix(), None
+        with contextlib.suppress(OSError, UnicodeDecodeError):
+            lines = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
+            listed = (line.partition(" ") for line in lines)
+            expected = {entry.strip().lstrip("*"): value for value, _, entry in listed}.get(name)
+        with contextlib.suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
+            about = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+            expected = str(about["outputs"][name])
+        if expected not in (None, sha256):
+            words = f"sha256 differs from the manifest in {folder.name or folder}"
+            remedy = "copy the file again, or run the command that wrote it again"
+            raise InputRejected("F05", words, where=path, remedy=remedy)
 
 
-def _listed(folder: Path, path: Path) -> str | None:
-    name = path.relative_to(folder).as_posix()
+def _refuse_bad_urdf(log: ExperimentLog) -> None:
+    """Look at the URDF of a description here, where the file is known (S17, X13)."""
+    if "urdf_text" not in log.robot_text or log.robot.urdf_text is None:
+        return
+    from pipelines.io.urdf import chain_from_urdf
+
     try:
-        outputs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["outputs"]
-        if isinstance(outputs.get(name), str):
-            return str(outputs[name])
-    except (OSError, ValueError, KeyError, AttributeError, TypeError, RecursionError):
-        pass  # no manifest, or not one of ours
-    try:
-        lines = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError):
-        return None
-    return {entry.strip().lstrip("*"): value for value, _, entry in (line.partition(" ") for line in lines)}.get(name)
+        chain_from_urdf(log.robot.urdf_text, log.robot.tip_link)
+    except InputRejected as problem:
+        problem.where = clean(f"{log.source or log.name}, /robot, {problem.where}")
+        raise
+
+
+def _conform(log: ExperimentLog, assume_units: bool, checks: list[Check]) -> ExperimentLog:
+    """Return `log` in SI and in the format's orientation; what is changed is added to `checks`.
+
+    Raises:
+        InputRejected: it is not what the format says and has no single reading (S01-S20).
+    """
+    _refuse_signals(log)
+    law = log.controller.law if log.controller else None
+    signals = {}
+    for name, signal in log.signals.items():
+        where = f"{log.source or log.name}, signal {name}"
+        turned = _oriented(log, name, signal, where, checks)
+        signals[name] = _in_si(name, turned, law, where, assume_units, checks)
+    if any(signals[name] is not log.signals[name] for name in signals):
+        log = replace(log, signals=signals)
+    refuse_unlike_format(log)
+    return log
+
+
+def _oriented(
+    log: ExperimentLog, name: str, signal: Signal, where: str, checks: list[Check]
+) -> Signal:
+    """Return a signal that is stored as (joints, samples), or t as a column, turned (S11)."""
+    values, n, samples = signal.values, log.n_joints, log.t.size
+    if name == "t" and values.ndim == 2 and 1 in values.shape:
+        turned, remedy = values.reshape(-1), "store t as a vector"
+    elif name != "t" and n == 1 and values.shape == (samples,):
+        return replace(signal, values=values[:, None])
+    elif name != "t" and values.shape == (n, samples) and n != samples:
+        turned, remedy = np.ascontiguousarray(values.T), "store (samples, joints)"
+    else:
+        return signal
+    words = f"stored as {values.shape}, read as {turned.shape}"
+    checks.append(Check.of("S11", "warn", words, where=where, remedy=remedy))
+    return replace(signal, values=turned)
+
+
+def _in_si(
+    name: str, signal: Signal, law: str | None, where: str, assume_units: bool, checks: list[Check]
+) -> Signal:
+    """Convert declared units; refuse undeclared ones unless the user vouches for SI (S04-S06)."""
+    wanted = schema.unit_of(name, law)
+    if signal.units == wanted:
+        return signal
+    if not signal.units.strip():
+        if not assume_units:
+            words = f"no units; {wanted} is what the format wants"
+            remedy = "declare them, or pass --assume-units if they are SI"
+            raise InputRejected("S04", words, where=where, remedy=remedy)
+        words = f"no units; taken as {wanted}, as --assume-units says"
+        remedy = "write the attribute units"
+        checks.append(Check.of("S04", "warn", words, where=where, remedy=remedy))
+        return replace(signal, units=wanted)
+    unit = to_si(signal.units, schema.quantity_of(name, law), where=where)
+    if not unit.is_si:
+        words = f"declared in {signal.units}, converted to {wanted}"
+        remedy = "store SI units, if results should not list the conversion"
+        checks.append(Check.of("S06", "warn", words, where=where, remedy=remedy))
+    return replace(signal, values=unit.factor * signal.values + unit.offset, units=wanted)
+
+
+def refuse_unlike_format(log: ExperimentLog) -> None:
+    """Refuse a log that is not exactly what the format says: what a writer may put on disk."""
+    where = log.source or log.name
+    for group, found in attributes_of(log).items():
+        schema.checked(group, found, where if group == "attributes" else f"{where}, {group}")
+    texts = {f"signal {name}, long_name": signal.long_name for name, signal in log.signals.items()}
+    for place, text in (texts | {"robot": log.robot_text}).items():
+        try:
+            bad = b"\0" in text.encode("utf-8")
+        except (UnicodeEncodeError, AttributeError):
+            bad = True
+        if bad:
+            words, remedy = "not a text in UTF-8 without NUL", "write it as plain text"
+            raise InputRejected("S20", words, where=f"{where}, {place}", remedy=remedy)
+    _refuse_signals(log)
+    _refuse_shapes(log, where)
+
+
+def _refuse_signals(log: ExperimentLog) -> None:
+    """Refuse a log that lacks a signal (S01), or has one that it cannot have (S19, S20)."""
+    where = log.source or log.name
+    known = schema.SIGNALS | (schema.DERIVED if log.derived is not None else {})
+    planned = log.origin == "planned"
+    required = ("t", "q_ref") if planned else ("t", "q", "tau")
+    missing = [name for name in required if name not in log.signals]
+    if missing:
+        unknown = set(log.signals) - set(known)
+        hints = "".join(did_you_mean(name, unknown) for name in missing)
+        there = ", ".join(sorted(log.signals)) or "none"
+        words = f"signal {', '.join(missing)} missing{hints}; there are {there}"
+        remedy = "rename it, or import the recording with --map"
+        raise InputRejected("S01", words, where=where, remedy=remedy)
+    measured = [name for name in ("q", "tau") if name in log.signals]
+    if planned and measured:
+        words = f"a planned log has references only, but there is {', '.join(measured)}"
+        remedy = "remove them, or say where they come from: origin 'measured' or 'simulated'"
+        raise InputRejected("S20", words, where=where, remedy=remedy)
+    for name in log.signals:
+        if name not in known:
+            hint = did_you_mean(name, known)
+            more = " without a /derived group" if name in schema.DERIVED else hint
+            words = f"signal '{name}' is not in format version {schema.FORMAT_VERSION}{more}"
+            raise InputRejected("S19", words, where=where, remedy="rename or remove it")
+
+
+def _refuse_shapes(log: ExperimentLog, where: str) -> None:
+    """Refuse wrong units (S05), shapes (S02, S11) and attributes that do not go together (S20)."""
+    n, samples = log.n_joints, log.signals["t"].values.shape
+    law = log.controller.law if log.controller else None
+    for name, signal in log.signals.items():
+        place, shape, wanted = f"{where}, signal {name}", signal.values.shape, (*samples, n)
+        if signal.units != (unit := schema.unit_of(name, law)):
+            words = f"units are '{signal.units}', the format wants '{unit}'"
+            raise InputRejected("S05", words, where=place, remedy="convert the samples to SI")
+        if (name == "t" and len(shape) == 1) or (name != "t" and shape == wanted):
+            continue
+        if name != "t" and len(shape) == 2 and shape[0] == samples[0]:
+            words = f"{shape[1]} columns for a robot of {n} joints"
+            remedy = "give the description of this robot, or choose the columns with --joints"
+            raise InputRejected("S02", words, where=place, remedy=remedy)
+        words = f"shape {shape}, neither ({samples[0]}, {n}) nor ({n}, {samples[0]})"
+        remedy = "store (samples, joints), and t as a vector"
+        raise InputRejected("S11", words, where=place, remedy=remedy)
+    moves_one = log.experiment in schema.ONE_JOINT
+    faults = {
+        f"a {log.experiment} log {'needs' if moves_one else 'does not have'} the attribute joint": (
+            (log.joint is not None) != moves_one
+        ),
+        f"joint is {log.joint}, outside 1 … {n}": not 1 <= (log.joint or 1) <= n,
+    }
+    if log.posture is not None:
+        words = f"posture has {log.posture.size} values for {n} joints"
+        faults[words] = log.posture.shape != (n,)
+    if log.controller is not None:
+        for key in PER_JOINT:
+            value = getattr(log.controller, key)
+            shape = (n, 3) if key == "observer_gain" else (n,)
+            if value is not None:
+                faults[f"controller: {key} has shape {value.shape}, not {shape}"] = (
+                    value.shape != shape
+                )
+        limit = log.controller.output_limit
+        faults["controller: output_limit is not a list of limits above 0"] = (
+            limit is not None and not (limit > 0.0).all()
+        )
+        gains = log.controller.kp is not None and log.controller.kd is not None
+        closed = law in ("pd", "pd+feedforward", "computed-torque")
+        faults[f"controller: law {law} without kp and kd"] = closed and not gains
+    for words, wrong in faults.items():
+        if wrong:
+            remedy = "write one value a joint, joints counted from 1; gains, or law 'unknown'"
+            raise InputRejected("S20", words, where=where, remedy=remedy)
 
 
 def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
-    """`inputs` with every pattern (*, ?, [ ]) that the shell left as it was replaced by what it matches.
+    """Return `inputs` with every pattern (*, ?, [ ]) replaced by what it matches.
 
     Raises:
         NothingMatched: C06, a pattern matches nothing.
@@ -231,16 +455,18 @@ def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
             continue
         matches = sorted(glob.glob(str(path), recursive=True))
         if not matches:
-            raise NothingMatched("C06", "nothing matches that pattern", where=path, remedy="logs end in .h5 or .parquet")
+            words, remedy = "nothing matches that pattern", "logs end in .h5 or .parquet"
+            raise NothingMatched("C06", words, where=path, remedy=remedy)
         found += map(Path, matches)
     return tuple(dict.fromkeys(found))
 
 
 def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
-    """The logs named by `inputs`: files as they are, folders searched below.
+    """Return the logs named by `inputs`: files as they are, folders searched below.
 
-    Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is named: then its logs
-    are meant. A link to a log is that log; links to folders, and those that lead nowhere, are passed over with a warning.
+    Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is
+    named: then its logs are meant. A link to a log is that log; links to folders, and those that
+    lead nowhere, are passed over with a warning.
 
     Raises:
         UsageError: an input does not exist.
@@ -249,44 +475,54 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
     found: list[Path] = []
     checks: list[Check] = []
     inputs = tuple(inputs)
+    folders = [path for path in inputs if os.path.isdir(path)]
     for path in inputs:
-        if not os.path.isdir(path):  # unlike Path.is_dir, it answers for a path that is none
+        if path not in folders:
             regular_file(path)
             found.append(path)
             continue
         own = (path / PROVENANCE).is_file()
-        root = path / "logs" if own else path
-        found += sorted(_below(root, checks))
+        found += _below(path / "logs" if own else path, checks)
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
-        raise nothing_there(", ".join(map(str, inputs)), checks, [path for path in inputs if os.path.isdir(path)])
+        raise nothing_there(", ".join(map(str, inputs)), checks, folders)
     return tuple(dict.fromkeys(found)), tuple(checks)
 
 
-def nothing_there(where: object, checks: Sequence[Check], folders: Sequence[Path]) -> NothingMatched:
-    """C06, there is no log; with what to give instead: links to folders (X11) and results of rrrid, which are passed over unless
-    they are named, or recordings, of which `import` makes logs.
-    """
+def nothing_there(
+    where: object, checks: Sequence[Check], folders: Sequence[Path]
+) -> NothingMatched:
+    """Return the error that there is no log (C06), with what to give instead."""
     passed, remedy = "", "logs end in .h5 or .parquet"
     links = [str(check.where) for check in checks if check.code == "RRID-X11"]
     own = [path.parent for path in _within(folders, PROVENANCE) if path.parent not in folders]
     results = [str(folder) for folder in own if (folder / "logs").is_dir()]
-    if over := list(dict.fromkeys([*links, *results])):
+    recorded = [path for path in _within(folders, "*") if path.suffix.lower() in RECORDINGS]
+    over = list(dict.fromkeys([*links, *results]))
+    if over:
         passed = f"; links and results of rrrid are passed over, here {len(over)}"
         there = [path for path in over if os.path.isdir(path)]
-        remedy = f"give what is meant by its own path: {shlex.join(there[:3])}{' …' * (len(there) > 3)}" if there else remedy
-    elif recorded := next((path for path in _within(folders, "*") if path.suffix.lower() in RECORDINGS), None):
-        passed = f", but recordings such as {recorded.name}"
-        remedy = f"make logs of them; this drafts the recipe: rrrid import --guess {shlex.quote(str(recorded))}"
+        if there:
+            more = " …" if len(there) > 3 else ""
+            remedy = f"give what is meant by its own path: {shlex.join(there[:3])}{more}"
+    elif recorded:
+        passed = f", but recordings such as {recorded[0].name}"
+        draft = f"rrrid import --guess {shlex.quote(str(recorded[0]))}"
+        remedy = f"make logs of them; this drafts the recipe: {draft}"
     return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
 
 
 def _within(folders: Sequence[Path], pattern: str) -> list[Path]:
-    """Return the files that match `pattern` in `folders` and two levels below, without hidden ones."""
+    """Return the files that match `pattern` in `folders` and two levels below, none hidden."""
+    found = []
     with contextlib.suppress(OSError):
-        return [path for folder in folders for above in ("", "*/", "*/*/") for path in sorted(folder.glob(f"{above}{pattern}"))
-                if path.is_file() and not any(part.startswith(".") for part in path.relative_to(folder).parts)]
-    return []
+        for folder in folders:
+            for above in ("", "*/", "*/*/"):
+                for path in sorted(folder.glob(f"{above}{pattern}")):
+                    parts = path.relative_to(folder).parts
+                    if path.is_file() and not any(part.startswith(".") for part in parts):
+                        found.append(path)
+    return found
 
 
 def _below(folder: Path, checks: list[Check]) -> list[Path]:
@@ -296,30 +532,33 @@ def _below(folder: Path, checks: list[Check]) -> list[Path]:
         return []
     except OSError as problem:
         raise fault_of(problem, folder) from None
-    return [path for entry in there for path in (_below(entry, checks) if entry.is_dir() else [entry])]
+    found = []
+    for entry in there:
+        found += _below(entry, checks) if entry.is_dir() else [entry]
+    return found
 
 
 def entries(folder: Path, checks: list[Check]) -> list[Path]:
-    """Logs in `folder` and folders to look into, in order; links to folders and to nothing are passed over with a word (X11).
+    """Return logs in `folder` and folders to look into, in order; X11 for links passed over.
 
     Raises:
         OSError: the folder cannot be read.
     """
     found = []
     for entry in sorted(folder.iterdir()):
+        log = entry.suffix.lower() in ENDINGS
         if entry.name.startswith("."):
             continue
-        if entry.is_symlink() and entry.is_dir():
-            checks.append(Check.of("X11", "warn", "link to a folder passed over", where=entry,
-                                   remedy="give what it leads to by its own path, if that is meant"))
-        elif entry.is_symlink() and not entry.exists():
-            if entry.suffix.lower() in ENDINGS:
-                checks.append(Check.of("X11", "warn", "link that leads nowhere, or in a circle, passed over", where=entry,
-                                       remedy="remove it, or let it lead to a log"))
+        if entry.is_symlink() and (entry.is_dir() or (log and not entry.exists())):
+            words = "link that leads nowhere, or in a circle, passed over"
+            remedy = "remove it, or let it lead to a log"
+            if entry.is_dir():
+                words = "link to a folder passed over"
+                remedy = "give what it leads to by its own path, if that is meant"
+            checks.append(Check.of("X11", "warn", words, where=entry, remedy=remedy))
         elif entry.is_dir():
             if not (entry / PROVENANCE).is_file():
                 found.append(entry)
-        elif entry.suffix.lower() in ENDINGS and entry.exists():
+        elif log and entry.exists():
             found.append(entry)
     return found
-

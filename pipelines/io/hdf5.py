@@ -1,76 +1,146 @@
-"""Read and write a log as HDF5: nothing is followed, nothing is trusted, everything is measured before it is read."""
+"""Read and write a log as HDF5: nothing is followed, and all is measured before it is read."""
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Collection
+import re
+from collections.abc import Collection, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.io import canonical, schema
-from pipelines.io.chunks import store
-from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.config import FORMAT as LIMITS
+from pipelines.io.sandbox import Answer
+from pipelines.io.schema import FORMAT, FORMAT_VERSION, plain
 
-__all__ = ["as_reals", "explain", "foreign_storage", "read_parts", "refuse_oversize", "write"]
+__all__ = [
+    "explain",
+    "read_parts",
+    "read_series",
+    "refuse_bad_dataset",
+    "refuse_oversize",
+    "refuse_version",
+    "write",
+    "write_series",
+]
+
+Array = npt.NDArray[np.float64]
 
 _GROUPS = ("controller", "derived")
-_MANY_ATTRIBUTES = 64
-_LONG_ATTRIBUTE = 1 << 20  # [B] a model.json in /controller is the longest a log carries
-# A chunk of gzip cannot unpack to more than 1032 times its size, and `t` never repeats: no honest log comes near this.
-_LARGEST_RATIO = 1100
-_ALWAYS_ALLOWED = 64 << 20  # [B]
-# Only a log in which nothing moves is packed to a three-hundredth, and nobody records a quarter of a gigabyte of that.
-_LONG, _LONG_RATIO = 256 << 20, 300  # [B], and how many times the file
-_CHUNK = 65536  # samples
+_AGAIN = "copy the file again from where it was recorded"
+_OPTIONS: dict[str, Any] = {
+    "dtype": "<f8",
+    "compression": "gzip",
+    "compression_opts": 1,
+    "shuffle": True,
+    "fletcher32": True,
+    "track_times": False,
+}
 
 
-def write(path: Path, log: ExperimentLog) -> None:
-    """Write `log` to `path`, samples in chunks of (65536, 1) with gzip, shuffle and fletcher32."""
+def write(path: Path, parts: Answer) -> None:
+    """Write the parts of a log, samples in chunks of (65536, 1) with gzip and fletcher32."""
     import h5py
 
-    # Version 1.10 of the file format checksums its metadata, so that a flipped bit there is noticed as well.
-    with h5py.File(path, "w", libver=("v110", "v110"), track_order=False) as file:
-        groups = canonical.attributes_of(log)
-        _write_attributes(file, {"format": schema.FORMAT, "format_version": schema.FORMAT_VERSION,
-                                 "digest": canonical.digest_of(log)} | groups.pop("attributes"))
+    groups = dict(parts.about["groups"])
+    head = {"format": FORMAT, "format_version": FORMAT_VERSION, "digest": parts.about["digest"]}
+    with _written_to(path) as file:
+        _write_attributes(file, head | groups.pop("attributes"))
+        robot = groups.pop("robot")
         for name, attributes in groups.items():
             _write_attributes(file.create_group(name), attributes)
-        file.create_dataset("robot", data=log.robot_text, dtype=h5py.string_dtype("utf-8"))
+        file.create_dataset("robot", data=robot, dtype=h5py.string_dtype("utf-8"))
         signals = file.create_group("signals")
-        for name, signal in log.signals.items():
-            dataset = _write_samples(signals, name, signal.values)
-            dataset.attrs["units"], dataset.attrs["long_name"] = signal.units, signal.long_name
+        for name, values in parts.arrays.items():
+            dataset = _write_samples(signals, name, values)
+            dataset.attrs.update(parts.about["signals"][name])
 
 
-def _write_samples(signals: Any, name: str, values: Array) -> Any:
-    if values.size == 0:
-        return signals.create_dataset(name, data=values, dtype="<f8", track_times=False)
-    return store(signals, name, values, (min(_CHUNK, len(values)),) + (1,) * (values.ndim - 1))
+@contextlib.contextmanager
+def _written_to(path: Path) -> Iterator[Any]:
+    """Give an HDF5 file in memory, and write it to `path`.
 
-
-def _write_attributes(owner: Any, attributes: dict[str, object]) -> None:
+    A full disk is then an error of Python; HDF5 itself cannot close a file without room, and
+    crashes later. Version 1.10 of the format checksums metadata: a flipped bit there is noticed.
+    """
     import h5py
 
+    version = ("v110", "v110")
+    with h5py.File("log", "w", libver=version, driver="core", backing_store=False) as file:
+        yield file
+        file.flush()
+        image = file.id.get_file_image()
+    path.write_bytes(image)
+
+
+def _write_samples(owner: Any, name: str, values: Array) -> Any:
+    if values.size == 0:
+        return owner.create_dataset(name, data=values, dtype="<f8", track_times=False)
+    chunk = (min(LIMITS.chunk, len(values)),) + (1,) * (values.ndim - 1)
+    return owner.create_dataset(name, data=values, chunks=chunk, **_OPTIONS)
+
+
+def _write_attributes(owner: Any, attributes: Mapping[str, Any]) -> None:
+    import h5py
+
+    text = h5py.string_dtype("utf-8")
     for name, value in attributes.items():
         if isinstance(value, tuple):
-            owner.attrs.create(name, list(value), shape=(len(value),), dtype=h5py.string_dtype("utf-8"))
+            owner.attrs.create(name, list(value), shape=(len(value),), dtype=text)
         elif isinstance(value, int):
             owner.attrs.create(name, value, dtype="<i8")
-        elif isinstance(value, str) and len(value) > 60_000:
-            # An attribute message holds less than 64 KiB, but a variable-length text lives in a heap of its own.
-            owner.attrs.create(name, value, dtype=h5py.string_dtype("utf-8"))
+        elif isinstance(value, str):  # of variable length: the only one that may exceed 64 KiB
+            owner.attrs.create(name, value, dtype=text)
         else:
             owner.attrs[name] = value
 
 
-def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[ExperimentLog, str | None]:
-    """The container as it is: the log, with the signals of `only` or all, and the digest it carries or None.
+def write_series(path: Path, series: Mapping[str, Array]) -> None:
+    """Write the series of a result, each under the place where its JSON names it."""
+    with _written_to(path) as file:
+        file.attrs["format"] = "rrrid-result"
+        for name, values in series.items():
+            rows = max(1, LIMITS.chunk * len(values) // max(values.size, 1))
+            chunk = (min(rows, len(values)), *values.shape[1:])
+            file.create_dataset(name, data=values, chunks=chunk, **_OPTIONS)
 
-    Runs inside the guarded child.
+
+def read_series(path: Path) -> dict[str, Array]:
+    """Return the series of a result; only numbers that lie in the file itself are read.
+
+    Raises:
+        InputRejected: F02-F04, damaged; X01-X05, S12, it leads elsewhere or holds something else.
+    """
+    import h5py
+
+    found: dict[str, Any] = {}
+
+    def note(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            refuse_bad_dataset(item, f"{path}, /{name}")
+            found[f"/{name}"] = item
+
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            file.visititems(note)
+            declared = sum(8 * math.prod(dataset.shape) for dataset in found.values())
+            refuse_oversize(declared, path.stat().st_size, "X05", path)
+            return {name: _reals(dataset, f"{path}, {name}") for name, dataset in found.items()}
+    except InputRejected:
+        raise
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as problem:
+        raise explain(problem, path) from None
+
+
+def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
+    """Return the groups of attributes, the digest, and the signals of `only` or all.
+
+    Runs in the guarded child.
 
     Raises:
         InputRejected: with the row of the table of bad inputs that fits.
@@ -79,218 +149,229 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[Experim
 
     try:
         with h5py.File(path, "r", locking=False) as file:
-            return _read_file(file, str(path), only)
+            return _read_file(file, path, only)
     except InputRejected:
         raise
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, UnicodeError, MemoryError) as problem:
+    except (
+        OSError,
+        RuntimeError,
+        KeyError,
+        ValueError,
+        TypeError,
+        UnicodeError,
+        MemoryError,
+    ) as problem:
         raise explain(problem, path) from None
 
 
-def _read_file(file: Any, where: str, only: Collection[str] | None) -> tuple[ExperimentLog, str | None]:
-    # First what could lead elsewhere, then what the file says it is; only a log of this version is judged by its names.
+def _read_file(file: Any, path: Path, only: Collection[str] | None) -> Answer:
+    # First what could lead elsewhere, then what the file says it is, then its names.
+    where = str(path)
     _refuse_links(file, where)
-    _version(file, where)
-    _only(file, ("robot", "signals", *_GROUPS), where)
-    attributes = _attributes(file, where)
+    head = [name for name in ("format", "format_version") if name in file.attrs]
+    refuse_version({name: _attribute(file.attrs, name, where) for name in head}, "HDF5", where)
+    _refuse_unknown(file, ("robot", "signals", *_GROUPS), where)
+    attributes = {k: v for k, v in _attributes(file, where).items() if k not in head}
     digest = attributes.pop("digest", None)
-    if digest is not None and not isinstance(digest, str):
-        raise InputRejected("S20", "attribute 'digest' is not a text", where=where, remedy="write it as a text, or leave it out")
-    groups: dict[str, object] = {"attributes": attributes}
+    groups: dict[str, Any] = {"attributes": attributes}
     for name in _GROUPS:
         if name in file:
-            _refuse_links(_group(file, name, where), f"{where}, /{name}")
-            _only(file[name], (), f"{where}, /{name}")
-            groups[name] = _attributes(file[name], f"{where}, /{name}")
-    groups["robot"] = _robot_text(file, where)
+            place = f"{where}, /{name}"
+            group = _group(file, name, where)
+            _refuse_links(group, place)
+            _refuse_unknown(group, (), place)
+            groups[name] = _attributes(group, place)
+    if "robot" in file:
+        groups["robot"] = _robot_text(file["robot"], where)
     signals = _group(file, "signals", where)
     _refuse_links(signals, f"{where}, /signals")
-    _few(signals, f"{where}, /signals")
-    datasets = _within_budget(signals, Path(where).stat().st_size, where)
-    read = {name: _signal(dataset, f"{where}, /signals/{name}") for name, dataset in datasets.items()
-            if only is None or name in only}
-    attributes.pop("format"), attributes.pop("format_version")
-    return canonical.from_parts(groups, read, where=where), digest
+    _refuse_many(signals, f"{where}, /signals")
+    for name in signals:
+        refuse_bad_dataset(signals[name], f"{where}, /signals/{name}")
+    declared = sum(8 * math.prod(one.shape) for one in signals.values())
+    refuse_oversize(declared, path.stat().st_size, "X05", where)
+    read = [name for name in signals if only is None or name in only]
+    words, arrays = {}, {}
+    for name in read:
+        place = f"{where}, /signals/{name}"
+        words[name] = _attributes(signals[name], place)
+        arrays[name] = _reals(signals[name], place)
+    return Answer({"groups": groups, "digest": digest, "signals": words}, arrays)
 
 
-def _version(file: Any, where: str) -> None:
-    there = file.attrs
-    form, version = (_attribute(there, name, f"{where}, attribute {name}") if name in there else None
-                     for name in ("format", "format_version"))
-    if form != schema.FORMAT:
-        raise InputRejected("F06", f"an HDF5 file, but not an experiment log: its format is {form!r}", where=where,
-                            remedy="use 'rrrid import' with a recipe to make a log of a recording")
-    if not isinstance(version, int) or version != schema.FORMAT_VERSION:
-        raise InputRejected("F11", f"format_version {version}; this program understands version {schema.FORMAT_VERSION}",
-                            where=where,
-                            remedy="update rrrid, or write the log in that version")
+def refuse_version(attributes: dict[str, Any], container: str, where: str) -> None:
+    """Take format and version out of the attributes of a log; refuse others (F06, F11).
+
+    Args:
+        container: "HDF5" or "Parquet".
+    """
+    form, version = attributes.pop("format", None), attributes.pop("format_version", None)
+    if form != FORMAT:
+        words = f"{container}, but not an experiment log: its format is {form!r}"
+        remedy = "use 'rrrid import' with a recipe to make a log of a recording"
+        raise InputRejected("F06", words, where=where, remedy=remedy)
+    if version != FORMAT_VERSION or not isinstance(version, int) or isinstance(version, bool):
+        words = f"format_version {version}; this program understands version {FORMAT_VERSION}"
+        remedy = "update rrrid, or write the log in that version"
+        raise InputRejected("F11", words, where=where, remedy=remedy)
 
 
 def _refuse_links(group: Any, where: str) -> None:
-    """X01, X04: only hard links; a link elsewhere is refused before it is followed."""
+    """Refuse all but hard links before one is followed (X01, X04)."""
     import h5py
 
-    for name in islice(group, _MANY_ATTRIBUTES + 1):
+    for name in islice(group, LIMITS.members + 1):
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
-            raise InputRejected("X01", f"external link '{name}' -> '{link.filename}' refused", where=where,
-                                remedy="store the data in the log itself")
+            words = f"external link '{name}' -> '{link.filename}' refused"
+            remedy = "store the data in the log itself"
+            raise InputRejected("X01", words, where=where, remedy=remedy)
         if isinstance(link, h5py.SoftLink):
-            raise InputRejected("X04", f"soft link '{name}' refused", where=where, remedy="store the data in the log itself")
+            words, remedy = f"soft link '{name}' refused", "store the data in the log itself"
+            raise InputRejected("X04", words, where=where, remedy=remedy)
 
 
-def _few(group: Any, where: str) -> None:
-    """X04: no more members than were looked at."""
-    if len(group) > _MANY_ATTRIBUTES:
-        raise InputRejected("X04", f"more than {_MANY_ATTRIBUTES} members", where=where,
-                            remedy="a log holds robot, controller and signals")
+def _refuse_many(group: Any, where: str) -> None:
+    """Refuse endless groups (X04)."""
+    if max(len(group), len(group.attrs)) > LIMITS.members:
+        words = f"more than {LIMITS.members} members or attributes"
+        remedy = "a log holds robot, controller and signals"
+        raise InputRejected("X04", words, where=where, remedy=remedy)
 
 
-def _only(group: Any, known: tuple[str, ...], where: str) -> None:
-    """S19: nothing but what the format names; X04, a group besides, however deep: it is not looked into."""
+def _refuse_unknown(group: Any, known: Collection[str], where: str) -> None:
+    """Refuse what the format does not name (S19); a group, however deep, unseen (X04)."""
     import h5py
 
-    _few(group, where)
+    _refuse_many(group, where)
     for name in group:
-        if name not in known:
-            if group.get(name, getclass=True) is h5py.Group:
-                raise InputRejected("X04", f"group '{name}' is not in format version {schema.FORMAT_VERSION}, and not looked into",
-                                    where=where, remedy="remove it")
-            raise InputRejected("S19", f"'{name}' is not in format version {schema.FORMAT_VERSION}", where=where,
-                                remedy="remove it")
+        if name in known:
+            continue
+        words = f"'{name}' is not in format version {FORMAT_VERSION}"
+        if group.get(name, getclass=True) is h5py.Group:
+            words = f"group {words}, and not looked into"
+            raise InputRejected("X04", words, where=where, remedy="remove it")
+        raise InputRejected("S19", words, where=where, remedy="remove it")
 
 
 def _group(file: Any, name: str, where: str) -> Any:
     import h5py
 
     if file.get(name, getclass=True) is not h5py.Group:
-        raise InputRejected("S01", f"group /{name} is missing", where=where, remedy="a log has /robot and /signals")
+        remedy = "a log has /robot and /signals"
+        raise InputRejected("S01", f"group /{name} is missing", where=where, remedy=remedy)
     return file[name]
 
 
-def _attributes(owner: Any, where: str) -> dict[str, object]:
-    there = owner.attrs  # made anew with each look
-    if len(there) > _MANY_ATTRIBUTES:
-        raise InputRejected("X04", f"{len(there)} attributes", where=where, remedy="a log has fewer than twenty")
-    return {name: _attribute(there, name, f"{where}, attribute {name}") for name in there}
+def _attributes(owner: Any, where: str) -> dict[str, Any]:
+    attributes = owner.attrs  # made anew with each look
+    return {name: _attribute(attributes, name, f"{where}, attribute {name}") for name in attributes}
 
 
-def _attribute(there: Any, name: str, where: str) -> object:
+def _attribute(attributes: Any, name: str, where: str) -> Any:
+    """Return an attribute as JSON has it."""
     import h5py
 
-    info = there.get_id(name)
-    declared = math.prod(info.shape) * info.dtype.itemsize
-    if declared > _LONG_ATTRIBUTE:
-        raise InputRejected("X05", f"declares {declared} bytes", where=where, remedy="an attribute is a few words or numbers")
-    kind = info.dtype
-    if h5py.check_string_dtype(kind) is None and kind.kind not in "SUfiu":
-        raise InputRejected("S12", f"of type {kind}, neither text nor number", where=where,
-                            remedy="write it as a text or a number")
-    value = there[name]
+    stored = attributes.get_id(name)
+    declared = math.prod(stored.shape) * stored.dtype.itemsize
+    if declared > LIMITS.attribute:
+        remedy = "an attribute is a few words or numbers"
+        raise InputRejected("X05", f"declares {declared} bytes", where=where, remedy=remedy)
+    if h5py.check_string_dtype(stored.dtype) is None and stored.dtype.kind not in "SUfiu":
+        words = f"of type {stored.dtype}, neither text nor number"
+        remedy = "write it as a text or a number"
+        raise InputRejected("S12", words, where=where, remedy=remedy)
+    value = attributes[name]
     if isinstance(value, h5py.Empty):
         raise InputRejected("S20", "empty", where=where, remedy="write its value, or leave it out")
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
-        return [_as_text(v) for v in value] if value and not isinstance(value[0], float | int | list) else value
-    return _as_text(value.item() if isinstance(value, np.generic) else value)
+    return plain(_text(value))
 
 
-def _as_text(value: object) -> object:
+def _text(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_text(item) for item in value]
     return value.decode("utf-8") if isinstance(value, bytes) else value
 
 
-def _robot_text(file: Any, where: str) -> str:
+def _robot_text(dataset: Any, where: str) -> str:
     import h5py
 
-    if file.get("robot", getclass=True) is not h5py.Dataset:
-        raise InputRejected("S01", "the robot description /robot is missing", where=where,
-                            remedy="a log explains itself: write /robot")
-    dataset = file["robot"]
-    if dataset.shape != () or h5py.check_string_dtype(dataset.dtype) is None or foreign_storage(dataset):
-        raise InputRejected("S20", "/robot is not a scalar text", where=where, remedy="write the robot's TOML as a single text")
+    scalar = isinstance(dataset, h5py.Dataset) and dataset.shape == ()
+    if not scalar or h5py.check_string_dtype(dataset.dtype) is None or _foreign(dataset):
+        remedy = "write the robot's TOML as a single text"
+        raise InputRejected("S20", "/robot is not a scalar text", where=where, remedy=remedy)
     return str(dataset.asstr()[()])
 
 
-def foreign_storage(dataset: Any) -> str | None:
-    """X02, X03: external raw storage and virtual data sets read other files, or zeros where those are missing."""
-    properties = dataset.id.get_create_plist()
-    if properties.get_external_count() > 0:
+def _foreign(dataset: Any) -> str:
+    """Say what reads other files, or zeros where those are missing (X02, X03); "" for none."""
+    if dataset.id.get_create_plist().get_external_count() > 0:
         return "external raw storage"
-    return "virtual data" if dataset.is_virtual else None
+    return "virtual data" if dataset.is_virtual else ""
 
 
-def _within_budget(signals: Any, file_size: int, where: str) -> dict[str, Any]:
-    """The data sets by their names. X02-X06, S12: every one is judged by its declaration before one byte of it is read."""
+def refuse_bad_dataset(dataset: Any, where: str) -> None:
+    """Refuse what is no array of real numbers in this very file, before one byte is read."""
     import h5py
 
-    declared, found = 0, {}
-    for name in signals:
-        place = f"{where}, /signals/{name}"
-        if signals.get(name, getclass=True) is not h5py.Dataset:
-            raise InputRejected("S19", "not a data set", where=place, remedy="a signal is one data set")
-        dataset = found[name] = signals[name]
-        if foreign := foreign_storage(dataset):
-            raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=place,
-                                remedy="store the data in the log itself")
-        if dataset.dtype.kind not in "fiu" or dataset.dtype.itemsize > 8 or dataset.ndim not in (1, 2):
-            raise InputRejected("S12", f"type {dataset.dtype} of shape {dataset.shape}, not real numbers over samples", where=place,
-                                remedy="store float64 of shape (samples, joints)")
-        _filters_available(dataset, place)
-        declared += 8 * math.prod(dataset.shape)
-    refuse_oversize(declared, file_size, "X05", where)
-    return found
-
-
-def refuse_oversize(declared: int, file_size: int, code: str, where: str) -> None:
-    """Raise unless a file of `file_size` bytes may honestly hold `declared` bytes of samples."""
-    if declared > max(_ALWAYS_ALLOWED, _LARGEST_RATIO * file_size) or declared > max(_LONG, _LONG_RATIO * file_size):
-        raise InputRejected(code, f"declares {declared / 1e6:.0f} MB in a file of {file_size / 1e6:.3f} MB", where=where,
-                            remedy="this is not a recording; if it is, store it uncompressed")
-
-
-def _filters_available(dataset: Any, where: str) -> None:
-    import h5py
-
+    if not isinstance(dataset, h5py.Dataset):
+        remedy = "a signal is one data set"
+        raise InputRejected("S19", "not a data set", where=where, remedy=remedy)
+    if foreign := _foreign(dataset):
+        code, remedy = "X02" if "raw" in foreign else "X03", "store the data in the log itself"
+        raise InputRejected(code, f"{foreign} refused", where=where, remedy=remedy)
+    kind = dataset.dtype
+    if kind.kind not in "fiu" or kind.itemsize > 8 or dataset.ndim < 1:
+        words = f"type {kind} of shape {dataset.shape}, not real numbers over samples"
+        remedy = "store float64 of shape (samples, joints)"
+        raise InputRejected("S12", words, where=where, remedy=remedy)
     properties = dataset.id.get_create_plist()
     for index in range(properties.get_nfilters()):
         code, _, _, name = properties.get_filter(index)
         if not h5py.h5z.filter_avail(code):
             label = name.decode("utf-8", "replace") if name else "unnamed"
-            raise InputRejected("F10", f"needs the HDF5 filter {code} ({label}), which is not installed", where=where,
-                                remedy="install its plug-in (pip install hdf5plugin covers most), or write the log with gzip")
+            words = f"needs the HDF5 filter {code} ({label}), which is not installed"
+            remedy = "install its plug-in (pip install hdf5plugin covers most), or write with gzip"
+            raise InputRejected("F10", words, where=where, remedy=remedy)
 
 
-def _signal(dataset: Any, where: str) -> Signal:
-    attributes = _attributes(dataset, where)
-    unknown = sorted(set(attributes) - {"units", "long_name"})
-    if unknown:
-        raise InputRejected("S19", f"attributes {unknown} are not in the format", where=where, remedy="remove them")
+def refuse_oversize(declared: int, size: int, code: str, where: object) -> None:
+    """Refuse `declared` bytes of samples that a file of `size` bytes cannot honestly hold."""
+    usual = max(LIMITS.always, LIMITS.packing * size)
+    if declared > min(usual, max(LIMITS.long, LIMITS.long_packing * size)):
+        words = f"declares {declared / 1e6:.0f} MB in a file of {size / 1e6:.3f} MB"
+        remedy = "this is not a recording; if it is, store it uncompressed"
+        raise InputRejected(code, words, where=where, remedy=remedy)
+
+
+def _reals(dataset: Any, where: str) -> Array:
+    """Return a data set as float64."""
     try:
         stored = dataset[()]
     except OSError as problem:
-        code, what = ("F04",
-                      "checksum mismatch, the data are damaged") if "filter" in str(problem) or "etcher" in str(problem) else (
-            "F02", f"the data cannot be read: {problem}")
-        raise InputRejected(code, what, where=where, remedy="copy the file again from where it was recorded") from None
-    return Signal(as_reals(stored, where), str(attributes.get("units", "")), str(attributes.get("long_name", "")))
-
-
-def as_reals(stored: Any, where: str) -> Array:
-    """Samples as float64; S12 where integers are too large for it to hold exactly."""
-    if stored.dtype.kind in "iu" and stored.size and max(abs(int(stored.max())), abs(int(stored.min()))) > 2**53:
-        raise InputRejected("S12", "integers beyond 2^53, which are no samples", where=where, remedy="store float64")
+        code, words = "F02", f"the data cannot be read: {problem}"
+        if "filter" in str(problem) or "etcher" in str(problem):
+            code, words = "F04", "checksum mismatch, the data are damaged"
+        raise InputRejected(code, words, where=where, remedy=_AGAIN) from None
+    whole = stored.dtype.kind in "iu" and stored.size
+    if whole and max(abs(int(stored.max())), abs(int(stored.min()))) > LIMITS.integer:
+        words, remedy = "integers beyond 2^53, which are no samples", "store float64"
+        raise InputRejected("S12", words, where=where, remedy=remedy)
     return np.asarray(stored, dtype=np.float64)
 
 
 def explain(problem: BaseException, path: Path) -> InputRejected:
-    """The library's message in the words of the table of bad inputs."""
-    import re
-
-    text, again = str(problem), "copy the file again from where it was recorded"
+    """Return the library's message in the words of the table of bad inputs."""
+    text = str(problem)
+    code, words, remedy = "F02", f"damaged: {text or type(problem).__name__}", _AGAIN
     if found := re.search(r"eof = (\d+).*stored_eof = (\d+)", text):
-        return InputRejected("F02", f"truncated: {found[1]} of {found[2]} bytes", where=path, remedy=again)
-    if "h5clear" in text or "already open for write" in text or "object header" in text:
-        return InputRejected("F03", "not closed properly by the program that wrote it", where=path,
-                             remedy="try 'h5clear -s FILE', or record again")
-    if isinstance(problem, MemoryError):
-        return InputRejected("X05", "needs more memory than a log may", where=path, remedy="split the recording")
-    return InputRejected("F02", f"damaged: {text or type(problem).__name__}", where=path, remedy=again)
+        words = f"truncated: {found[1]} of {found[2]} bytes"
+    elif "h5clear" in text or "already open for write" in text or "object header" in text:
+        code, words = "F03", "not closed properly by the program that wrote it"
+        remedy = "try 'h5clear -s FILE', or record again"
+    elif isinstance(problem, MemoryError):
+        code, words = "X05", "needs more memory than a log may"
+        remedy = "split the recording"
+    return InputRejected(code, words, where=path, remedy=remedy)

@@ -12,22 +12,52 @@ import numpy.typing as npt
 from pipelines.io.experiment import Array
 from pipelines.io.order_statistics import median
 
-__all__ = ["ABSURD", "FEWEST", "GAP_LIMIT", "GAP_TICKS", "LARGEST_JITTER", "MOST_STEPS", "SHORTEST", "jitter", "late",
-           "percent", "recorded_span", "sentinels", "shorter_than_period"]
+__all__ = [
+    "ABSURD",
+    "FEWEST",
+    "GAP_LIMIT",
+    "GAP_TICKS",
+    "LARGEST_JITTER",
+    "MOST_STEPS",
+    "SHORTEST",
+    "jitter",
+    "late",
+    "percent",
+    "recorded_span",
+    "sentinels",
+    "shorter_than_period",
+]
 
 FEWEST = 20  # samples; fewer have no statistics, and show no motion (T08)
-SHORTEST = 100  # samples; a shorter stretch is over before an observer or a filter has settled (T04)
+SHORTEST = (
+    100  # samples; a shorter stretch is over before an observer or a filter has settled (T04)
+)
 
 # A model-based observer predicts through this many missing samples; beyond, the log is taken apart (T03, T04).
 GAP_LIMIT = 10
-GAP_TICKS = GAP_LIMIT + 1.5  # sample times; the longest interval with at most so many samples missing, half a one to spare
+GAP_TICKS = (
+    GAP_LIMIT + 1.5
+)  # sample times; the longest interval with at most so many samples missing, half a one to spare
 
 MOST_STEPS = 5  # a clock that was set back more often than this is not a clock (T01)
 LARGEST_JITTER = 0.05  # of the sample time (T05)
 _WANDERING = 0.15  # the same; intervals of one and a half sample times are then nothing special
 
 ABSURD = 1e9  # no joint is there, in any SI unit (D03)
-_SENTINELS = np.array([999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0, 65535.0, 2147483647.0, 2147483648.0, 4294967295.0])
+_SENTINELS = np.array(
+    [
+        999.0,
+        9999.0,
+        99999.0,
+        999999.0,
+        32767.0,
+        32768.0,
+        65535.0,
+        2147483647.0,
+        2147483648.0,
+        4294967295.0,
+    ]
+)
 
 
 def sentinels(x: Array) -> npt.NDArray[np.bool_]:
@@ -70,6 +100,12 @@ def late(ticks: Array, rms: float) -> npt.NDArray[np.intp]:
 
 
 def percent(share: float, digits: int = 3) -> str:
-    """"1.5 %"; what rounding leaves of nothing is "below 0.001 %", for its digits say nothing."""
-    whole = abs(100.0 * share) >= 10.0**digits - 0.5  # more digits before the point than are asked for: "100", not "1e+02"
-    return "below 0.001 %" if abs(share) < 1e-5 else f"{100.0 * share:.{'0f' if whole else f'{digits}g'}} %"
+    """ "1.5 %"; what rounding leaves of nothing is "below 0.001 %", for its digits say nothing."""
+    whole = (
+        abs(100.0 * share) >= 10.0**digits - 0.5
+    )  # more digits before the point than are asked for: "100", not "1e+02"
+    return (
+        "below 0.001 %"
+        if abs(share) < 1e-5
+        else f"{100.0 * share:.{'0f' if whole else f'{digits}g'}} %"
+    )

@@ -1,41 +1,64 @@
-"""Read and write model.json: robot, base parameters, friction, effects, and the range of the logs behind them.
+"""Read and write model.json: robot, base parameters, friction, effects, range of the logs.
 
-    model = read_model(path)         from a file, or by the bare name of one that is shipped ("rrr"); frozen, checked
-    text  = model_text(model)        the canonical text: equal models give equal bytes
-    model_schema()                   the JSON Schema, for others
+model = read_model(path)         from a file, or by the bare name of a shipped one ("rrr")
+text  = model_text(model)        the canonical text: equal models give equal bytes
+model_schema()                   the JSON Schema, for others
 
-The dataclasses below *are* the schema: pydantic reads their fields. It is imported only when a model is read.
+The dataclasses below are the schema: pydantic, imported when a model is read, reads their fields.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, fields, is_dataclass
-from functools import lru_cache
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Final, Literal, NoReturn
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected, did_you_mean
-from pipelines.io.atomic import write_file
-from pipelines.io.field_words import words_of
+from pipelines.io.config import FORMAT as LIMITS
+from pipelines.io.output import write_text
+from pipelines.io.results import json_text
+from pipelines.io.robot import shipped
+from pipelines.io.sandbox import read_small_text, regular_file
+from pipelines.io.schema import DRAFT, adapter, described
 
 if TYPE_CHECKING:
-    from pydantic import TypeAdapter
     from pydantic_core import ErrorDetails
 
-__all__ = ["FORMAT", "FORMAT_VERSION", "ModelFile", "Source", "StoredEffect", "StoredParameter", "StoredValue",
-           "Validity", "model_schema", "model_text", "parse_model", "read_model", "write_model"]
+__all__ = [
+    "FORMAT",
+    "FORMAT_VERSION",
+    "ModelFile",
+    "Source",
+    "StoredEffect",
+    "StoredParameter",
+    "StoredValue",
+    "Validity",
+    "model_schema",
+    "model_text",
+    "parse_model",
+    "read_covariance",
+    "read_model",
+    "write_covariance",
+    "write_model",
+]
 
-FORMAT: Final = "rrrid-model"
-FORMAT_VERSION: Final = 1
+Array = npt.NDArray[np.float64]
 
-_LARGEST = 64 * 2**20  # [bytes] a model is some kilobytes; what is larger is not one
-_STRICT = {"extra": "forbid", "strict": True, "allow_inf_nan": False}
+FORMAT = "rrrid-model"
+FORMAT_VERSION = 1  # numerics
+_STRICT: dict[str, object] = {"extra": "forbid", "strict": True, "allow_inf_nan": False}
 
 Origin = Literal["fitted", "known", "assumed"]
-Ranges = tuple[tuple[float, float] | None, ...]  # one [low, high] a joint, null where the logs do not say
+# one [low, high] a joint, null where the logs do not say
+Ranges = tuple[tuple[float, float] | None, ...]
 
 
 @dataclass(frozen=True)
@@ -44,10 +67,10 @@ class StoredValue:
 
     __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
-    value: float
-    std: float | None  # one standard deviation; null where unknown
-    unit: str
-    origin: Origin
+    value: float = described("the number, in its unit")
+    std: float | None = described("one standard deviation; null where unknown")
+    unit: str = described("unit of the number; 1: a pure number")
+    origin: Origin = described("where it comes from")
 
 
 @dataclass(frozen=True)
@@ -56,13 +79,13 @@ class StoredParameter:
 
     __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
-    name: str
-    value: float
-    std: float | None
-    unit: str
-    visible: bool
-    origin: Origin
-    combination: str  # of link parameters, readable
+    name: str = described("name, as logs and reports have it")
+    value: float = described("the number, in its unit")
+    std: float | None = described("one standard deviation; null where unknown")
+    unit: str = described("unit of the number")
+    visible: bool = described("whether the logs show it clearly")
+    origin: Origin = described("where it comes from")
+    combination: str = described("of link parameters, readable")
 
 
 @dataclass(frozen=True)
@@ -71,21 +94,21 @@ class StoredEffect:
 
     __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
-    effect: str  # identifier of causes.md
-    joint: int | None  # 1-based; null where it belongs to the whole arm
-    parameters: dict[str, StoredValue]
+    effect: str = described("identifier of causes.md")
+    joint: int | None = described("number of the joint, from 1; null: the whole arm")
+    parameters: dict[str, StoredValue] = described("the parameters by their names")
 
 
 @dataclass(frozen=True)
 class Validity:
-    """Where the logs behind the model went: beyond it, the model extrapolates."""
+    """The range of the logs behind the model: beyond it, the model extrapolates."""
 
     __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
-    speed: Ranges | None = None  # [rad/s]
-    acceleration: Ranges | None = None  # [rad/s^2]
-    posture: Ranges | None = None  # [rad]
-    temperature: Ranges | None = None  # [degC]
+    speed: Ranges | None = described("[rad/s] lowest and highest of each joint", None)
+    acceleration: Ranges | None = described("[rad/s^2] the same", None)
+    posture: Ranges | None = described("[rad] the same", None)
+    temperature: Ranges | None = described("[degC] the same", None)
 
 
 @dataclass(frozen=True)
@@ -94,47 +117,37 @@ class Source:
 
     __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
-    name: str
-    sha256: str
-    experiment: str
-    role: str
+    name: str = described("name of the log")
+    sha256: str = described("SHA-256 of the file's bytes, hexadecimal")
+    experiment: str = described("friction, excitation, writing, frf, hold or free")
+    role: str = described("identify, validate or reference")
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """What model.json holds. Numbers are SI; a prismatic joint has m and N where a revolute one has rad and N m."""
+    """A model. Numbers are SI; a prismatic joint has m and N instead of rad and N m."""
 
     __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
-    name: str
-    robot: str  # the robot description, TOML text
-    base_parameters: tuple[StoredParameter, ...]
-    friction: tuple[StoredEffect, ...] = ()
-    effects: tuple[StoredEffect, ...] = ()
-    validity: Validity | None = None
-    sources: tuple[Source, ...] = ()
-    notes: tuple[str, ...] = ()
-    format: Literal["rrrid-model"] = field(default=FORMAT, kw_only=True)
-    format_version: Literal[1] = field(default=FORMAT_VERSION, kw_only=True)
-
-
-@lru_cache(maxsize=1)
-def _adapter() -> TypeAdapter[ModelFile]:
-    from pydantic import TypeAdapter
-
-    return TypeAdapter(ModelFile)
+    name: str = described("name of the model")
+    robot: str = described("the robot description, TOML text")
+    base_parameters: tuple[StoredParameter, ...] = described("what the rigid body has")
+    friction: tuple[StoredEffect, ...] = described("friction laws", ())
+    effects: tuple[StoredEffect, ...] = described("accepted further effects", ())
+    validity: Validity | None = described("range of the logs behind it", None)
+    sources: tuple[Source, ...] = described("the logs behind it", ())
+    notes: tuple[str, ...] = described("what else is to be known", ())
+    _: dataclasses.KW_ONLY
+    format: Literal["rrrid-model"] = described("what kind of file this is", "rrrid-model")
+    format_version: Literal[1] = described("version of the format", 1)
 
 
 def model_schema() -> dict[str, Any]:
-    """The JSON Schema of model.json."""
-    schema = _adapter().json_schema(mode="validation")
-    # A default serves those who build a model; in the file these must stand.
+    """Return the JSON Schema of model.json."""
+    schema = adapter(ModelFile).json_schema(mode="validation")
+    # defaults are for those who build a model; in the file these must be there
     schema["required"] = ["format", "format_version", *schema["required"]]
-    kinds = {kind.__name__: kind for kind in (StoredParameter, StoredValue, StoredEffect, Source, Validity)}
-    for kind, told in ((ModelFile, schema), *((kinds[name], told) for name, told in schema["$defs"].items())):
-        for name, words in words_of(kind).items():
-            told["properties"][name].setdefault("description", words)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    return {"$schema": DRAFT, **schema}
 
 
 def read_model(source: str | Path) -> ModelFile:
@@ -142,23 +155,25 @@ def read_model(source: str | Path) -> ModelFile:
 
     Raises:
         UsageError: there is no such file (C04).
-        InputRejected: it is no model file (S18), or one of a later version (F11), or no regular file at all.
+        InputRejected: it is no model file (S18), of a later version (F11), or no regular file.
         EnvironmentFault: no permission.
     """
-    from pipelines.io.files import regular_file
-    from pipelines.io.shipped import shipped
-
     path = Path(source)
     if not path.exists():
         path = shipped("models", str(source))
-    if (size := regular_file(path).st_size) > _LARGEST:
-        raise InputRejected("S18", f"{size} bytes are too many for a model file", where=path,
-                            remedy="give a model.json")
+    size = regular_file(path).st_size
+    if size > LIMITS.model:
+        raise _wrong(f"{size} bytes are too many", path)
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as problem:
-        raise InputRejected("S18", f"the model file cannot be read: {problem}", where=path, remedy="give a model.json") from None
+        raise _wrong(f"it cannot be read: {problem}", path) from None
     return parse_model(text, where=path)
+
+
+def _wrong(words: str, where: object) -> InputRejected:
+    remedy = "write the model again, or correct it by the schema: rrrid schema model"
+    return InputRejected("S18", f"not a model file: {words}", where=where, remedy=remedy)
 
 
 def parse_model(text: str, where: object = "") -> ModelFile:
@@ -169,80 +184,76 @@ def parse_model(text: str, where: object = "") -> ModelFile:
     """
     from pydantic import ValidationError
 
-    def wrong(what: str) -> NoReturn:
-        raise InputRejected("S18", f"not a model file: {what}", where=where,
-                            remedy="write the model again, or correct it by the schema: rrrid schema model")
-
     def once(pairs: list[tuple[str, object]]) -> dict[str, object]:
-        keys = [key for key, _ in pairs]
-        if len(set(keys)) < len(keys):
-            wrong(f"'{max(keys, key=keys.count)}' stands twice in one object")
+        for key, count in Counter(key for key, _ in pairs).items():
+            if count > 1:
+                raise _wrong(f"'{key}' stands twice in one object", where)
         return dict(pairs)
 
+    def no_number(word: str) -> None:
+        raise _wrong(f"{word} is not JSON", where)
+
     try:
-        table = json.loads(text, object_pairs_hook=once, parse_constant=lambda word: wrong(f"{word} is not JSON"))
+        table = json.loads(text, object_pairs_hook=once, parse_constant=no_number)
     except (ValueError, RecursionError) as problem:
-        wrong(f"the JSON is broken: {problem}")
+        raise _wrong(f"the JSON is broken: {problem}", where) from None
     if not isinstance(table, dict) or table.get("format") != FORMAT:
-        wrong(f"its \"format\" is not \"{FORMAT}\"")
+        raise _wrong(f'its "format" is not "{FORMAT}"', where)
     version = table.get("format_version")
-    if isinstance(version, int) and not isinstance(version, bool) and version > FORMAT_VERSION:
-        raise InputRejected("F11", f"the model file has format version {version}; this program understands up to "
-                            f"{FORMAT_VERSION}", where=where, remedy="update rrrid")
-    if version != FORMAT_VERSION or isinstance(version, bool):
-        wrong(f"its \"format_version\" is {version}, not {FORMAT_VERSION}")
+    if type(version) is int and version > FORMAT_VERSION:
+        words = f"the model file has format version {version}"
+        words = f"{words}; this program understands up to {FORMAT_VERSION}"
+        raise InputRejected("F11", words, where=where, remedy="update rrrid")
+    if type(version) is not int or version != FORMAT_VERSION:
+        raise _wrong(f'its "format_version" is {version}, not {FORMAT_VERSION}', where)
     try:
-        model = _adapter().validate_json(text)
+        model: ModelFile = adapter(ModelFile).validate_json(text)
     except ValidationError as problem:
-        wrong(_first_fault(problem.errors(include_url=False)[0]))
-    for fault in _implausible(model):
-        wrong(fault)
+        fault = problem.errors(include_url=False)[0]
+        raise _wrong(_fault_in_words(fault), where) from None
+    for words in _implausible(model):
+        raise _wrong(words, where)
     return model
 
 
 def _implausible(model: ModelFile) -> Iterator[str]:
-    """What no schema sees: a spread below zero, a range that ends before it begins, a name that stands twice."""
-    effects = (*model.friction, *model.effects)
-    spreads = [(p.name, p.std) for p in model.base_parameters]
-    spreads += [(f"{e.effect}.{name}", value.std) for e in effects for name, value in e.parameters.items()]
-    yield from (f"the std of {name} is {std}" for name, std in spreads if std is not None and std < 0)
-    names = [p.name for p in model.base_parameters]
-    yield from (f"base parameter {name} stands twice" for name in names if names.count(name) > 1)
+    """Yield what no schema sees: negative spreads, reversed ranges, names that come twice."""
+    spreads = {p.name: p.std for p in model.base_parameters}
+    for effect in (*model.friction, *model.effects):
+        spreads |= {f"{effect.effect}.{k}": value.std for k, value in effect.parameters.items()}
+    for name, std in spreads.items():
+        if std is not None and std < 0.0:
+            yield f"the std of {name} is {std}"
+    for name, count in Counter(p.name for p in model.base_parameters).items():
+        if count > 1:
+            yield f"base parameter {name} stands twice"
     for key in ("speed", "acceleration", "posture", "temperature"):
-        for one in getattr(model.validity, key, None) or ():
-            if one is not None and one[0] > one[1]:
-                yield f"validity.{key} runs from {one[0]} to {one[1]}"
+        for limits in getattr(model.validity, key, None) or ():
+            if limits is not None and limits[0] > limits[1]:
+                yield f"validity.{key} runs from {limits[0]} to {limits[1]}"
 
 
-def _first_fault(fault: ErrorDetails) -> str:
-    place = [part for part in fault["loc"] if isinstance(part, int) or not part.startswith("nullable")]
-    words = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
+def _fault_in_words(fault: ErrorDetails) -> str:
+    place = [x for x in fault["loc"] if isinstance(x, int) or not x.startswith("nullable")]
+    words = "".join(f"[{x}]" if isinstance(x, int) else f".{x}" for x in place).lstrip(".")
     if fault["type"] == "unexpected_keyword_argument":
-        return f"{words} is not a key of the format{did_you_mean(str(place[-1]), _keys())}"
+        kinds = (StoredValue, StoredParameter, StoredEffect, Validity, Source, ModelFile)
+        known = {one.name for kind in kinds for one in fields(kind)}
+        return f"{words} is not a key of the format{did_you_mean(str(place[-1]), known)}"
     if fault["type"] in ("missing", "missing_argument"):
         return f"{words} is missing"
     return f"{words}: {fault['msg'].lower()}"
 
 
-def _keys() -> set[str]:
-    """Every key that the format knows, wherever it stands."""
-    return {one.name for kind in (StoredValue, StoredParameter, StoredEffect, Validity, Source, ModelFile)
-            for one in fields(kind)}
-
-
 def model_text(model: ModelFile) -> str:
-    """The canonical JSON text: keys sorted, floats by their shortest exact form, null for what is not finite."""
-    return json.dumps(_plain(model), sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    """Return the canonical JSON text: sorted keys, exact floats, null for what is not finite."""
+    table = _plain(model)
+    return json.dumps(table, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def write_model(path: Path, model: ModelFile) -> None:
     """Write `model` to `path`, whole or not at all."""
-    text = model_text(model)
-    write_file(path, lambda draft: _put(draft, text))
-
-
-def _put(draft: Path, text: str) -> None:
-    draft.write_text(text, encoding="utf-8")
+    write_text(path, model_text(model))
 
 
 def _plain(value: object) -> object:
@@ -255,3 +266,28 @@ def _plain(value: object) -> object:
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     return value
+
+
+def write_covariance(path: Path, names: Sequence[str], covariance: Array) -> None:
+    """Write the covariance (k, k) of the numbers `names` of a model, atomically."""
+    table = {"names": list(names), "covariance": _plain(covariance.tolist())}
+    write_text(path, json_text(table))
+
+
+def read_covariance(path: Path) -> tuple[tuple[str, ...], Array]:
+    """Return what `write_covariance` wrote; NaN where a number is not determined.
+
+    Raises:
+        InputRejected: S18, it is not of that form.
+    """
+    text = read_small_text(path, what="a covariance (JSON)")
+    try:
+        table = json.loads(text)
+        names = tuple(map(str, table["names"]))
+        rows = [[np.nan if x is None else float(x) for x in row] for row in table["covariance"]]
+        return names, np.array(rows, dtype=np.float64).reshape(len(names), len(names))
+    except (ValueError, TypeError, KeyError, RecursionError, OverflowError) as problem:
+        words = "not the covariance of a model's parameters"
+        remedy = "run estimate-bps again, or take the file away"
+        words = f"{words}: {type(problem).__name__}: {problem}"
+        raise InputRejected("S18", words, where=path, remedy=remedy) from None

@@ -58,4 +58,6 @@ def in_order(few: Iterable[Array]) -> list[Array]:
 def distinct(x: npt.NDArray[Scalar]) -> npt.NDArray[Scalar]:
     """The different values of `x`, in order; none of them undefined."""
     ordered = np.sort(np.ravel(x))
-    return np.asarray(ordered[np.concatenate([[True], ordered[1:] != ordered[:-1]])[:ordered.size]])
+    return np.asarray(
+        ordered[np.concatenate([[True], ordered[1:] != ordered[:-1]])[: ordered.size]]
+    )

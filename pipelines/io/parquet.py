@@ -1,68 +1,80 @@
-"""Read and write a log as Parquet: one table, one JSON object in its metadata, a checksum on every page."""
+"""Read and write a log as Parquet, and write tables for other programs."""
 
 from __future__ import annotations
 
 import json
+import os
 import re
-from collections.abc import Collection
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.io import canonical, schema
-from pipelines.io.experiment import Array, ExperimentLog, Signal
-from pipelines.io.hdf5 import as_reals, refuse_oversize
+from pipelines.io.config import FORMAT as LIMITS
+from pipelines.io.hdf5 import refuse_oversize, refuse_version
+from pipelines.io.output import write_file
+from pipelines.io.sandbox import Answer
+from pipelines.io.schema import FORMAT, FORMAT_VERSION, plain
 
-__all__ = ["read_parts", "write"]
+__all__ = ["columns_of", "csv_cell", "read_parts", "write", "write_rows", "write_table"]
+
+# its other allocators reserve more address space than a guarded child may use
+os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
+
+Array = npt.NDArray[np.float64]
 
 _KEY = b"rrrid"
-_LONGEST_METADATA = 16 << 20  # [B]
 _COLUMN = re.compile(r"(?P<signal>[a-z_]+?)(?:_(?P<joint>[1-9]\d{0,2}))?")
+_AGAIN = "copy the file again from where it was recorded"
 
 
-def write(path: Path, log: ExperimentLog) -> None:
-    """Write `log` to `path`: zstd, byte-stream-split, no dictionary, page checksums."""
+def write(path: Path, parts: Answer) -> None:
+    """Write the parts of a log as one table: zstd, byte-stream-split, page checksums."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    about = json.loads(canonical.log_text(log))
-    about.pop("signals")
-    flat = {"format": schema.FORMAT, "format_version": schema.FORMAT_VERSION, "digest": canonical.digest_of(log)}
-    flat |= about.pop("attributes") | about
+    groups = plain(parts.about["groups"])
+    about = {"format": FORMAT, "format_version": FORMAT_VERSION, "digest": parts.about["digest"]}
+    about |= groups.pop("attributes") | groups
     fields, columns = [], []
-    for name, signal in log.signals.items():
-        words = {"units": signal.units, "long_name": signal.long_name}
-        vectors = [(name, signal.values)] if signal.values.ndim == 1 else [
-            (f"{name}_{j + 1}", signal.values[:, j]) for j in range(signal.values.shape[1])]
-        fields += [pa.field(column, pa.float64(), nullable=False, metadata=words) for column, _ in vectors]
-        columns += [_column(values) for _, values in vectors]
-    text = json.dumps(flat, sort_keys=True, separators=(",", ":"), allow_nan=False)
-    table = pa.Table.from_arrays(columns, schema=pa.schema(fields, metadata={_KEY: text.encode("ascii")}))
-    pq.write_table(table, path, compression="zstd", use_dictionary=False, use_byte_stream_split=True,
-                   write_statistics=False, write_page_checksum=True, version="2.6")
+    for name, values in columns_of(parts.arrays).items():
+        words = parts.about["signals"][name if name in parts.arrays else name.rpartition("_")[0]]
+        fields.append(pa.field(name, pa.float64(), nullable=False, metadata=words))
+        # through its buffer: pyarrow's own conversion imports pandas, five times the work
+        data = pa.py_buffer(np.ascontiguousarray(values, dtype="<f8"))
+        columns.append(pa.Array.from_buffers(pa.float64(), len(values), [None, data]))
+    text = json.dumps(about, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    schema = pa.schema(fields, metadata={_KEY: text.encode("ascii")})
+    pq.write_table(
+        pa.Table.from_arrays(columns, schema=schema),
+        path,
+        compression="zstd",
+        use_dictionary=False,
+        use_byte_stream_split=True,
+        write_statistics=False,
+        write_page_checksum=True,
+        version="2.6",
+    )
 
 
-def _column(values: Array) -> Any:
-    """Samples as an Arrow array. Through its buffer: pyarrow's own conversion imports pandas, five times the work."""
-    import pyarrow as pa
-
-    return pa.Array.from_buffers(pa.float64(), len(values), [None, pa.py_buffer(np.ascontiguousarray(values, dtype="<f8"))])
-
-
-def _samples(column: Any) -> Any:
-    """An Arrow column without nulls as a NumPy array, through its buffers."""
-    width = column.type.bit_width // 8
-    kind = np.dtype(f"<{'f' if str(column.type) in ('double', 'float', 'halffloat') else str(column.type)[0]}{width}")
-    parts = [np.frombuffer(chunk.buffers()[1], kind, len(chunk), chunk.offset * width) for chunk in column.chunks if len(chunk)]
-    return np.concatenate(parts) if parts else np.empty(0, kind)
+def columns_of(signals: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the columns of a table: `t`, `q_1` … `q_n` and so on."""
+    columns = {}
+    for name, values in signals.items():
+        if values.ndim == 1:
+            columns[name] = values
+        else:
+            columns |= {f"{name}_{j}": column for j, column in enumerate(values.T, 1)}
+    return columns
 
 
-def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[ExperimentLog, str | None]:
-    """The container as it is: the log, with the signals of `only` or all, and the digest it carries or None.
+def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
+    """Return the groups of attributes, the digest, and the signals of `only` or all.
 
-    Runs inside the guarded child.
+    Runs in the guarded child.
 
     Raises:
         InputRejected: with the row of the table of bad inputs that fits.
@@ -72,91 +84,149 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> tuple[Experim
 
     where = str(path)
     try:
-        with pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False,
-                            thrift_string_size_limit=_LONGEST_METADATA) as file:
+        with pq.ParquetFile(
+            path,
+            page_checksum_verification=True,
+            pre_buffer=False,
+            thrift_string_size_limit=LIMITS.metadata,
+        ) as file:
             about = _about(file.schema_arrow, where)
-            refuse_oversize(8 * file.metadata.num_rows * file.metadata.num_columns, path.stat().st_size, "X06", where)
-            names = {name: columns for name, columns in _signal_columns(file.schema_arrow, where).items()
-                     if only is None or name in only}
-            table = file.read([column for columns in names.values() for column in columns], use_threads=False)
+            rows, count = file.metadata.num_rows, file.metadata.num_columns
+            refuse_oversize(8 * rows * count, path.stat().st_size, "X06", where)
+            names = _signal_columns(file.schema_arrow, where)
+            names = {k: own for k, own in names.items() if only is None or k in only}
+            table = file.read([name for own in names.values() for name in own], use_threads=False)
     except InputRejected:
         raise
     except (OSError, pa.ArrowException, ValueError, KeyError, UnicodeError, MemoryError) as problem:
         raise _explain(problem, path) from None
-    if table.num_rows != file.metadata.num_rows or any(column.null_count for column in table.columns):
-        raise InputRejected("F04", "rows are missing inside the table", where=where, remedy="copy the file again")
+    if table.num_rows != rows or any(column.null_count for column in table.columns):
+        words = "rows are missing inside the table"
+        raise InputRejected("F04", words, where=where, remedy=_AGAIN)
+    keys = ("controller", "derived", "robot")
+    groups: dict[str, Any] = {key: about.pop(key) for key in keys if key in about}
     digest = about.pop("digest", None)
-    groups = {key: about.pop(key) for key in ("controller", "derived", "robot") if key in about}
-    signals = {name: _signal(table, columns, f"{where}, column {columns[0]}") for name, columns in names.items()}
-    log = canonical.from_parts(groups | {"attributes": about}, signals, where=where)
-    return log, digest if isinstance(digest, str) else None
+    described, arrays = {}, {}
+    for name, own in names.items():
+        described[name] = _words(table.schema, own, where)
+        columns = [_samples(table.column(column)) for column in own]
+        arrays[name] = columns[0] if own == ["t"] else np.stack(columns, axis=1)
+    groups["attributes"] = about
+    return Answer({"groups": groups, "digest": digest, "signals": described}, arrays)
 
 
-def _about(arrow_schema: Any, where: str) -> dict[str, Any]:
-    text = (arrow_schema.metadata or {}).get(_KEY)
-    if text is None:
-        raise InputRejected("F06", "a Parquet table, but not an experiment log: it has no key 'rrrid' in its metadata", where=where,
-                            remedy="use 'rrrid import' with a recipe to make a log of a recording")
+def _about(schema: Any, where: str) -> dict[str, Any]:
+    """Return the JSON object in the metadata of a table."""
     try:
-        about = json.loads(text)
+        about = json.loads((schema.metadata or {}).get(_KEY, b"{}"))
     except (ValueError, RecursionError):
-        raise InputRejected("F04", "the attributes are damaged", where=where, remedy="copy the file again") from None
-    if not isinstance(about, dict) or about.pop("format", None) != schema.FORMAT:
-        raise InputRejected("F06", "a Parquet table, but not an experiment log", where=where,
-                            remedy="use 'rrrid import' with a recipe to make a log of a recording")
-    version = about.pop("format_version", None)
-    if version != schema.FORMAT_VERSION or isinstance(version, bool):
-        raise InputRejected("F11", f"format_version {version}; this program understands version {schema.FORMAT_VERSION}",
-                            where=where,
-                            remedy="update rrrid, or write the log in that version")
+        words = "the attributes are damaged"
+        raise InputRejected("F04", words, where=where, remedy=_AGAIN) from None
+    if not isinstance(about, dict):
+        about = {}
+    refuse_version(about, "Parquet", where)
     return about
 
 
-def _signal_columns(arrow_schema: Any, where: str) -> dict[str, list[str]]:
-    """Signal -> its columns in joint order; S03 where a name stands twice, S12 where a column does not hold numbers."""
+def _signal_columns(schema: Any, where: str) -> dict[str, list[str]]:
+    """Map every signal to its columns in joint order (S02, S03, S12, S19)."""
     import pyarrow.types as types
 
-    columns: dict[str, dict[int, str]] = {}
-    for field in arrow_schema:
-        place = f"{where}, column {field.name}"
+    found: dict[str, dict[int, str]] = {}
+    for field in schema:
         match = _COLUMN.fullmatch(field.name)
         if match is None:
-            raise InputRejected("S19", f"column '{field.name}' is not in format version {schema.FORMAT_VERSION}", where=where,
-                                remedy="rename or remove it")
+            words = f"column '{field.name}' is not in format version {FORMAT_VERSION}"
+            raise InputRejected("S19", words, where=where, remedy="rename or remove it")
         if not (types.is_floating(field.type) or types.is_integer(field.type)):
-            raise InputRejected("S12", f"type {field.type}, not real numbers", where=place, remedy="store double")
-        joint = int(match["joint"] or 0)
-        if joint in columns.setdefault(match["signal"], {}):
-            raise InputRejected("S03", f"two columns are called '{field.name}'", where=where, remedy="rename one")
-        columns[match["signal"]][joint] = field.name
-    for signal, by_joint in columns.items():
-        wanted = [0] if signal == "t" else list(range(1, len(by_joint) + 1))
-        if sorted(by_joint) != wanted:
-            raise InputRejected("S02", f"columns of {signal} are {', '.join(by_joint.values())}", where=where,
-                                remedy=f"number the joints from 1: {signal}_1, {signal}_2, …")
-    return {signal: [by_joint[j] for j in sorted(by_joint)] for signal, by_joint in columns.items()}
+            words, place = f"type {field.type}, not real numbers", f"{where}, column {field.name}"
+            raise InputRejected("S12", words, where=place, remedy="store double")
+        own, joint = found.setdefault(match["signal"], {}), int(match["joint"] or 0)
+        if joint in own:
+            words = f"two columns are called '{field.name}'"
+            raise InputRejected("S03", words, where=where, remedy="rename one")
+        own[joint] = field.name
+    for signal, own in found.items():
+        if sorted(own) != ([0] if signal == "t" else list(range(1, len(own) + 1))):
+            words = f"columns of {signal} are {', '.join(own.values())}"
+            remedy = f"number the joints from 1: {signal}_1, {signal}_2, …"
+            raise InputRejected("S02", words, where=where, remedy=remedy)
+    return {signal: [own[joint] for joint in sorted(own)] for signal, own in found.items()}
 
 
-def _signal(table: Any, columns: list[str], where: str) -> Signal:
-    words = {tuple(sorted((table.schema.field(c).metadata or {}).items())) for c in columns}
-    if len(words) != 1:
-        raise InputRejected("S20", f"columns {', '.join(columns)} differ in units or long_name", where=where,
-                            remedy="give one signal one unit")
-    about = {key.decode("utf-8", "replace"): value.decode("utf-8", "replace") for key, value in words.pop()}
-    if unknown := set(about) - {"units", "long_name", "PARQUET:field_id"}:
-        raise InputRejected("S19", f"metadata {sorted(unknown)} are not in the format", where=where, remedy="remove them")
-    stacked = [as_reals(_samples(table.column(c)), where) for c in columns]
-    values = stacked[0] if columns == ["t"] else np.stack(stacked, axis=1)
-    return Signal(values, about.get("units", ""), about.get("long_name", ""))
+def _words(schema: Any, columns: list[str], where: str) -> dict[str, str]:
+    """Return units and long_name of a signal, which all its columns share."""
+    every = [schema.field(column).metadata or {} for column in columns]
+    if any(words != every[0] for words in every):
+        words = f"columns {', '.join(columns)} differ in units or long_name"
+        raise InputRejected("S20", words, where=where, remedy="give one signal one unit")
+    decoded = {
+        k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in every[0].items()
+    }
+    decoded.pop("PARQUET:field_id", None)
+    return decoded
+
+
+def _samples(column: Any) -> Array:
+    """Return an Arrow column without nulls as float64, through its buffers (without pandas)."""
+    kind = np.dtype(column.type.to_pandas_dtype())
+    parts = [
+        np.frombuffer(chunk.buffers()[1], kind, len(chunk), chunk.offset * kind.itemsize)
+        for chunk in column.chunks
+        if len(chunk)
+    ]
+    stored = np.concatenate(parts) if parts else np.empty(0, kind)
+    if kind.kind in "iu" and stored.size and np.abs(stored.astype(float)).max() > LIMITS.integer:
+        words, remedy = "integers beyond 2^53, which are no samples", "store float64"
+        raise InputRejected("S12", words, remedy=remedy)
+    return stored.astype(np.float64)
 
 
 def _explain(problem: BaseException, path: Path) -> InputRejected:
-    """The library's message in the words of the table of bad inputs."""
+    """Return the library's message in the words of the table of bad inputs."""
     text = str(problem).splitlines()[0] if str(problem) else type(problem).__name__
-    again = "copy the file again from where it was recorded"
-    lowered = text.lower()
-    if "crc" in lowered or "checksum" in lowered:
-        return InputRejected("F04", "checksum mismatch in a page, the data are damaged", where=path, remedy=again)
-    if "magic bytes" in lowered or "footer" in lowered:
-        return InputRejected("F07", "truncated: no footer", where=path, remedy=again)
-    return InputRejected("F04", f"damaged: {text}", where=path, remedy=again)
+    code, words = "F04", f"damaged: {text}"
+    if "crc" in text.lower() or "checksum" in text.lower():
+        words = "checksum mismatch in a page, the data are damaged"
+    elif "magic bytes" in text.lower() or "footer" in text.lower():
+        code, words = "F07", "truncated: no footer"
+    return InputRejected(code, words, where=path, remedy=_AGAIN)
+
+
+def csv_cell(text: str) -> str:
+    """Return `text` as a CSV cell that no spreadsheet takes for a formula (X10)."""
+    safe = f"'{text}" if text[:1] in ("=", "+", "-", "@", "\t", "\r") else text
+    if safe == text and not any(c in safe for c in ',;"\n\r'):
+        return safe
+    return '"' + safe.replace('"', '""') + '"'
+
+
+def write_table(path: Path, columns: Mapping[str, Array], units: Mapping[str, str]) -> None:
+    """Write named columns with their units as Parquet, page checksums included."""
+    import pyarrow as pa
+
+    fields = [
+        pa.field(name, pa.float64(), metadata={"units": units.get(name, "1")}) for name in columns
+    ]
+    _write_arrow(path, [pa.array(values) for values in columns.values()], pa.schema(fields))
+
+
+def write_rows(
+    path: Path, rows: Sequence[Mapping[str, str | float | int | None]], kinds: Mapping[str, type]
+) -> None:
+    """Write rows of named cells as Parquet; `kinds`: column -> str, float or int."""
+    import pyarrow as pa
+
+    arrow = {str: pa.string(), float: pa.float64(), int: pa.int64()}
+    schema = pa.schema([pa.field(name, arrow[kind]) for name, kind in kinds.items()])
+    columns = [pa.array([row.get(n) for row in rows], type=arrow[k]) for n, k in kinds.items()]
+    _write_arrow(path, columns, schema)
+
+
+def _write_arrow(path: Path, columns: list[Any], schema: Any) -> None:
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table(columns, schema=schema)
+    options = {"compression": "zstd", "write_page_checksum": True}
+    write_file(path, lambda draft: pq.write_table(table, draft, **options))

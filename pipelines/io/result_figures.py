@@ -16,15 +16,28 @@ from pipelines.io.toml_text import TomlError, parse_toml
 __all__ = ["fitted", "name_in", "numbers_of", "residuals", "robot_of"]
 
 # What a result calls the error that is left, its words, and its unit; arrays are per joint.
-_RESIDUALS: Final = {"torque_rms": ("torque rms", "N m"), "residual_rms": ("nominal model residual rms", "N m"),
-                     "after_rms": ("extended model residual rms", "N m"), "relative_error": ("relative error", "1"),
-                     "reconstruction_error_max": ("reconstruction error max", "rad")}
-_SAID_BEFORE: Final = {"after_rms": "noise_floor"}  # it is no model's, and stands with the nominal one already
+_RESIDUALS: Final = {
+    "torque_rms": ("torque rms", "N m"),
+    "residual_rms": ("nominal model residual rms", "N m"),
+    "after_rms": ("extended model residual rms", "N m"),
+    "relative_error": ("relative error", "1"),
+    "reconstruction_error_max": ("reconstruction error max", "rad"),
+}
+_SAID_BEFORE: Final = {
+    "after_rms": "noise_floor"
+}  # it is no model's, and stands with the nominal one already
 _SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
 # Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
 _NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
 _SILENT: Final = ("parameters", "result", "torque")
-_PASSED_OVER: Final = ("balance", "comparison", "candidate_laws", "rejected", "detection_limits", "courses")
+_PASSED_OVER: Final = (
+    "balance",
+    "comparison",
+    "candidate_laws",
+    "rejected",
+    "detection_limits",
+    "courses",
+)
 _PICTURES: Final = "previews"  # whose units are of position and torque, not of joints
 _A_MODEL: Final = "model"  # whose "robot" is a whole description
 _MOST = 400  # figures of one item
@@ -51,7 +64,9 @@ def _figures(result: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
             yield name, holder
 
 
-def residuals(result: Mapping[str, Any], turning: Sequence[bool] = ()) -> dict[str, tuple[float, str]]:
+def residuals(
+    result: Mapping[str, Any], turning: Sequence[bool] = ()
+) -> dict[str, tuple[float, str]]:
     """Name -> (value, unit) of every residual of `result`.
 
     Args:
@@ -65,27 +80,40 @@ def residuals(result: Mapping[str, Any], turning: Sequence[bool] = ()) -> dict[s
                 for words, joint, value in _leaves(holder[key], but=_SAID_BEFORE.get(key)):
                     if len(found) < _MOST:
                         full = " ".join(filter(None, (name, called, words)))
-                        found[_free(full, found)] = value, _SLIDING.get(unit, unit) if joint in slides else unit
+                        found[_free(full, found)] = (
+                            value,
+                            _SLIDING.get(unit, unit) if joint in slides else unit,
+                        )
     return found
 
 
 def _sliding(value: Any) -> set[int]:
     """The joints, from 1, that slide by the units that a result gives of them."""
     if isinstance(value, Mapping):
-        told = [unit for key in ("units", "torque_units") if isinstance(value.get(key), list) for unit in enumerate(value[key], 1)]
+        told = [
+            unit
+            for key in ("units", "torque_units")
+            if isinstance(value.get(key), list)
+            for unit in enumerate(value[key], 1)
+        ]
         return {j for j, unit in told if unit in _SLIDING.values()}.union(
-            *(_sliding(item) for key, item in value.items() if key != _PICTURES))
+            *(_sliding(item) for key, item in value.items() if key != _PICTURES)
+        )
     return set[int]().union(*map(_sliding, value)) if isinstance(value, list) else set()
 
 
 def robot_of(result: Any) -> str:
     """The name of the first robot that a result is of, however deep; "" where it says none."""
     if isinstance(result, Mapping):
-        if "base_parameters" in result and isinstance(result.get("robot"), str):  # a model file, with a whole description
+        if "base_parameters" in result and isinstance(
+            result.get("robot"), str
+        ):  # a model file, with a whole description
             return name_in(result["robot"])
         if isinstance(result.get("robot"), str):
             return str(result["robot"])
-        return next(filter(None, (robot_of(item) for key, item in result.items() if key != _A_MODEL)), "")
+        return next(
+            filter(None, (robot_of(item) for key, item in result.items() if key != _A_MODEL)), ""
+        )
     return next(filter(None, map(robot_of, result)), "") if isinstance(result, list) else ""
 
 
@@ -133,7 +161,9 @@ def _words(item: Any) -> list[str]:
     return said
 
 
-def _leaves(value: Any, words: tuple[str, ...] = (), joint: int = 0, but: str | None = None) -> Iterator[tuple[str, int, float]]:
+def _leaves(
+    value: Any, words: tuple[str, ...] = (), joint: int = 0, but: str | None = None
+) -> Iterator[tuple[str, int, float]]:
     """Words, the joint they are of or 0, and the number; without what stands under the key `but`."""
     if _number(value):
         yield " ".join(words), joint, float(value)

@@ -43,10 +43,14 @@ def less_findings(result: Mapping[str, Any], held: Container[Place]) -> dict[str
         if isinstance(less.get(kind), list):
             less[kind] = [one for one in less[kind] if not _is_held(one, held)]
     if less.get("stages"):
-        less["stages"] = [{**step, "result": less_findings(step["result"], held)} if step.get("result") else step
-                          for step in less["stages"]]
+        less["stages"] = [
+            {**step, "result": less_findings(step["result"], held)} if step.get("result") else step
+            for step in less["stages"]
+        ]
     return less
 
 
 def _is_held(finding: Any, held: Container[Place]) -> bool:
-    return isinstance(finding, Mapping) and (str(finding.get("cause")), finding.get("joint")) in held
+    return (
+        isinstance(finding, Mapping) and (str(finding.get("cause")), finding.get("joint")) in held
+    )

@@ -1,104 +1,93 @@
-"""Store any stage's result as open files, and bring it back: JSON for figures, HDF5 for long series.
+"""Store any stage's result as open files, and read it again: JSON for figures, HDF5 for series.
 
-    text, series = encode(result)
-    result = decode(Result, json.loads(text), series)
+text, series = encode(result)
+result = decode(Result, json.loads(text), series)
 
-A result is a frozen dataclass of plain values, tuples, further dataclasses and arrays. Arrays of at most 64 numbers
-stand in the JSON; longer ones become series, and the JSON says which. Infinite and undefined numbers become null.
-Fields marked `metadata=NOT_STORED` (samples that are written as logs, say) are left out and come back as None. The fields of one
-marked `metadata=FLAT` stand beside the others; what is None adds nothing.
+A result is a frozen dataclass of plain values, tuples, further dataclasses and arrays. Short arrays
+are part of the JSON; longer ones become series, and the JSON says which. Infinite and undefined
+numbers become null. Fields marked `metadata=NOT_STORED` are left out and come back as None. The
+fields of one marked `metadata=FLAT` are beside the others; what is None adds nothing.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import json
 import math
+import re
 import types
 import typing
+import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
-from pipelines.errors import InputRejected
-from pipelines.io.chunks import store
-from pipelines.io.experiment import Array
+from pipelines.errors import InputRejected, UsageError
+from pipelines.io.config import FORMAT as LIMITS
+from pipelines.io.hdf5 import read_series, write_series
+from pipelines.io.output import PROVENANCE, hash_file
+from pipelines.io.sandbox import Answer, guarded, read_small_text, regular_file
+from pipelines.io.schema import DRAFT
 
-__all__ = ["FLAT", "NOT_STORED", "SCHEMA_VERSION", "decode", "encode", "headed", "json_text", "read_foreign_series", "read_series",
-           "refuse_earlier", "stored_result", "write_series"]
+__all__ = [
+    "FLAT",
+    "NOT_STORED",
+    "SCHEMA_VERSION",
+    "StoredResult",
+    "decode",
+    "encode",
+    "headed",
+    "json_text",
+    "listed_outputs",
+    "read_any_result",
+    "read_foreign_series",
+    "read_result",
+    "read_series",
+    "result_schema",
+    "stored_result",
+    "words_of",
+    "write_series",
+]
 
-NOT_STORED: Final[Mapping[str, object]] = {"stored": False}
-FLAT: Final[Mapping[str, object]] = {"flat": True}
-SCHEMA_VERSION: Final = 2  # of result.json
-_INLINE = 64
-_CHUNK = 65536  # numbers
-_SERIES = "$series"
-
+Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 
+NOT_STORED: Mapping[str, object] = {"stored": False}
+FLAT: Mapping[str, object] = {"flat": True}
+SCHEMA_VERSION = 2  # numerics: of result.json
+_SERIES = "$series"
+_AGAIN = "run the command again"
 
-def encode(result: Any) -> tuple[dict[str, Any], dict[str, Array]]:
-    """`result` as a JSON object and the series that are too long for it."""
+
+def _stored_fields(kind: Any) -> list[Any]:
+    return [one for one in dataclasses.fields(kind) if one.metadata.get("stored", True)]
+
+
+def encode(result: Any) -> tuple[Any, dict[str, Array]]:
+    """Return `result` as a JSON object, and the series that are too long for it."""
     series: dict[str, Array] = {}
     return _encode(result, "", series), series
 
 
-def json_text(value: Any) -> str:
-    """JSON as every file of rrrid has it: sorted keys, two blanks, null for infinite and undefined. Bytes of a path that are no
-    text (C07) become question marks."""
-    text = json.dumps(value, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    return text.encode("utf-8", "replace").decode("utf-8")
-
-
-def headed(command: str, object_: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the object of a result.json: the command and the version of the schema before what was found."""
-    return {"command": command, "schema_version": SCHEMA_VERSION, **object_}
-
-
-def refuse_earlier(object_: Mapping[str, Any], file: Path) -> None:
-    """Refuse a result.json of an earlier schema, whose names have other meanings.
-
-    Raises:
-        InputRejected: F17.
-    """
-    version = object_.get("schema_version", 1)
-    if not isinstance(version, int) or version < SCHEMA_VERSION:
-        raise InputRejected("F17", "written by an earlier rrrid", where=file, remedy="run the command again")
-
-
-def stored_result(path: Path, command: str) -> Mapping[str, Any] | None:
-    """The object of the result.json of `command`, named itself or in the folder named; None where there is none.
-
-    Raises:
-        InputRejected: F17, it was written by an earlier rrrid.
-    """
-    file = path / "result.json" if path.is_dir() else path
-    if file.name != "result.json" or not file.is_file():
-        return None
-    try:
-        found = json.loads(file.read_text(encoding="utf-8"))
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(found, dict) or found.get("command") != command:
-        return None
-    refuse_earlier(found, file)
-    return found
-
-
 def _encode(value: Any, path: str, series: dict[str, Array]) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        stored = [field for field in dataclasses.fields(value) if field.metadata.get("stored", True)]
-        flat = [getattr(value, field.name) for field in stored if field.metadata.get("flat")]
-        beside = [_encode(one, path, series) for one in flat if one is not None]
-        return {key: item for one in beside for key, item in one.items()} | {
-            field.name: _encode(getattr(value, field.name), f"{path}/{field.name}", series)
-            for field in stored if not field.metadata.get("flat")}
+        found: dict[str, Any] = {}
+        for field in _stored_fields(value):
+            own, flat = getattr(value, field.name), field.metadata.get("flat")
+            if not flat:
+                found[field.name] = _encode(own, f"{path}/{field.name}", series)
+            elif own is not None:
+                found |= _encode(own, path, series)
+        return found
     if isinstance(value, Mapping):
         return {str(key): _encode(item, f"{path}/{key}", series) for key, item in value.items()}
     if isinstance(value, np.ndarray):
-        if value.size > _INLINE:
+        if value.size > LIMITS.inline:
             series[path] = np.asarray(value, dtype=np.float64)
             return {_SERIES: path}
         return _encode(value.tolist(), path, series)
@@ -111,92 +100,282 @@ def _encode(value: Any, path: str, series: dict[str, Array]) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
+def json_text(value: Any) -> str:
+    """Return JSON as every file of rrrid has it: sorted keys, two blanks.
+
+    Bytes of a path that are no text (C07) become question marks.
+    """
+    text = json.dumps(value, sort_keys=True, indent=2, ensure_ascii=False, allow_nan=False)
+    return f"{text}\n".encode("utf-8", "replace").decode("utf-8")
+
+
+def headed(command: str, found: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the object of a result.json: command and schema version before what was found."""
+    return {"command": command, "schema_version": SCHEMA_VERSION, **found}
+
+
 def decode(kind: type[T], value: Any, series: Mapping[str, Array]) -> T:
-    """The result of type `kind` that `encode` made `value` and `series` of."""
+    """Return the result of type `kind` that `encode` made `value` and `series` of."""
     return typing.cast(T, _decode(kind, value, series))
 
 
 def _decode(kind: Any, value: Any, series: Mapping[str, Array]) -> Any:
     origin, arguments = typing.get_origin(kind), typing.get_args(kind)
-    if origin in (typing.Union, types.UnionType):
-        real = [a for a in arguments if a is not type(None)]
-        return None if value is None else _decode(real[0], value, series) if len(real) == 1 else value
     if isinstance(value, dict) and _SERIES in value:
         return series[value[_SERIES]]
+    if origin in (typing.Union, types.UnionType):
+        real = [one for one in arguments if one is not type(None)]
+        return value if value is None or len(real) > 1 else _decode(real[0], value, series)
     if origin is np.ndarray:
-        return np.array([math.nan if x is None else x for x in value] if value is not None else math.nan, dtype=np.float64)
+        numbers = math.nan if value is None else [math.nan if x is None else x for x in value]
+        return np.array(numbers, dtype=np.float64)
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
-        hints = typing.get_type_hints(kind)
-        return kind(**{field.name: _decode(hints[field.name], value[field.name], series)
-                       if field.metadata.get("stored", True) else None
-                       for field in dataclasses.fields(kind) if field.metadata.get("stored", True) is False or field.name in value})
+        hints, values = typing.get_type_hints(kind), dict[str, Any]()
+        for field in dataclasses.fields(kind):
+            if not field.metadata.get("stored", True):
+                values[field.name] = None
+            elif field.name in value:
+                values[field.name] = _decode(hints[field.name], value[field.name], series)
+        return kind(**values)
     if origin is tuple:
-        if len(arguments) == 2 and arguments[1] is Ellipsis:
-            return tuple(_decode(arguments[0], item, series) for item in value)
-        return tuple(_decode(a, item, series) for a, item in zip(arguments, value, strict=True))
-    if origin in (dict, Mapping) or (isinstance(origin, type) and issubclass(origin, Mapping)):
+        kinds = arguments if arguments[1:] != (Ellipsis,) else arguments[:1] * len(value)
+        items = zip(kinds, value, strict=True)
+        return tuple(_decode(own, item, series) for own, item in items)
+    if isinstance(origin, type) and issubclass(origin, Mapping):
         return {key: _decode(arguments[1], item, series) for key, item in value.items()}
-    if kind is float and value is None:
-        return math.nan
-    return float(value) if kind is float else value
-
-
-def write_series(path: Path, series: Mapping[str, Array]) -> None:
-    """The series of a result as HDF5, checksummed, each under the place where the JSON names it."""
-    import h5py
-
-    with h5py.File(path, "w", libver=("v110", "v110")) as file:
-        file.attrs["format"] = "rrrid-result"
-        for name, values in series.items():
-            rows = max(1, _CHUNK * len(values) // max(values.size, 1))
-            store(file, name, values, (min(rows, len(values)), *values.shape[1:]))
-
-
-def read_series(path: Path) -> dict[str, Array]:
-    """What `write_series` wrote, of a file whose bytes are known to be those."""
-    import h5py
-
-    found: dict[str, Array] = {}
-    with h5py.File(path, "r") as file:
-        file.visititems(lambda name, item: found.update({f"/{name}": item[()]}) if isinstance(item, h5py.Dataset) else None)
-    return found
+    if kind is float:
+        return math.nan if value is None else float(value)
+    return value
 
 
 def read_foreign_series(path: Path) -> dict[str, Array]:
-    """The same of a file that may come from anywhere: in a guarded child, and only numbers that lie in the file itself.
+    """Return the series in a file that may come from anywhere, read in a guarded child."""
+    import h5py  # noqa: F401
+
+    return dict(guarded(lambda: Answer({}, read_series(path)), path).arrays)
+
+
+@dataclass(frozen=True)
+class StoredResult:
+    """A result: its file, the command that wrote it ("model" of a model file), its JSON object."""
+
+    path: Path
+    command: str
+    object: dict[str, Any]
+    within: str = ""  # the folder of a stage, below that of the run whose result.json has it
+
+    @property
+    def folder(self) -> Path:
+        """Return the folder where the command has left it."""
+        return self.path.parent / self.within
+
+    @property
+    def series(self) -> Path:
+        """Return the file of its long series, if it has any."""
+        return self.path.parent / "result.h5"
+
+
+def read_result(path: Path) -> StoredResult:
+    """Return the result in `path`: an output folder, its result.json, or a model.json.
 
     Raises:
-        InputRejected: F02-F04, damaged; X02, X03, X05, S12, it leads elsewhere or holds something else.
+        UsageError: C04, there is none.
+        InputRejected: F05, it is not what provenance.json says; F02, it is damaged; S19, it is no
+            result of rrrid; F17, it is of an earlier version.
     """
-    import h5py
+    file = path / "result.json" if path.is_dir() else path
+    if path.is_dir() and not file.is_file():
+        remedy = "name the folder that a command has left with --out"
+        raise UsageError("C04", "no result.json there", where=path, remedy=remedy)
+    regular_file(file, what="a result.json, or the folder it is in")
+    if listed_outputs(file.parent).get(file.name) not in (None, hash_file(file)):
+        words = "sha256 differs from provenance.json: it was changed since it was written"
+        raise InputRejected("F05", words, where=file, remedy=_AGAIN)
+    try:
+        text = read_small_text(file, LIMITS.result, what="a result.json")
+        found = json.loads(text, parse_int=_whole_number)
+    except (ValueError, RecursionError):
+        words = "not complete JSON, or with numbers that no float holds"
+        raise InputRejected("F02", words, where=file, remedy=_AGAIN) from None
+    if isinstance(found, dict) and found.get("format") == "rrrid-model":
+        return StoredResult(file, "model", found)
+    if not isinstance(found, dict) or not isinstance(found.get("command"), str):
+        remedy = "name a result.json, or the folder it is in"
+        raise InputRejected("S19", "not a result of rrrid", where=file, remedy=remedy)
+    version = found.get("schema_version", 1)
+    if not isinstance(version, int) or version < SCHEMA_VERSION:
+        words = "written by an earlier rrrid"
+        raise InputRejected("F17", words, where=file, remedy=_AGAIN)
+    return StoredResult(file, found["command"], found)
 
-    from pipelines.io.guard import Answer, guarded
-    from pipelines.io.hdf5 import explain
 
-    def work() -> Answer:
+def _whole_number(digits: str) -> int:
+    if len(digits) > LIMITS.digits:
+        raise ValueError
+    return int(digits)
+
+
+def read_any_result(path: Path) -> StoredResult:
+    """Return the result in `path`, as `read_result`, or of a stage within the result of a run.
+
+    The folder of a stage need not be there: one that writes no files has none.
+
+    Raises:
+        UsageError: C04, there is none, or the run has passed the stage over.
+        InputRejected: as `read_result`.
+    """
+    run = None
+    if not path.is_file() and not (path / "result.json").is_file():
+        run = stored_result(path.parent, "run")
+    for stage in (run or {}).get("stages") or ():
+        if stage["name"] == path.name:
+            if stage["result"] is None:
+                words = f"the run has no result of {path.name}: it was passed over, or refused"
+                raise UsageError("C04", words, where=path, remedy="its report says why")
+            found = {"command": path.name, **stage["result"]}
+            return StoredResult(path.parent / "result.json", path.name, found, path.name)
+    return read_result(path)
+
+
+def stored_result(path: Path, command: str) -> dict[str, Any] | None:
+    """Return the object of the result.json of `command` in `path`; None where there is none.
+
+    Raises:
+        InputRejected: F17, it was written by an earlier rrrid.
+    """
+    file = path / "result.json" if path.is_dir() else path
+    if file.name != "result.json" or not file.is_file():
+        return None
+    try:
+        found = read_result(file)
+    except InputRejected as problem:
+        if problem.code == "RRID-F17":
+            raise
+        return None  # of another program
+    return found.object if found.command == command else None
+
+
+def listed_outputs(folder: Path) -> dict[str, str]:
+    """Map files to their SHA-256, as the provenance.json in `folder` has them; empty for none."""
+    try:
+        outputs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["outputs"]
+        return {str(name): str(value) for name, value in outputs.items()}
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        return {}
+
+
+def result_schema(kind: type[Any], command: str) -> dict[str, Any]:
+    """Return the JSON Schema of the result.json of `command`, whose result is a `kind`.
+
+    Its descriptions are the comments beside the fields, or the names of the fields.
+    """
+    from pydantic import Field
+
+    about = Field(description="the command that has left this")
+    version = Field(description="version of the names in this file")
+    head = {
+        "command": (typing.Literal[command], about),
+        "schema_version": (typing.Literal[SCHEMA_VERSION], version),
+    }
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of fields called as methods of a model
+        schema: dict[str, Any] = _Models().of(kind, head).model_json_schema()
+    return {"$schema": DRAFT, **schema, "title": f"result.json of rrrid {command}"}
+
+
+class _Models:
+    """Pydantic models of dataclasses, as `encode` writes them."""
+
+    def __init__(self) -> None:
+        from pydantic import BaseModel, ConfigDict, Field, RootModel
+
+        class Strict(BaseModel):
+            model_config = ConfigDict(extra="forbid")
+
+        class Series(Strict):
+            """The place of a long series in result.h5."""
+
+            place: str = Field(alias="$series", description="its place")
+
+        class Numbers(RootModel[float | None | list["Numbers"]]):
+            """Numbers; null: infinite or undefined."""
+
+        Numbers.model_rebuild(_types_namespace={"Numbers": Numbers})
+        self.strict, self.array = Strict, Numbers | Series
+        self.found: dict[type[Any], Any] = {}
+
+    def of(self, kind: type[Any], head: Mapping[str, Any]) -> Any:
+        """Return the model of a dataclass with the fields `head` before its own."""
+        from pydantic import create_model
+
+        fields = dict(head) | self._fields(kind)
+        doc = " ".join((kind.__doc__ or "").strip().split("\n\n")[0].split())
+        made = doc.startswith(f"{kind.__name__}(")  # by dataclass
+        options: dict[str, Any] = {"__base__": self.strict, "__doc__": None if made else doc}
+        return create_model(kind.__name__, __module__=kind.__module__, **options, **fields)
+
+    def _fields(self, kind: type[Any]) -> dict[str, Any]:
+        from pydantic import Field
+
+        hints, words = typing.get_type_hints(kind), words_of(kind)
+        fields: dict[str, Any] = {}
+        for field in _stored_fields(kind):
+            hint = hints[field.name]
+            if not field.metadata.get("flat"):
+                about = Field(description=words[field.name])
+                fields[field.name] = (self._translated(hint), about)
+                continue
+            parts = typing.get_args(hint) or (hint,)
+            inner = next(one for one in parts if dataclasses.is_dataclass(one))
+            for name, (own, about) in self._fields(typing.cast(type[Any], inner)).items():
+                optional = Field(default=None, description=about.description)
+                fields.setdefault(name, (own, optional))
+        return fields
+
+    def _translated(self, hint: Any) -> Any:
+        """Return a type as JSON has it: arrays as numbers, dataclasses as models."""
+        origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+        if origin is np.ndarray or hint is np.ndarray:
+            return self.array
+        if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+            if hint not in self.found:
+                self.found[hint] = self.of(hint, {})
+            return self.found[hint]
+        if origin is typing.Literal or origin is None:
+            return {float: float | None, Path: str}.get(hint, hint)
+        if origin in (typing.Union, types.UnionType):
+            return typing.Union[tuple(map(self._translated, arguments))]  # noqa: UP007
+        inner = tuple(one if one is Ellipsis else self._translated(one) for one in arguments)
+        if isinstance(origin, type) and issubclass(origin, Mapping):
+            return dict.__class_getitem__(inner)
+        return origin[inner]
+
+
+def words_of(kind: type[Any]) -> dict[str, str]:
+    """Map every field of a dataclass to the comment beside or above it, else to its name."""
+    found: dict[str, str] = {}
+    for base in reversed(kind.__mro__):
+        if not dataclasses.is_dataclass(base):
+            continue
         try:
-            with h5py.File(path, "r", locking=False) as file:
-                _refuse_what_leads_elsewhere(file, path)
-            return Answer({}, read_series(path))
-        except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as problem:
-            raise explain(problem, path) from None
-
-    return dict(guarded(work, path).arrays)
-
-
-def _refuse_what_leads_elsewhere(file: Any, path: Path) -> None:
-    """Every data set, before one byte of it is read."""
-    import h5py
-
-    from pipelines.io.hdf5 import foreign_storage, refuse_oversize
-
-    found: list[Any] = []
-    file.visititems(lambda _, item: found.append(item) if isinstance(item, h5py.Dataset) else None)
-    for dataset in found:
-        where = f"{path}, {dataset.name}"
-        if foreign := foreign_storage(dataset):
-            raise InputRejected("X02" if "raw" in foreign else "X03", f"{foreign} refused", where=where,
-                                remedy="run the command again")
-        if dataset.dtype != np.float64:
-            raise InputRejected("S12", f"type {dataset.dtype}, no series of a result", where=where, remedy="run the command again")
-    refuse_oversize(8 * sum(math.prod(dataset.shape) for dataset in found), path.stat().st_size, "X05", str(path))
+            lines = inspect.getsource(base).splitlines()
+        except (OSError, TypeError):
+            lines = []
+        above: list[str] = []
+        name = ""
+        for line in lines:
+            code, _, comment = line.partition("# ")
+            if line.strip().startswith("# "):
+                above.append(comment)
+                continue
+            if match := re.match(r"    (\w+) ?: ", line):
+                name = match[1]
+                found[name] = " ".join(above)
+            elif not line.startswith("     ") and line.strip() != ")":
+                name = ""
+            if name and code and comment:
+                found[name] = " ".join([found[name], comment]).strip()
+            above = []
+    fields = {field.name for field in dataclasses.fields(kind)}
+    spoken = {name: name.replace("_", " ") for name in fields}
+    return {name: ": ".join(filter(None, (spoken[name], found.get(name)))) for name in fields}

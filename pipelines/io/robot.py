@@ -1,90 +1,115 @@
-"""Describe a robot: kinematics, limits, known links and drive, as TOML text that travels inside every log.
+"""Describe a robot: kinematics, limits, known links and drive, as TOML text inside every log.
 
-    robot = parse_robot(text)      from the text of a log
-    text  = format_robot(robot)    the canonical text
+robot = parse_robot(text)      from the text of a log
+text  = format_robot(robot)    the canonical text
 
 Files, which may name a URDF, are read by `pipelines.io.robot_files`.
-
-The validator is written out here rather than left to pydantic: it runs for every log that is opened, and importing
-pydantic alone costs more than reading a ten-second log.
 """
 
 from __future__ import annotations
 
+import json
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import NoReturn
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
-from pipelines.io.toml_text import TomlError, parse_toml
+from pipelines.io.config import URDF
+from pipelines.io.sandbox import TomlError, parse_toml
+from pipelines.io.schema import STRICT, adapter, described
 
-__all__ = ["Drive", "Joint", "LinkParameters", "RobotDescription", "format_robot", "parse_robot"]
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
+__all__ = [
+    "Drive",
+    "Joint",
+    "LinkParameters",
+    "RobotDescription",
+    "format_robot",
+    "inconsistency",
+    "inconsistency_of_link",
+    "parse_robot",
+    "shipped",
+    "shipped_names",
+]
+
+Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
+Six = tuple[float, float, float, float, float, float]
 
-_ROBOT_KEYS = ("name", "gravity", "kinematics", "joint", "drive")
-_KINEMATICS_KEYS = ("convention", "urdf", "urdf_text", "tip_link", "tool")
-_JOINT_KEYS = ("name", "type", "a", "alpha", "d", "offset", "position", "velocity", "acceleration", "torque",
-               "encoder_resolution", "link")
 _GEOMETRY = ("a", "alpha", "d", "offset")
-_LEAST = 'write at least: [[joint]] name = "elbow", type = "revolute", a = 0.4, alpha = 0.0, d = 0.0, offset = 0.0, a line each'
-_LEAST_URDF = 'write at least: [[joint]] name = "elbow", type = "revolute", a line each'
-_LONGEST = 100.0  # [m] no arm has such a link
-_LINK_KEYS = ("mass", "com", "inertia")
-_DRIVE_KEYS = ("transmission", "torque_constant")
-_CONVENTIONS = ("dh", "mdh", "urdf")
+_LONGEST = 100.0  # numerics: [m] no arm has such a link
+_CORRECT = "correct the robot description"
+_TEXT = r"^[^\x00]*[^\x00\s][^\x00]*$"
+
+# In a wheel the files lie inside the package; in a checkout in sample_logs/.
+_PACKAGE = Path(__file__).resolve().parents[1]
+_ROOTS = (_PACKAGE / "shipped", _PACKAGE.parent / "sample_logs")
+_ENDINGS = {"robots": ".toml", "recipes": ".toml", "models": ".json"}
 
 
 @dataclass(frozen=True)
 class LinkParameters:
-    """What is known of one link, in the link's own frame (DH: the distal frame; modified DH and URDF: the joint's).
+    """What is known of one link, in its own frame (DH: the distal one; MDH, URDF: the joint's).
 
-    `inertia` holds Ixx Iyy Izz Ixy Ixz Iyz about the frame's *origin*, products with positive sign, Ixy = +∫xy dm:
-    the convention of Kostić et al. 2004, eq. (7), and of `verified.md`, section 0.
+    `inertia` holds Ixx Iyy Izz Ixy Ixz Iyz about the frame's *origin*, products with positive
+    sign, Ixy = +∫xy dm: the convention of Kostić et al. 2004, eq. (7).
     """
 
-    mass: float  # [kg]
-    com: Vector  # [m]
-    inertia: tuple[float, float, float, float, float, float]  # [kg m^2]
+    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
+
+    mass: float = described("[kg]", ge=0.0)
+    com: Vector = described("[m] centre of mass")
+    inertia: Six = described("[kg m^2] Ixx Iyy Izz Ixy Ixz Iyz")
 
 
 @dataclass(frozen=True)
 class Joint:
-    """One moving joint. Prismatic joints use m, m/s, m/s^2 and N where revolute ones use rad, rad/s, rad/s^2, N m."""
+    """One moving joint. Prismatic joints use m and N instead of rad and N m."""
 
-    name: str
-    type: str = "revolute"  # or "prismatic"
-    a: float = 0.0  # [m]
-    alpha: float = 0.0  # [rad]
-    d: float = 0.0  # [m]
-    offset: float = 0.0  # [rad] q_model = q_log + offset
-    position: tuple[float, float] = (-math.inf, math.inf)  # [rad]
-    velocity: float = math.inf  # [rad/s]
-    acceleration: float = math.inf  # [rad/s^2]
-    torque: float = math.inf  # [N m]
-    encoder_resolution: float | None = None  # [rad]
-    link: LinkParameters | None = None
+    __pydantic_config__: ClassVar[dict[str, object]] = {"extra": "forbid", "strict": True}
+
+    name: str = described("name of the joint", pattern=_TEXT)
+    type: Literal["revolute", "prismatic"] = described("kind of joint", "revolute")
+    a: float = described("[m]", 0.0, allow_inf_nan=False)
+    alpha: float = described("[rad]", 0.0, allow_inf_nan=False)
+    d: float = described("[m]", 0.0, allow_inf_nan=False)
+    offset: float = described("[rad] q_model = q_log + offset", 0.0, allow_inf_nan=False)
+    position: tuple[float, float] = described("[rad] range", (-math.inf, math.inf))
+    velocity: float = described("[rad/s] limit", math.inf, gt=0.0)
+    acceleration: float = described("[rad/s^2] limit", math.inf, gt=0.0)
+    torque: float = described("[N m] limit", math.inf, gt=0.0)
+    encoder_resolution: float | None = described("[rad]", None, ge=0.0, allow_inf_nan=False)
+    link: LinkParameters | None = described("what is known of the link", None)
 
     @property
     def revolute(self) -> bool:
+        """Return whether the joint turns."""
         return self.type == "revolute"
 
 
 @dataclass(frozen=True)
 class Drive:
-    """The motor side, kept for effects that live there; never applied on reading, for a log is joint side already.
+    """The motor side, kept for effects that live there; never applied on reading.
 
     q_motor = N q_joint, tau_joint = Nᵀ tau_motor with N = `transmission`.
     """
 
-    transmission: tuple[tuple[float, ...], ...] | None = None  # (n, n)
-    torque_constant: tuple[float, ...] | None = None  # (n,) [N m/A], motor side
+    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
+
+    transmission: tuple[tuple[float, ...], ...] | None = described("(n, n)", None)
+    torque_constant: tuple[float, ...] | None = described("(n,) [N m/A], motor side", None)
 
 
 @dataclass(frozen=True)
 class RobotDescription:
-    """A robot as a log describes it. Frozen and hashable, so that geometry made from it can be cached."""
+    """A robot as a log describes it. Hashable, so that geometry made from it can be kept."""
 
     name: str
     gravity: Vector  # [m/s^2] in the base frame
@@ -94,71 +119,43 @@ class RobotDescription:
     urdf_text: str | None = None  # kinematics of a URDF, meshes left out
     tip_link: str | None = None  # last link, where a URDF branches
     drive: Drive | None = None
-    checks: tuple[Check, ...] = field(default=(), compare=False)  # what its file was warned of; no part of the robot
+    # what its file was warned of; no part of the robot
+    checks: tuple[Check, ...] = field(default=(), compare=False)
 
     @property
     def n_joints(self) -> int:
+        """Return the number of joints."""
         return len(self.joints)
 
     @property
     def revolute(self) -> tuple[bool, ...]:
+        """Return of each joint whether it turns."""
         return tuple(joint.revolute for joint in self.joints)
 
 
-class _Reader:
-    """Take typed values out of a TOML table; every complaint names its place."""
+@dataclass(frozen=True)
+class _Kinematics:
+    """The table [kinematics]."""
 
-    def __init__(self, table: object, path: str, fail: type[RrridError], where: str) -> None:
-        self.path, self.fail, self.where = path, fail, where
-        if not isinstance(table, Mapping):
-            self.wrong(path or "the robot description", "must be a table")
-        self.table: Mapping[str, object] = table
+    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
-    def wrong(self, key: str, what: str, code: str = "C02", remedy: str = "correct the robot description") -> NoReturn:
-        place = f"{self.path}.{key}" if self.path and key != self.path else key
-        raise self.fail(code, f"robot description, {place}: {what}", where=self.where, remedy=remedy)
+    convention: Literal["dh", "mdh", "urdf"] = described("meaning of the joints' numbers")
+    tool: Vector = described("[m] tip in the last frame", (0.0, 0.0, 0.0))
+    urdf_text: str | None = described("kinematics of a URDF", None, pattern=_TEXT)
+    tip_link: str | None = described("last link of the arm", None, pattern=_TEXT)
 
-    def only(self, known: Iterable[str]) -> None:
-        for key in self.table:
-            if key not in known:
-                self.wrong(key, f"is not a key of the format{did_you_mean(key, known)}", code="C01")
 
-    def text(self, key: str, default: str | None = None, among: tuple[str, ...] | None = None) -> str:
-        value = self.table.get(key, default)
-        if not isinstance(value, str) or not value.strip():
-            self.wrong(key, "must be a text that is not empty" if key in self.table else "is missing")
-        if "\0" in str(value):
-            self.wrong(key, "holds a NUL character")
-        if among is not None and value not in among:
-            self.wrong(key, f"is '{value}', must be one of {', '.join(among)}")
-        return str(value)
+@dataclass(frozen=True)
+class _Table:
+    """The TOML text of a robot."""
 
-    def number(self, key: str, default: float | None = None, low: float = -math.inf, infinite: bool = False) -> float:
-        if key not in self.table and default is not None:
-            return default
-        value = self.table.get(key)
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            self.wrong(key, "must be a number" if key in self.table else "is missing")
-        try:
-            number = float(value)
-        except OverflowError:  # an integer of hundreds of digits
-            number = math.inf
-            infinite = False
-        if math.isnan(number) or (math.isinf(number) and not infinite) or number < low:
-            self.wrong(key, f"is {number}, must be {'' if infinite else 'finite and '}at least {low}")
-        return number
+    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
-    def numbers(self, key: str, size: int, infinite: bool = False) -> tuple[float, ...]:
-        value = self.table.get(key)
-        entries: list[object] = value if isinstance(value, list) else []
-        if len(entries) != size:
-            self.wrong(key, f"must be a list of {size} numbers")
-        inner = _Reader({f"{key}[{i}]": entry for i, entry in enumerate(entries)}, self.path, self.fail, self.where)
-        return tuple(inner.number(k, infinite=infinite) for k in inner.table)
-
-    def vector(self, key: str) -> Vector:
-        x, y, z = self.numbers(key, 3)
-        return x, y, z
+    name: str = described("name of the robot", pattern=_TEXT)
+    gravity: Vector = described("[m/s^2] in the base frame")
+    kinematics: _Kinematics = described("how the joints follow each other")
+    joint: tuple[Joint, ...] = described("the moving joints", min_length=1)
+    drive: Drive | None = described("the motor side", None)
 
 
 def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> RobotDescription:
@@ -168,96 +165,115 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
         UsageError: the text is not a robot description (exit 2).
         InputRejected: the same, where the text came out of a log (`inside_log`, exit 3).
     """
+    from pydantic import ValidationError
+
     fail: type[RrridError] = InputRejected if inside_log else UsageError
     try:
         table = parse_toml(text)
+        _refuse_incomplete(table)
+        text = json.dumps(table, default=str)  # TOML has dates
+        found: _Table = adapter(_Table).validate_json(text)
+        _refuse_impossible(found)
     except TomlError as problem:
-        raise fail("C01", f"the robot description is not valid TOML: {problem}", where=where,
-                   remedy="correct it at that place") from None
-    top = _Reader(table, "", fail, str(where))
-    top.only(_ROBOT_KEYS)
-    kinematics = _Reader(table.get("kinematics"), "kinematics", fail, str(where))
-    kinematics.only(_KINEMATICS_KEYS)
-    convention = kinematics.text("convention", among=_CONVENTIONS)
-    if "urdf" in kinematics.table:
-        kinematics.wrong("urdf", "names a file, which a text on its own cannot reach",
-                         remedy="load the description from its file, so that the URDF can be embedded")
-    if convention == "urdf" and "urdf_text" not in kinematics.table:
-        kinematics.wrong("urdf_text", "is missing with convention 'urdf'")
-    joints = table.get("joint")
-    if not isinstance(joints, list) or not joints:
-        top.wrong("joint", "there must be at least one [[joint]]")
+        words = f"the robot description is not valid TOML: {problem}"
+        remedy = "correct it at that place"
+        raise fail("C01", words, where=where, remedy=remedy) from None
+    except ValidationError as problem:
+        code, words = _fault_in_words(problem.errors(include_url=False)[0])
+        words = f"robot description, {words}"
+        raise fail(code, words, where=where, remedy=_CORRECT) from None
+    except _Wrong as wrong:
+        words, remedy = f"robot description, {wrong.words}", wrong.remedy
+        raise fail("C02", words, where=where, remedy=remedy) from None
+    own = found.kinematics
+    urdf_text = own.urdf_text if own.convention == "urdf" else None
     return RobotDescription(
-        name=top.text("name"),
-        gravity=top.vector("gravity"),
-        convention=convention,
-        joints=tuple(_joint(_Reader(j, f"joint[{i + 1}]", fail, str(where)), convention)
-                     for i, j in enumerate(joints)),
-        tool=kinematics.vector("tool") if "tool" in kinematics.table else (0.0, 0.0, 0.0),
-        urdf_text=kinematics.text("urdf_text") if convention == "urdf" else None,
-        tip_link=kinematics.text("tip_link") if "tip_link" in kinematics.table else None,
-        drive=_drive(table.get("drive"), len(joints), fail, str(where)),
+        found.name,
+        found.gravity,
+        own.convention,
+        found.joint,
+        own.tool,
+        urdf_text,
+        own.tip_link,
+        found.drive,
     )
 
 
-def _joint(read: _Reader, convention: str) -> Joint:
-    read.only(_JOINT_KEYS)
-    geometric = _geometric(read, convention)
-    low, high = read.numbers("position", 2, infinite=True) if "position" in read.table else (-math.inf, math.inf)
-    if low >= high:
-        read.wrong("position", f"its lower end {low} is not below its upper end {high}")
-    limits = {key: read.number(key, default=math.inf, low=0.0, infinite=True)
-              for key in ("velocity", "acceleration", "torque")}
-    for key, value in limits.items():
-        if value == 0.0:
-            read.wrong(key, "is 0: the joint could never move")
-    resolution = read.number("encoder_resolution", low=0.0) if "encoder_resolution" in read.table else None
-    link = _link(_Reader(read.table["link"], f"{read.path}.link", read.fail, read.where)) if "link" in read.table else None
-    return Joint(read.text("name"), read.text("type", among=("revolute", "prismatic")), position=(low, high),
-                 encoder_resolution=resolution, link=link, **geometric, **limits)
+class _Wrong(Exception):
+    """What pydantic does not see."""
+
+    def __init__(self, words: str, remedy: str = _CORRECT) -> None:
+        super().__init__(words)
+        self.words, self.remedy = words, remedy
 
 
-def _geometric(read: _Reader, convention: str) -> dict[str, float]:
-    """The numbers that place the joint; what is missing is named at once, and what cannot be in rad or m."""
-    wanted = () if convention == "urdf" else _GEOMETRY
-    missing = [key for key in ("name", "type", *wanted) if key not in read.table]
-    if missing:
-        read.wrong(read.path, f"{', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing",
-                   remedy=_LEAST if wanted else _LEAST_URDF)
-    found = {key: read.number(key) for key in _GEOMETRY if key in wanted or (key == "offset" and key in read.table)}
-    if abs(found.get("alpha", 0.0)) > 2 * math.pi:
-        read.wrong("alpha", f"is {found['alpha']:g} rad: looks like degrees", remedy="write it in rad")
-    for key in ("a", "d"):
-        if abs(found.get(key, 0.0)) > _LONGEST:
-            read.wrong(key, f"is {found[key]:g} m: looks like mm", remedy="write it in m")
-    return found
+def _refuse_incomplete(table: Mapping[str, Any]) -> None:
+    """Name at once all that a joint lacks, and a URDF that only its file can reach."""
+    kinematics, joints = table.get("kinematics"), table.get("joint")
+    if not isinstance(kinematics, dict) or not isinstance(joints, list):
+        return
+    urdf = kinematics.get("convention") == "urdf"
+    if "urdf" in kinematics:
+        words = "kinematics.urdf: names a file, which a text on its own cannot reach"
+        remedy = "load the description from its file, so that the URDF can be embedded"
+        raise _Wrong(words, remedy)
+    if urdf and "urdf_text" not in kinematics:
+        raise _Wrong("kinematics.urdf_text: is missing with convention 'urdf'")
+    wanted = ("name", "type") if urdf else ("name", "type", *_GEOMETRY)
+    for index, joint in enumerate(joints, 1):
+        missing = [key for key in wanted if isinstance(joint, dict) and key not in joint]
+        if missing:
+            words = f"joint[{index}]: {', '.join(missing)} "
+            words += "is missing" if len(missing) == 1 else "are missing"
+            example = {"name": '"elbow"', "type": '"revolute"', "a": "0.4"}
+            least = ", ".join(f"{key} = {example.get(key, '0.0')}" for key in wanted)
+            raise _Wrong(words, f"write at least: [[joint]] {least}, a line each")
 
 
-def _link(read: _Reader) -> LinkParameters:
-    read.only(_LINK_KEYS)
-    xx, yy, zz, xy, xz, yz = read.numbers("inertia", 6)
-    return LinkParameters(read.number("mass", low=0.0), read.vector("com"), (xx, yy, zz, xy, xz, yz))
+def _refuse_impossible(table: _Table) -> None:
+    """Refuse lengths and twists in another unit, empty ranges, and drives of another size."""
+    for index, joint in enumerate(table.joint, 1):
+        place = f"joint[{index}]"
+        if abs(joint.alpha) > 2 * math.pi:
+            words = f"{place}.alpha: is {joint.alpha:g} rad: looks like degrees"
+            raise _Wrong(words, "write it in rad")
+        for key in ("a", "d"):
+            if abs(getattr(joint, key)) > _LONGEST:
+                words = f"{place}.{key}: is {getattr(joint, key):g} m: looks like mm"
+                raise _Wrong(words, "write it in m")
+        low, high = joint.position
+        if not low < high:
+            words = f"{place}.position: its lower end {low} is not below its upper end {high}"
+            raise _Wrong(words)
+    n = len(table.joint)
+    if table.drive is not None:
+        rows = table.drive.transmission or ((0.0,) * n,) * n
+        constants = table.drive.torque_constant or (0.0,) * n
+        if len(rows) != n or any(len(row) != n for row in rows):
+            raise _Wrong(f"drive.transmission: must hold {n} rows of {n} numbers")
+        if len(constants) != n:
+            raise _Wrong(f"drive.torque_constant: must be a list of {n} numbers")
 
 
-def _drive(table: object, n: int, fail: type[RrridError], where: str) -> Drive | None:
-    if table is None:
-        return None
-    read = _Reader(table, "drive", fail, where)
-    read.only(_DRIVE_KEYS)
-    matrix = None
-    if "transmission" in read.table:
-        value = read.table["transmission"]
-        rows: list[object] = value if isinstance(value, list) else []
-        if len(rows) != n:
-            read.wrong("transmission", f"must hold {n} rows of {n} numbers")
-        inner = _Reader({f"transmission[{i}]": row for i, row in enumerate(rows)}, "drive", fail, where)
-        matrix = tuple(inner.numbers(key, n) for key in inner.table)
-    constants = read.numbers("torque_constant", n) if "torque_constant" in read.table else None
-    return Drive(matrix, constants)
+def _fault_in_words(fault: ErrorDetails) -> tuple[str, str]:
+    """Return the code and the words of what pydantic found."""
+    place = ""
+    for part in fault["loc"]:
+        place += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if place else part
+    if fault["type"] == "unexpected_keyword_argument":
+        kinds = (_Table, _Kinematics, Joint, LinkParameters, Drive)
+        known = {one.name for kind in kinds for one in fields(kind)} | {"urdf"}
+        hint = did_you_mean(str(fault["loc"][-1]), known)
+        return "C01", f"{place}: is not a key of the format{hint}"
+    if fault["type"] in ("missing", "missing_argument"):
+        return "C02", f"{place}: is missing"
+    if fault["type"] == "dataclass_type":
+        return "C02", f"{place}: must be a table"
+    return "C02", f"{place}: {fault['msg'].lower()}"
 
 
 def format_robot(robot: RobotDescription) -> str:
-    """The canonical TOML text of `robot`: `parse_robot` gives back an equal description."""
+    """Return the canonical TOML text of `robot`: `parse_robot` gives back an equal description."""
     import tomli_w
 
     kinematics: dict[str, object] = {"convention": robot.convention, "tool": list(robot.tool)}
@@ -265,8 +281,12 @@ def format_robot(robot: RobotDescription) -> str:
         kinematics["tip_link"] = robot.tip_link
     if robot.urdf_text is not None:
         kinematics["urdf_text"] = robot.urdf_text
-    table: dict[str, object] = {"name": robot.name, "gravity": list(robot.gravity), "kinematics": kinematics,
-                                "joint": [_joint_table(j, robot.convention) for j in robot.joints]}
+    table: dict[str, object] = {
+        "name": robot.name,
+        "gravity": list(robot.gravity),
+        "kinematics": kinematics,
+        "joint": [_joint_table(joint, robot.convention) for joint in robot.joints],
+    }
     if robot.drive is not None:
         drive: dict[str, object] = {}
         if robot.drive.transmission is not None:
@@ -284,10 +304,66 @@ def _joint_table(joint: Joint, convention: str) -> dict[str, object]:
     if convention != "urdf" or joint.offset:
         table["offset"] = joint.offset
     table["position"] = list(joint.position)
-    table |= {key: getattr(joint, key) for key in ("velocity", "acceleration", "torque")
-              if math.isfinite(getattr(joint, key))}
+    for key in ("velocity", "acceleration", "torque"):
+        if math.isfinite(limit := getattr(joint, key)):
+            table[key] = limit
     if joint.encoder_resolution is not None:
         table["encoder_resolution"] = joint.encoder_resolution
     if joint.link is not None:
-        table["link"] = {"mass": joint.link.mass, "com": list(joint.link.com), "inertia": list(joint.link.inertia)}
+        link = joint.link
+        table["link"] = {"mass": link.mass, "com": list(link.com), "inertia": list(link.inertia)}
     return table
+
+
+def inconsistency(mass: float, inertia: Array) -> str:
+    """Return why no rigid body has this mass [kg] and inertia (3, 3) [kg m^2]; "" where one has.
+
+    The inertia is about the centre of mass. A body exists where m > 0 and the second moment of its
+    density, Σ = ½ tr(I) 1 - I, has no negative eigenvalue (Wensing, Kim and Slotine 2018,
+    pseudo-inertia): with the principal moments A ≤ B ≤ C, that is A ≥ 0 and C ≤ A + B.
+    """
+    smallest, middle, largest = np.linalg.eigvalsh(0.5 * (inertia + inertia.T))
+    allowed = URDF.rounding * float(np.abs([smallest, middle, largest]).sum())
+    if mass <= 0.0 and largest > 0.0:
+        return "an inertia without mass"
+    if smallest < -allowed:
+        return f"a negative moment of inertia, {smallest:.3g} kg m^2"
+    if largest > smallest + middle + allowed:
+        others = f"above the sum of the two others, {smallest + middle:.3g}"
+        return f"a moment of inertia, {largest:.3g} kg m^2, {others}"
+    return ""
+
+
+def inconsistency_of_link(link: LinkParameters) -> str:
+    """Return the same for a link, whose inertia is about its frame's origin.
+
+    I_c = I_o - m (|c|² 1 - c cᵀ); products of inertia have the sign of +∫xy dm.
+    """
+    xx, yy, zz, xy, xz, yz = link.inertia
+    about_origin = np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
+    com = np.array(link.com)
+    shift = link.mass * (com @ com * np.eye(3) - np.outer(com, com))
+    return inconsistency(link.mass, about_origin - shift)
+
+
+def shipped_names(kind: str) -> list[str]:
+    """Return the names of the shipped "robots", "recipes" or "models", sorted."""
+    return sorted(
+        {path.stem for root in _ROOTS for path in (root / kind).glob(f"*{_ENDINGS[kind]}")}
+    )
+
+
+def shipped(kind: str, name: str) -> Path:
+    """Return the file of the shipped robot, recipe or model `name`.
+
+    Raises:
+        UsageError: C04, nothing of that name is shipped.
+    """
+    known = shipped_names(kind)
+    for root in _ROOTS:
+        path = root / kind / f"{name}{_ENDINGS[kind]}"
+        if name in known and path.is_file():
+            return path
+    words = f"no such file, and no shipped {kind[:-1]} of that name{did_you_mean(name, known)}"
+    remedy = f"shipped {kind}: {', '.join(known) or 'none'}"
+    raise UsageError("C04", words, where=name, remedy=remedy)

@@ -1,146 +1,491 @@
-"""Tell the logs of several robots and days of recording apart, by what they say of themselves and never by where they lie.
+"""Read the logs of a command: opened, in their roles, of one robot and one day of recording.
 
-    for session in apart(logs):     one robot and one day at a time; what was before goes with what came after
+inputs = read_logs(request, settings)     every log among the request's paths
+inputs = of_one_session(inputs)           SeveralSessions, with the list, where there are more
+
+Sessions are told apart by what the logs say of themselves and never by where they lie.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
-from dataclasses import dataclass
+import dataclasses
+from collections import defaultdict
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Final
+from typing import Any
 
-from pipelines.io.files import Opened
+from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean, did_you_mean
+from pipelines.io.files import Opened, find_logs, open_log
+from pipelines.io.output import written_by
+from pipelines.io.robot import RobotDescription
+from pipelines.io.robot_files import load_robot
 
-__all__ = ["Session", "apart", "called", "day_that_judges", "sessions"]
+__all__ = [
+    "Inputs",
+    "Rejected",
+    "Request",
+    "Session",
+    "SeveralSessions",
+    "apart",
+    "called",
+    "check_alike",
+    "of_one_session",
+    "only",
+    "read_by_role",
+    "read_logs",
+    "refuse_mixed",
+]
 
-Key = tuple[str, str, str]
+Key = tuple[str, str, str]  # robot's name, its description, day
 
-_PAUSE: Final = timedelta(hours=3)
-_SESSION: Final = timedelta(hours=12)
-_DATE: Final = len("2026-05-18")
+_PAUSE = timedelta(hours=3)
+_SESSION = timedelta(hours=12)
+
+
+def _silent(words: str) -> None:
+    """Report no progress."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the user asked of any stage: inputs, and the options that every command takes."""
+
+    paths: tuple[Path, ...]
+    out: Path | None = None
+    robot: str | None = None  # description to use instead of the one inside the logs
+    strict: bool = False  # a repair is an error
+    check: bool = False  # a gate that failed, or something found, ends in exit 1
+    force: bool = False  # replace a folder of rrrid's of any command, changed or not
+    no_report: bool = False
+    assume_units: bool = False
+    format: str = "h5"  # of derived logs
+    tell: Callable[[str], None] = field(default=_silent, compare=False)  # progress, in words
+    joints: tuple[int, ...] = ()  # 1-based: the joints of every log, in this order; none: all
+    # role -> paths of logs that have it, whatever they say
+    roles: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    session: str = ""  # the name of the only one to take, of several robots and days
+
+    @property
+    def named(self) -> tuple[Path, ...]:
+        """Return every input, also those that are named for a role."""
+        return (*self.paths, *(path for paths in _by_role(self.roles).values() for path in paths))
+
+
+@dataclass(frozen=True)
+class Rejected:
+    """An input that could not be opened, and why."""
+
+    path: Path
+    error: RrridError
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Opened logs, rejected files, and what a stage's own reader adds as `material`."""
+
+    logs: tuple[Opened, ...] = ()
+    rejected: tuple[Rejected, ...] = ()
+    checks: tuple[Check, ...] = ()
+    sources: tuple[Path, ...] = ()  # every file read, for provenance
+    hashes: Mapping[Path, str] = field(default_factory=dict)  # SHA-256, where the reader has it
+    folders: tuple[Path, ...] = ()  # inputs beside the request's paths: no output goes there
+    robot: RobotDescription | None = None  # --robot
+    material: Any = None
+    label: str = ""  # folder name for the default --out
+    robot_name: str = ""
+    named: frozenset[Path] = frozenset()  # named for a role: they go with every day
 
 
 @dataclass(frozen=True)
 class Session:
     """The logs of one robot and one day."""
 
-    name: str  # unlike that of any other session beside it: "rrr-tue 2026-03-02"
+    name: str  # unlike that of any other session: "rrr-tue 2026-03-02"
     robot: str
     description: str
     logs: tuple[Opened, ...]
-    own: str  # what tells it from others of a robot of that name, for the name of a folder: "2026-03-02"; "" where there are none
+    own: str  # what distinguishes it from others of its robot: "2026-03-02"; "" for the only one
+
+
+class SeveralSessions(UsageError):
+    """C02: the logs are of several robots or days. `names` are those of the sessions."""
+
+    names: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the error as JSON has it."""
+        return {**super().as_dict(), "sessions": [clean(name) for name in self.names]}
+
+
+def _by_role(roles: Mapping[str, Sequence[str]]) -> dict[str, tuple[Path, ...]]:
+    return {
+        role: tuple(Path(path).expanduser().absolute() for path in paths)
+        for role, paths in roles.items()
+        if paths
+    }
+
+
+def read_logs(request: Request, settings: object, *, keep_rejected: bool = False) -> Inputs:
+    """Open every log among the request's paths, and give it the role it was named for.
+
+    A log that is named for a role has it, whatever it says of itself; of the others, those that
+    say they have this role are left out.
+
+    Raises:
+        InputRejected: some of them are rejected, unless `keep_rejected`. The error is the first
+            one's, and names the others.
+        UsageError: C01, no such session; C02, no logs, or one for two roles; C04, no such file.
+    """
+    by_role = _by_role(request.roles)
+    asked = tuple(dict.fromkeys((*request.paths, *(p for own in by_role.values() for p in own))))
+    if not asked:
+        remedy = "name logs, or folders of logs"
+        raise UsageError("C02", "no logs", where="LOGS", remedy=remedy)
+    paths, checks = find_logs(asked)
+    robot = load_robot(request.robot) if request.robot is not None else None
+    logs: list[Opened] = []
+    rejected: list[Rejected] = []
+    for index, path in enumerate(paths, 1):
+        request.tell(f"reading {path.name} ({index} of {len(paths)})")
+        try:
+            units, joints = request.assume_units, request.joints
+            logs.append(open_log(path, assume_units=units, joints=joints, robot=robot))
+        except RrridError as problem:
+            if problem.exit_code != InputRejected.exit_code:
+                raise
+            rejected.append(Rejected(path, problem))
+    if rejected and not keep_rejected:
+        raise _all_of(rejected)
+    names = sorted({opened.log.robot_name for opened in logs})
+    hashes = {opened.path: opened.sha256 for opened in logs}
+    roles = _roles_of(by_role)
+    inputs = Inputs(
+        tuple(_in_role(logs, roles, by_role)),
+        tuple(rejected),
+        (*(robot.checks if robot is not None else ()), *checks),
+        paths,
+        hashes,
+        folders=tuple(path for own in by_role.values() for path in own),
+        robot=robot,
+        label=_label(asked[0].absolute()),
+        robot_name=names[0] if len(names) == 1 else "several" if names else "unknown",
+        named=frozenset(roles),
+    )
+    if not request.session:
+        return inputs
+    found = apart(inputs.logs, inputs.named)
+    session = called(request.session, found)
+    if session is None:
+        known = [one.name for one in found]
+        words = f"no session '{request.session}'{did_you_mean(request.session, known)}"
+        remedy = f"there are: {', '.join(known)}"
+        raise UsageError("C01", words, where="--session", remedy=remedy)
+    return only(inputs, session)
+
+
+def read_by_role(
+    request: Request,
+    settings: object,
+    named: Mapping[str, Sequence[str]],
+    *,
+    keep_rejected: bool = False,
+) -> Inputs:
+    """Open the logs of the request with the roles of `named`: role -> paths."""
+    request = dataclasses.replace(request, roles=named)
+    return read_logs(request, settings, keep_rejected=keep_rejected)
+
+
+def _roles_of(by_role: Mapping[str, tuple[Path, ...]]) -> dict[Path, str]:
+    """Map every file that is named for a role to it."""
+    roles: dict[Path, str] = {}
+    for role, given in by_role.items():
+        for file in find_logs(given)[0]:
+            if roles.setdefault(file, role) != role:
+                words = f"{file.name} is named for {roles[file]} and for {role}"
+                remedy = "name it for one of them"
+                raise UsageError("C02", words, where=f"--{role}", remedy=remedy)
+    return roles
+
+
+def _in_role(
+    logs: Iterable[Opened], roles: Mapping[Path, str], named: Collection[str]
+) -> Iterable[Opened]:
+    for opened in logs:
+        role = roles.get(opened.path, opened.log.role)
+        if role != opened.log.role:
+            yield dataclasses.replace(opened, log=dataclasses.replace(opened.log, role=role))
+        elif opened.path in roles or role not in named:
+            yield opened
+
+
+def _all_of(rejected: list[Rejected]) -> RrridError:
+    """Return the first of several errors, with the names of the other files and their codes."""
+    first, others = rejected[0].error, rejected[1:]
+    if not others:
+        return first
+    named = ", ".join(f"{clean(r.path.name, 40)} ({r.error.code})" for r in others[:6])
+    more = f" and {len(others) - 6} more" if len(others) > 6 else ""
+    words = f"{clean(first.message, 160)}; {len(others)} more cannot be used: {named}{more}"
+    code, where = first.code.removeprefix("RRID-"), first.where or rejected[0].path
+    return InputRejected(code, words, where=where, remedy=first.remedy)
+
+
+def _label(first: Path) -> str:
+    """Return what the default --out calls the inputs: the name of the first one's folder.
+
+    Of rrrid's own output in runs/ROBOT/LABEL/COMMAND, or of its `logs`, it is LABEL: what is made
+    of an import lies beside it, and two imports of one robot are not confused.
+    """
+    folder = first if first.is_dir() else first.parent
+    if folder.name == "logs" and written_by(folder.parent):
+        folder = folder.parent
+    return folder.parent.name if folder.name == written_by(folder) else folder.name
+
+
+def only(inputs: Inputs, session: Session) -> Inputs:
+    """Return the inputs with the logs of that session alone."""
+    kept = {opened.path for opened in session.logs}
+    others = {opened.path for opened in inputs.logs} - kept
+    return dataclasses.replace(
+        inputs,
+        logs=tuple(opened for opened in inputs.logs if opened.path in kept),
+        robot_name=session.robot,
+        sources=tuple(path for path in inputs.sources if path not in others),
+        label=f"{inputs.label}-{session.own}" if session.own else inputs.label,
+    )
 
 
 def apart(logs: Iterable[Opened], named: Collection[Path] = ()) -> tuple[Session, ...]:
-    """The logs of one robot and one day at a time.
+    """Return the sessions of `logs`.
 
     Args:
         named: files that the user named for a role: they go with every day of their robot.
     """
-    groups = sessions(logs, named)
-    names = [" ".join(filter(None, (robot, day))) for robot, _, day in groups]
+    groups = _grouped(logs, named)
+    names = [f"{robot} {day}".strip() for robot, _, day in groups]
     robots = [robot for robot, _, _ in groups]
     found = []
     for i, ((robot, description, day), members) in enumerate(groups.items()):
-        again = names.count(names[i]) > 1
-        own = "-".join(filter(None, (day, str(i + 1) if again else ""))) if robots.count(robot) > 1 else ""
-        found.append(Session(f"{names[i]} ({i + 1})" if again else names[i], robot, description, tuple(members), own))
+        name, own = names[i], day
+        if names.count(name) > 1:
+            name, own = f"{name} ({i + 1})", "-".join(filter(None, (day, str(i + 1))))
+        own = own if robots.count(robot) > 1 else ""
+        found.append(Session(name, robot, description, tuple(members), own))
     return tuple(found)
 
 
 def called(wanted: str, found: Collection[Session]) -> Session | None:
-    """The session of this name, or the only one of the robot of this name."""
+    """Return the session of this name, or the only one of the robot of this name."""
     of_robot = [one for one in found if one.robot == wanted]
-    return next((one for one in found if one.name == wanted), of_robot[0] if len(of_robot) == 1 else None)
+    by_name = next((one for one in found if one.name == wanted), None)
+    return by_name or (of_robot[0] if len(of_robot) == 1 else None)
 
 
-def sessions(logs: Iterable[Opened], named: Collection[Path] = ()) -> dict[Key, list[Opened]]:
-    """Logs by the robot's name, its description, and the day.
+def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[Opened]]:
+    """Return the logs by the robot's name, its description, and the day.
 
-    What a robot was like before (role "reference") goes with every later day, or with the only one; a plan, and what is in `named`,
-    with every day of its robot. A day of which all logs judge (role "validate") goes with the day before it that has others, or
-    with the first one after; logs that do not tell their day go with the only day of their robot.
+    Reference logs go with every later day, or with the only one; a plan, and what is in `named`,
+    with every day of its robot. A day of which all logs judge (role "validate") goes with the day
+    before it that has others, or with the first one after; logs without a date go with the only
+    day of their robot.
     """
+    by_day = _across_midnight(list(logs))
     groups: dict[Key, list[Opened]] = {}
-    by_day = _across_midnight([((o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]), o) for o in logs])
-    meant = [(key, o) for key, o in by_day if o.path in named]
-    plans = [(key, o) for key, o in by_day if o.path not in named and o.log.origin == "planned"]
-    rest = [(key, o) for key, o in by_day if o.path not in named and o.log.origin != "planned"]
-    for key, opened in rest:
-        if opened.log.role != "reference":
+    references, meant, plans = [], [], []
+    for key, opened in by_day:
+        if opened.path in named:
+            meant.append((key, opened))
+        elif opened.log.origin == "planned":
+            plans.append((key, opened))
+        elif opened.log.role == "reference":
+            references.append((key, opened))
+        else:
             groups.setdefault(key, []).append(opened)
     if not groups:
-        _beside(groups, meant)
+        _add_to_every_day(groups, meant)
         meant = []
-    _undated(groups)
-    _judged_later(groups)
-    found = tuple(groups)
-    for key, opened in rest:
-        if opened.log.role == "reference":
-            days = [other for other in found if other[:2] == key[:2]]
-            later = [other for other in days if not other[2] or key[2] <= other[2]]
-            for other in later or (days if len(days) == 1 else [key]):
-                groups.setdefault(other, []).append(opened)
-    _beside(groups, (*meant, *plans))
-    return groups
-
-
-def _undated(groups: dict[Key, list[Opened]]) -> None:
-    """Put logs that do not tell their day to the only day of their robot, where there is one: they speak of no other."""
     for key in [key for key in groups if not key[2]]:
         days = [other for other in groups if other[:2] == key[:2] and other != key]
         if len(days) == 1:
             groups[days[0]] += groups.pop(key)
-
-
-def _judged_later(groups: dict[Key, list[Opened]]) -> None:
-    """Put days whose logs all judge to the day whose model they judge: by themselves they say nothing."""
-    judging = [key for key, logs in groups.items() if key[2] and all(opened.log.role == "validate" for opened in logs)]
+    judging = [
+        k for k, own in groups.items() if k[2] and all(o.log.role == "validate" for o in own)
+    ]
     for key in judging:
-        days = sorted(other for other in groups if other[:2] == key[:2] and other[2] and other not in judging)
+        days = [other for other in groups if other[:2] == key[:2] and other[2]]
+        days = sorted(set(days) - set(judging))
         if days:
             before = [other for other in days if other[2] <= key[2]]
             groups[before[-1] if before else days[0]] += groups.pop(key)
+    found = tuple(groups)
+    for key, opened in references:
+        days = [other for other in found if other[:2] == key[:2]]
+        later = [other for other in days if not other[2] or key[2] <= other[2]]
+        for other in later or (days if len(days) == 1 else [key]):
+            groups.setdefault(other, []).append(opened)
+    _add_to_every_day(groups, (*meant, *plans))
+    return groups
 
 
-def day_that_judges(session: Session) -> str:
-    """The last day of which a session has logs that judge but none that is judged; "" where there is none."""
-    days = {role: {(o.log.recorded or "")[:_DATE] for o in session.logs if (o.log.role == "validate") is role and o.log.recorded}
-            for role in (True, False)}
-    return max(days[True] - days[False], default="") if days[False] else ""
+def _add_to_every_day(groups: dict[Key, list[Opened]], logs: Iterable[tuple[Key, Opened]]) -> None:
+    """Add each log to every day of its robot; where there is none, to one without a date."""
+    found = tuple(groups)
+    for key, opened in logs:
+        of_robot = [other for other in found if other[:2] == key[:2]]
+        for other in of_robot or [(key[0], key[1], "")]:
+            groups.setdefault(other, []).append(opened)
 
 
-def _across_midnight(by_day: list[tuple[Key, Opened]]) -> list[tuple[Key, Opened]]:
-    """The same, with the logs after midnight (UTC: an afternoon, elsewhere) to the day before where it is one session: no pause
-    of more than three hours, and twelve in all. Logs of role "reference" and hours that are not told decide nothing."""
-    times: dict[Key, list[datetime]] = {}
+def _across_midnight(logs: list[Opened]) -> list[tuple[Key, Opened]]:
+    """Return the logs with their keys, those after midnight (UTC) with the day before.
+
+    It is one session where no pause is longer than three hours, and all of it twelve. Reference
+    logs and hours that are not given decide nothing.
+    """
+    by_day = [(_key(opened), opened) for opened in logs]
+    times: dict[Key, list[datetime]] = defaultdict(list)
     for key, opened in by_day:
-        if (began := _time(opened.log.recorded)) is not None and opened.log.role != "reference":
-            times.setdefault(key, []).append(began)
+        began = _time(opened.log.recorded)
+        if began is not None and opened.log.role != "reference":
+            times[key].append(began)
     same: dict[Key, Key] = {}
     for key, after in sorted(times.items()):
-        before = (*key[:2], (min(after) - timedelta(days=1)).date().isoformat())
-        if before in times and before not in same and min(after) - max(times[before]) <= _PAUSE and (
-                max(after) - min(times[before]) <= _SESSION):
+        yesterday = (min(after) - timedelta(days=1)).date().isoformat()
+        before = (*key[:2], yesterday)
+        if before not in times or before in same:
+            continue
+        pause, whole = min(after) - max(times[before]), max(after) - min(times[before])
+        if pause <= _PAUSE and whole <= _SESSION:
             same[key] = before
     return [(same.get(key, key), opened) for key, opened in by_day]
 
 
+def _key(opened: Opened) -> Key:
+    return opened.log.robot_name, opened.log.robot_text, (opened.log.recorded or "")[:10]
+
+
 def _time(recorded: str | None) -> datetime | None:
-    """When a log began; None where it tells a day alone, or nothing that is a time."""
+    """Return when a log began; None where it says a day alone, or no time."""
     try:
-        told = datetime.fromisoformat(recorded or "")
+        time = datetime.fromisoformat(recorded or "")
     except ValueError:
         return None
-    return told.replace(tzinfo=told.tzinfo or UTC) if len(recorded or "") > _DATE else None
+    return time.replace(tzinfo=time.tzinfo or UTC) if "T" in (recorded or "") else None
 
 
-def _beside(groups: dict[Key, list[Opened]], timeless: Iterable[tuple[Key, Opened]]) -> None:
-    """Put each log to every day of its robot; where there is none, to one without a date."""
-    found = tuple(groups)
-    for key, opened in timeless:
-        of_robot = [other for other in found if other[:2] == key[:2]]
-        for other in of_robot or [(key[0], key[1], "")]:
-            groups.setdefault(other, []).append(opened)
+def of_one_session(inputs: Inputs) -> Inputs:
+    """Return the inputs if their logs are of one robot and one day.
+
+    Raises:
+        SeveralSessions: C02, they are of several; --session takes one, `batch` takes all.
+        UsageError: C02, they are of several robots, and some were named for a role.
+    """
+    used = {}
+    for session in apart(inputs.logs, inputs.named):
+        paths = {opened.path for opened in session.logs if opened.log.origin != "planned"}
+        used[session.name] = (session, paths)
+    every = set().union(*(paths for _, paths in used.values()))
+    if len(used) < 2 or not every:
+        return inputs
+    for session, paths in used.values():
+        if paths == every:
+            return only(inputs, session)
+    several = [
+        session
+        for session, mine in used.values()
+        if not any(mine < others for _, others in used.values())
+    ]
+    robots = len({(session.robot, session.description) for session in several})
+    days = len(several) > robots
+    kinds = " and ".join(kind for kind, there in (("robots", robots > 1), ("days", days)) if there)
+    words = f"logs of several {kinds}: {_listed(several)}"
+    if robots > 1 and inputs.named:
+        remedy = (
+            "name logs of one robot alone for --identify, --validate and --reference; if it is one "
+            "robot, described twice, give --robot FILE"
+        )
+        raise UsageError("C02", words, where=inputs.label, remedy=remedy)
+    remedy = f"take one with --session '{several[0].name}', or all with "
+    remedy += "'rrrid batch FOLDER [--stage COMMAND]'"
+    if days:
+        remedy += "; for days that belong together, name their logs with --identify and --validate"
+    problem = SeveralSessions("C02", words, where=inputs.label, remedy=remedy)
+    problem.message = words  # complete, however long
+    problem.names = tuple(session.name for session in several)
+    raise problem
+
+
+def refuse_mixed(inputs: Inputs, folders: Iterable[Path]) -> None:
+    """Refuse a folder whose logs are of several sessions; logs named one by one may be of any.
+
+    Raises:
+        SeveralSessions: C02, one of `folders` holds several.
+    """
+    for folder in folders:
+        logs = tuple(opened for opened in inputs.logs if opened.path.is_relative_to(folder))
+        of_one_session(dataclasses.replace(inputs, logs=logs, label=str(folder)))
+
+
+def _listed(sessions: list[Session]) -> str:
+    """Name the sessions, and of a few the logs of each: by a folder that holds no others."""
+    names = [clean(session.name, 60) for session in sessions]
+    if len(sessions) > 6:
+        return "; ".join(names)
+    logs = [[o for o in session.logs if o.log.origin != "planned"] for session in sessions]
+    homes: dict[Path, set[int]] = defaultdict(set)
+    for index, own in enumerate(logs):
+        for opened in own:
+            homes[opened.path.parent].add(index)
+    parts = []
+    for name, own in zip(names, logs, strict=True):
+        folders = list(dict.fromkeys(opened.path.parent for opened in own))
+        if len(folders) < 4 and all(len(homes[folder]) == 1 for folder in folders):
+            count = f"{len(own)} log{'s' if len(own) > 1 else ''}"
+            there = f"{count} in {', '.join(clean(folder.name, 40) for folder in folders)}"
+        else:
+            there = _first_of([opened.path.name for opened in own])
+        parts.append(f"{name} ({there})")
+    return "; ".join(parts)
+
+
+def _first_of(names: Sequence[str]) -> str:
+    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
+    return f"{', '.join(clean(name, 40) for name in names[:4])}{more}"
+
+
+def check_alike(inputs: Inputs) -> tuple[Check, ...]:
+    """Warn of logs of one name in two folders, and of a day that judges another (S21).
+
+    Where neither robot nor day distinguishes them, they may well be of two machines.
+    """
+    found = []
+    for session in apart(inputs.logs, inputs.named):
+        where = clean(session.name, 60)
+        logs = [o for o in session.logs if o.path not in inputs.named]
+        homes: dict[tuple[str, str], dict[Path, str]] = defaultdict(dict)
+        for opened in logs:
+            if opened.log.origin != "planned":
+                homes[opened.log.name, opened.log.role][opened.path.parent] = opened.sha256
+        doubled = [own for own in homes.values() if len(set(own.values())) > 1]
+        folders = list(dict.fromkeys(folder for own in doubled for folder in own))
+        if doubled:
+            words = f"the folders {_first_of([folder.name for folder in folders])} hold logs of the same "
+            words += "names, robot and day, "
+            words += "and were taken for one session"
+            remedy = (
+                "if they are of two machines or sessions, give each folder by itself, or let "
+                "their logs say so: robot_name, recorded"
+            )
+            found.append(Check.of("S21", "warn", words, where=where, remedy=remedy))
+        days: dict[bool, set[str]] = {True: set(), False: set()}
+        for opened in logs:
+            if opened.log.recorded:
+                days[opened.log.role == "validate"].add(opened.log.recorded[:10])
+        alone = days[True] - days[False]
+        if days[False] and alone:
+            words = f"its logs of {max(alone)}, which all judge, were taken with it"
+            remedy = "if that is another session, name its logs by --validate"
+            found.append(Check.of("S21", "warn", words, where=where, remedy=remedy))
+    return tuple(found)

@@ -30,37 +30,89 @@ _KGF, _LBF = 9.80665, 4.4482216152605  # [N] NIST SP 811 (2008), table B.8
 
 UNITS: Final[dict[str, Unit]] = {
     # time
-    "s": Unit("time", 1.0), "ms": Unit("time", 1e-3), "us": Unit("time", 1e-6),
-    "ns": Unit("time", 1e-9), "100 ns": Unit("time", 1e-7), "min": Unit("time", 60.0), "d": Unit("time", 86400.0),
+    "s": Unit("time", 1.0),
+    "ms": Unit("time", 1e-3),
+    "us": Unit("time", 1e-6),
+    "ns": Unit("time", 1e-9),
+    "100 ns": Unit("time", 1e-7),
+    "min": Unit("time", 60.0),
+    "d": Unit("time", 86400.0),
     # position, revolute and prismatic
-    "rad": Unit("position", 1.0), "mrad": Unit("position", 1e-3), "deg": Unit("position", math.pi / 180.0),
-    "°": Unit("position", math.pi / 180.0), "rev": Unit("position", _TURN), "turn": Unit("position", _TURN),
-    "mdeg": Unit("position", math.pi / 180e3), "arcmin": Unit("position", math.pi / 10800.0),
+    "rad": Unit("position", 1.0),
+    "mrad": Unit("position", 1e-3),
+    "deg": Unit("position", math.pi / 180.0),
+    "°": Unit("position", math.pi / 180.0),
+    "rev": Unit("position", _TURN),
+    "turn": Unit("position", _TURN),
+    "mdeg": Unit("position", math.pi / 180e3),
+    "arcmin": Unit("position", math.pi / 10800.0),
     "arcsec": Unit("position", math.pi / 648e3),
-    "m": Unit("position", 1.0), "cm": Unit("position", 1e-2), "mm": Unit("position", 1e-3), "um": Unit("position", 1e-6),
+    "m": Unit("position", 1.0),
+    "cm": Unit("position", 1e-2),
+    "mm": Unit("position", 1e-3),
+    "um": Unit("position", 1e-6),
     # velocity
-    "rad/s": Unit("velocity", 1.0), "deg/s": Unit("velocity", math.pi / 180.0), "rpm": Unit("velocity", _TURN / 60.0),
-    "rev/s": Unit("velocity", _TURN), "mrad/s": Unit("velocity", 1e-3), "mdeg/s": Unit("velocity", math.pi / 180e3),
-    "m/s": Unit("velocity", 1.0), "cm/s": Unit("velocity", 1e-2), "mm/s": Unit("velocity", 1e-3),
+    "rad/s": Unit("velocity", 1.0),
+    "deg/s": Unit("velocity", math.pi / 180.0),
+    "rpm": Unit("velocity", _TURN / 60.0),
+    "rev/s": Unit("velocity", _TURN),
+    "mrad/s": Unit("velocity", 1e-3),
+    "mdeg/s": Unit("velocity", math.pi / 180e3),
+    "m/s": Unit("velocity", 1.0),
+    "cm/s": Unit("velocity", 1e-2),
+    "mm/s": Unit("velocity", 1e-3),
     # acceleration
-    "rad/s^2": Unit("acceleration", 1.0), "deg/s^2": Unit("acceleration", math.pi / 180.0),
-    "rev/s^2": Unit("acceleration", _TURN), "m/s^2": Unit("acceleration", 1.0), "mm/s^2": Unit("acceleration", 1e-3),
+    "rad/s^2": Unit("acceleration", 1.0),
+    "deg/s^2": Unit("acceleration", math.pi / 180.0),
+    "rev/s^2": Unit("acceleration", _TURN),
+    "m/s^2": Unit("acceleration", 1.0),
+    "mm/s^2": Unit("acceleration", 1e-3),
     # torque and force
-    "N m": Unit("torque", 1.0), "mN m": Unit("torque", 1e-3), "N mm": Unit("torque", 1e-3), "N cm": Unit("torque", 1e-2),
-    "kN m": Unit("torque", 1e3), "cN m": Unit("torque", 1e-2), "uN m": Unit("torque", 1e-6),
-    "kgf m": Unit("torque", _KGF), "kgf cm": Unit("torque", 1e-2 * _KGF), "lbf ft": Unit("torque", 0.3048 * _LBF),
-    "lbf in": Unit("torque", 0.0254 * _LBF), "ozf in": Unit("torque", 0.0254 * _LBF / 16.0),
-    "N": Unit("torque", 1.0), "mN": Unit("torque", 1e-3), "kN": Unit("torque", 1e3),
+    "N m": Unit("torque", 1.0),
+    "mN m": Unit("torque", 1e-3),
+    "N mm": Unit("torque", 1e-3),
+    "N cm": Unit("torque", 1e-2),
+    "kN m": Unit("torque", 1e3),
+    "cN m": Unit("torque", 1e-2),
+    "uN m": Unit("torque", 1e-6),
+    "kgf m": Unit("torque", _KGF),
+    "kgf cm": Unit("torque", 1e-2 * _KGF),
+    "lbf ft": Unit("torque", 0.3048 * _LBF),
+    "lbf in": Unit("torque", 0.0254 * _LBF),
+    "ozf in": Unit("torque", 0.0254 * _LBF / 16.0),
+    "N": Unit("torque", 1.0),
+    "mN": Unit("torque", 1e-3),
+    "kN": Unit("torque", 1e3),
     # current
-    "A": Unit("current", 1.0), "mA": Unit("current", 1e-3), "Arms": Unit("current", 1.0),  # what it is times: N m per A rms
+    "A": Unit("current", 1.0),
+    "mA": Unit("current", 1e-3),
+    "Arms": Unit("current", 1.0),  # what it is times: N m per A rms
     # temperature
-    "degC": Unit("temperature", 1.0), "°C": Unit("temperature", 1.0), "K": Unit("temperature", 1.0, -273.15),
+    "degC": Unit("temperature", 1.0),
+    "°C": Unit("temperature", 1.0),
+    "K": Unit("temperature", 1.0, -273.15),
 }
 
-_SPELLINGS: Final = str.maketrans({"·": " ", "*": " ", "⋅": " ", "•": " ", "∙": " ", "・": " ", "²": "^2", "\u03bc": "µ"})
-_ALIASES = {"µs": "us", "Nmm": "N mm", "N.mm": "N mm", "Ncm": "N cm", "N.cm": "N cm", "rad/s2": "rad/s^2", "m/s2": "m/s^2",
-            "deg/s2": "deg/s^2", "1/min": "rpm", "Grad": "deg", "Grad/s": "deg/s", "U/min": "rpm", "r/min": "rpm", "°": "deg",
-            "℃": "degC"}
+_SPELLINGS: Final = str.maketrans(
+    {"·": " ", "*": " ", "⋅": " ", "•": " ", "∙": " ", "・": " ", "²": "^2", "\u03bc": "µ"}
+)
+_ALIASES = {
+    "µs": "us",
+    "Nmm": "N mm",
+    "N.mm": "N mm",
+    "Ncm": "N cm",
+    "N.cm": "N cm",
+    "rad/s2": "rad/s^2",
+    "m/s2": "m/s^2",
+    "deg/s2": "deg/s^2",
+    "1/min": "rpm",
+    "Grad": "deg",
+    "Grad/s": "deg/s",
+    "U/min": "rpm",
+    "r/min": "rpm",
+    "°": "deg",
+    "℃": "degC",
+}
 _IN_OTHER_LANGUAGES: Final = {
     "rad": "弧度 ラジアン рад radians radianes radianti radianos",
     "deg": "度 град град. grados degrés gradi graus graden grader stopnie",
@@ -96,7 +148,9 @@ def _turned(name: str) -> str:
 def canonical_unit(unit: str) -> str:
     """`unit` as `UNITS` spells it: "Nm" and "N·m" are "N m"."""
     name = " ".join(str(unit).translate(_SPELLINGS).split())
-    return _ALIASES.get(name) or (name if name in UNITS or _NO_WORDS.search(name) else _in_words(name))
+    return _ALIASES.get(name) or (
+        name if name in UNITS or _NO_WORDS.search(name) else _in_words(name)
+    )
 
 
 def _in_words(name: str) -> str:
@@ -128,9 +182,22 @@ def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
     accepted = [known for known, value in UNITS.items() if value.quantity == quantity]
     found = UNITS.get(name)
     if share := of_rated(str(unit), quantity):
-        raise InputRejected("S05", f"'{unit}' is a share of what the drive is rated for", where=where, remedy=f"declare {share}")
+        raise InputRejected(
+            "S05",
+            f"'{unit}' is a share of what the drive is rated for",
+            where=where,
+            remedy=f"declare {share}",
+        )
     if found is None or found.quantity != quantity:
-        what = f"unknown unit '{unit}'{did_you_mean(name, UNITS)}" if found is None else f"'{unit}' is a unit of {found.quantity}"
-        raise InputRejected("S05", f"{what}; {quantity} needs one of {', '.join(accepted)}", where=where,
-                            remedy="declare the unit the numbers are in")
+        what = (
+            f"unknown unit '{unit}'{did_you_mean(name, UNITS)}"
+            if found is None
+            else f"'{unit}' is a unit of {found.quantity}"
+        )
+        raise InputRejected(
+            "S05",
+            f"{what}; {quantity} needs one of {', '.join(accepted)}",
+            where=where,
+            remedy="declare the unit the numbers are in",
+        )
     return found

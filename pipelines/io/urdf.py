@@ -1,7 +1,7 @@
-"""Read the kinematics of a URDF, and nothing else of it.
+"""Read the kinematics and the link parameters of a URDF: no mesh, entity or macro is followed.
 
-    robot = import_urdf("arm.urdf")              limits and link parameters too, the text reduced to the chain's joints
-    chain = chain_from_urdf(robot.urdf_text)     the joints' placements, for geometry
+robot = import_urdf("arm.urdf")              its text reduced to the joints of the chain
+chain = chain_from_urdf(robot.urdf_text)     the placements of the joints, for geometry
 """
 
 from __future__ import annotations
@@ -9,38 +9,33 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from xml.etree.ElementTree import Element, TreeBuilder
+from xml.parsers import expat
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import Check, InputRejected, UsageError
-from pipelines.io.link_consistency import inconsistency
-from pipelines.io.robot import Joint, LinkParameters, RobotDescription
-from pipelines.io.urdf_tree import (
-    Source,
-    Tree,
-    TreeJoint,
-    below,
-    number,
-    read,
-    read_origin,
-    rotation_of,
-    tree_of,
-    way_to,
-)
+from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
+from pipelines.io.config import URDF
+from pipelines.io.robot import Joint, LinkParameters, RobotDescription, inconsistency
 
 __all__ = ["JointPlacement", "UrdfChain", "chain_from_urdf", "import_urdf"]
 
 Array = npt.NDArray[np.float64]
 
-_GRAVITY = (0.0, 0.0, -9.81)
-_OPEN = 1e16  # the limit that URDFs write for none
+_MOVING = ("revolute", "continuous", "prismatic")
+_TYPES = (*_MOVING, "fixed", "planar", "floating")
+_OTHER_FORMATS = {
+    "mujoco": "an MJCF model (MuJoCo)",
+    "mujocoinclude": "a part of an MJCF model (MuJoCo)",
+    "sdf": "an SDF model (Gazebo)",
+    "gazebo": "an SDF model (Gazebo)",
+}
 
 
 @dataclass(frozen=True, eq=False)
 class JointPlacement:
-    """One moving joint: its frame in the frame of the moving joint before it (of the root link for the first)."""
+    """One moving joint: its frame in that of the moving joint before it, or of the root link."""
 
     name: str
     prismatic: bool
@@ -59,122 +54,503 @@ class UrdfChain:
     tip_position: Array  # (3,) [m]
 
 
-def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescription:
-    """The robot of a URDF file: its joints, limits and link parameters; gravity is (0, 0, -9.81) m/s^2.
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """A joint of the file, moving or fixed."""
 
-    Fixed joints are merged into the moving link before them, and so are branches that `tip_link` leaves aside,
-    which are taken as held at zero.
+    name: str
+    type: str
+    parent: str
+    child: str
+    xyz: Array  # (3,) [m]
+    rpy: Array  # (3,) [rad]
+    axis: Array  # (3,) unit vector
+    range: tuple[float, float]
+    velocity: float
+    effort: float
+    mimics: bool
+
+    @property
+    def moves(self) -> bool:
+        return self.type != "fixed"
+
+    @property
+    def independent(self) -> bool:
+        """Return whether its one coordinate is its own."""
+        return self.type in _MOVING and not self.mimics
+
+    @property
+    def rotation(self) -> Array:
+        return _rotation_of(self.rpy)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """The file or text, and the kind of its errors."""
+
+    where: str
+    kind: type[RrridError]
+
+    def wrong(self, words: str, remedy: str = "", code: str = "S17") -> RrridError:
+        remedy = remedy or "correct the URDF there, or export it again"
+        return self.kind(code, f"URDF: {words}", where=self.where, remedy=remedy)
+
+    def xacro(self) -> RrridError:
+        words = "this is a xacro macro file, which rrrid does not run"
+        return self.wrong(words, "expand it first: xacro arm.urdf.xacro > arm.urdf", "X13")
+
+
+@dataclass(frozen=True, eq=False)
+class _Tree:
+    """The links and joints of a file: each child has one parent, and all are under one root."""
+
+    name: str
+    links: dict[str, Element]
+    into: dict[str, _Joint]  # by child link
+    out: dict[str, list[_Joint]]  # by parent link
+    root: str
+    source: _Source
+
+    def body(self, link: str) -> list[str]:
+        """Return `link` and all links that are fixed to it, below it."""
+        found = [link]
+        for name in found:  # grows meanwhile
+            found += [joint.child for joint in self.out[name] if not joint.moves]
+        return found
+
+    def onwards(self, link: str) -> list[_Joint]:
+        """Return the moving joints that leave the body of `link`."""
+        return [joint for name in self.body(link) for joint in self.out[name] if joint.moves]
+
+    def below(self, link: str, stop: set[str]) -> list[str]:
+        """Return `link` and all links below it, not going through the joints named in `stop`."""
+        found = [link]
+        for name in found:
+            found += [joint.child for joint in self.out[name] if joint.name not in stop]
+        return found
+
+    def way(self, link: str) -> list[_Joint]:
+        """Return the joints from the root to `link`."""
+        way: list[_Joint] = []
+        while link in self.into:
+            way.append(self.into[link])
+            link = way[-1].parent
+        return way[::-1]
+
+
+def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescription:
+    """Return the robot of a URDF file: joints, limits, link parameters, standard gravity.
+
+    Fixed joints are merged into the moving link before them, and so are branches that `tip_link`
+    leaves aside, which are taken as held at zero.
 
     Raises:
         UsageError: no such file, not a URDF, or not a serial arm.
     """
-    source = Source(str(path), UsageError)
-    tree = tree_of(read(Path(path), source), source)
-    way, tip = way_to(tree, tip_link, source)
+    source = _Source(str(path), UsageError)
+    tree = _tree_of(_read(Path(path), source), source)
+    way, tip = _way_to_tip(tree, tip_link)
     moving = [joint for joint in way if joint.moves]
-    links = _merged_links(tree, moving, source)
-    joints = tuple(Joint(j.name, "prismatic" if j.type == "prismatic" else "revolute", position=j.limits[0],
-                         velocity=j.limits[1], torque=j.limits[2], link=link)
-                   for j, link in zip(moving, links, strict=True))
-    return RobotDescription(tree.name, _GRAVITY, "urdf", joints, urdf_text=_canonical(tree, way), tip_link=tip,
-                            checks=_impossible_links(tree, source))
+    stop = {joint.name for joint in moving}
+    joints = []
+    for joint in moving:
+        slides = joint.type == "prismatic"
+        joints.append(
+            Joint(
+                joint.name,
+                "prismatic" if slides else "revolute",
+                position=joint.range,
+                velocity=joint.velocity,
+                torque=joint.effort,
+                link=_link(tree, joint.child, stop),
+            )
+        )
+    return RobotDescription(
+        tree.name,
+        (0.0, 0.0, -9.81),
+        "urdf",
+        tuple(joints),
+        urdf_text=_canonical(tree, way),
+        tip_link=tip,
+        checks=_impossible_links(tree),
+    )
 
 
 def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
-    """The placements of the moving joints of a URDF that came with a log or a description.
+    """Return the placements of the moving joints of a URDF from a log or a description.
 
     Raises:
         InputRejected: the text is not the URDF of a serial arm.
     """
-    source = Source("urdf_text", InputRejected)
-    way, tip = way_to(tree_of(urdf_text, source), tip_link, source)
+    tree = _tree_of(urdf_text, _Source("urdf_text", InputRejected))
+    way, tip = _way_to_tip(tree, tip_link)
     placed: list[JointPlacement] = []
     rotation, position = np.eye(3), np.zeros(3)
     for joint in way:
-        rotation, position = rotation @ joint.rotation, rotation @ joint.position + position
+        rotation, position = rotation @ joint.rotation, rotation @ joint.xyz + position
         if joint.moves:
-            placed.append(JointPlacement(joint.name, joint.type == "prismatic", rotation, position, joint.axis))
+            slides = joint.type == "prismatic"
+            placed.append(JointPlacement(joint.name, slides, rotation, position, joint.axis))
             rotation, position = np.eye(3), np.zeros(3)
     return UrdfChain(tuple(placed), tip, rotation, position)
 
 
-def _merged_links(tree: Tree, moving: list[TreeJoint], source: Source) -> list[LinkParameters | None]:
-    """The parameters of each moving body about its joint's frame, everything fixed to it included."""
-    stop = frozenset(joint.name for joint in moving)
-    return [_body(tree, joint.child, stop, source) for joint in moving]
+def _read(path: Path, source: _Source) -> bytes:
+    if path.suffix.lower() == ".xacro":
+        raise source.xacro()
+    try:
+        if not path.is_file():  # a pipe or a device would hang
+            words = "not a regular file" if path.exists() else "no such file"
+            raise source.wrong(words, "check the path", "C04")
+        with path.open("rb") as file:
+            return file.read(URDF.size + 1)
+    except (OSError, ValueError) as problem:
+        remedy = "check the file and its permissions"
+        raise source.wrong(f"cannot be read: {problem}", remedy, "C04") from None
 
 
-def _body(tree: Tree, first: str, stop: frozenset[str], source: Source) -> LinkParameters | None:
+def _parse(text: bytes | str, source: _Source) -> Element:
+    """Return the XML tree; a document type is refused before an entity could be declared."""
+    if len(text) > URDF.size:
+        raise source.wrong(f"larger than {URDF.size // 1_000_000} MB", code="X13")
+    builder, parser, depth, elements = TreeBuilder(), expat.ParserCreate(), 0, 0
+
+    def doctype(*_: object) -> None:
+        words = "has a DOCTYPE or entity declaration, which is never followed"
+        raise source.wrong(words, "delete the <!DOCTYPE …> from the file", "X13")
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        nonlocal depth, elements
+        depth, elements = depth + 1, elements + 1
+        if tag.startswith("xacro:"):
+            raise source.xacro()
+        if depth > URDF.depth:
+            raise source.wrong(f"elements nested more than {URDF.depth} deep", code="X13")
+        if elements > URDF.elements:
+            raise source.wrong(f"more than {URDF.elements} elements", code="X13")
+        builder.start(tag, attributes)
+
+    def end(tag: str) -> None:
+        nonlocal depth
+        depth -= 1
+        builder.end(tag)
+
+    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = doctype
+    parser.StartElementHandler, parser.EndElementHandler = start, end
+    try:
+        parser.Parse(text.lstrip(), True)  # many a file begins with an empty line
+    except (expat.ExpatError, LookupError, ValueError) as problem:
+        raise source.wrong(f"is not well-formed XML: {problem}") from None
+    return builder.close()
+
+
+def _tree_of(text: bytes | str, source: _Source) -> _Tree:
+    robot = _parse(text, source)
+    if robot.tag in _OTHER_FORMATS:
+        remedy = "give the URDF that it was made from, or export a URDF of the arm"
+        raise source.wrong(f"this is {_OTHER_FORMATS[robot.tag]}, not a URDF", remedy)
+    if robot.tag != "robot":
+        raise source.wrong(f"the outermost element is <{robot.tag}>, not <robot>")
+    elements, joints = robot.findall("link"), robot.findall("joint")
+    if max(len(elements), len(joints)) > URDF.links:
+        remedy = "give the URDF of the arm alone"
+        raise source.wrong(f"more than {URDF.links} links or joints", remedy, "X13")
+    links: dict[str, Element] = {}
+    for element in elements:
+        if links.setdefault(_name(element, source), element) is not element:
+            raise source.wrong(f"two links are called '{element.get('name')}'")
+    into, out = _connected(joints, links, source)
+    roots = [name for name in links if name not in into]
+    if len(roots) != 1:
+        words = (
+            f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
+        )
+        loose = ", ".join(name for name in roots if not out[name])
+        more = f", or delete those without joints: {loose}" if loose else ""
+        remedy = f"connect all links into one tree{more}"
+        raise source.wrong(f"there must be one root link, but {words}", remedy)
+    tree = _Tree(robot.get("name") or "robot", links, into, out, roots[0], source)
+    if len(tree.below(tree.root, set())) != len(links):
+        words = "some joints form a closed loop apart from the root"
+        raise source.wrong(words, "only serial arms can be described")
+    return tree
+
+
+def _connected(
+    elements: list[Element], links: dict[str, Element], source: _Source
+) -> tuple[dict[str, _Joint], dict[str, list[_Joint]]]:
+    """Return the joints by their child link, and by their parent link."""
+    into: dict[str, _Joint] = {}
+    out: dict[str, list[_Joint]] = {name: [] for name in links}
+    for element in elements:
+        joint = _joint(element, source)
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                words = f"joint '{joint.name}' connects link '{end}', which is not defined"
+                raise source.wrong(f"{words}{did_you_mean(end, links)}")
+        if any(other.name == joint.name for other in into.values()):
+            raise source.wrong(f"two joints are called '{joint.name}'")
+        if joint.child in into:
+            both = f"'{into[joint.child].name}' and '{joint.name}'"
+            words = f"link '{joint.child}' hangs on joints {both}: a closed loop"
+            raise source.wrong(words, "only serial arms can be described")
+        into[joint.child] = joint
+        out[joint.parent].append(joint)
+    return into, out
+
+
+def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
+    """Return the joints from the root to the tip, and the tip's name."""
+    tip = tip_link or _only_tip(tree)
+    if tip not in tree.links:
+        words = f"there is no link '{tip}' for tip_link{did_you_mean(tip, tree.links)}"
+        raise tree.source.wrong(words, code="C02")
+    way = tree.way(tip)
+    for joint in way:
+        if joint.moves and not joint.independent:
+            what = "a mimic of another" if joint.mimics else joint.type
+            words = f"joint '{joint.name}' is {what}, and an arm has independent revolute, "
+            words += "continuous and prismatic joints"
+            remedy = f'make it type="fixed" in the URDF{_end_there(tree, ", or ")}'
+            raise tree.source.wrong(words, remedy)
+    if not any(joint.moves for joint in way):
+        remedy = _end_there(tree) or "give the URDF of an arm whose joints move"
+        raise tree.source.wrong(f"no joint moves between '{tree.root}' and '{tip}'", remedy)
+    return way, tip
+
+
+def _only_tip(tree: _Tree) -> str:
+    """Return the end of the only chain of moving joints; among links fixed to it, the first."""
+    link = tree.root
+    while True:
+        onwards = tree.onwards(link)
+        if len(onwards) > 1:
+            words = f"joints {', '.join(repr(joint.name) for joint in onwards)} branch off"
+            remedy = _end_there(tree) or 'make those that are no joint of the arm type="fixed"'
+            raise tree.source.wrong(f"{words} the same body", remedy)
+        if not onwards:
+            ends = [name for name in tree.body(link) if not tree.out[name]]
+            return ends[0] if len(ends) == 1 else link
+        link = onwards[0].child
+        if not onwards[0].independent:
+            return link
+
+
+def _end_there(tree: _Tree, before: str = "") -> str:
+    """Return the remedy that names the last link of the arm, as every place takes it.
+
+    An arm may end where its joints end, branch off or cease to be independent: the longest arms
+    first, and before them a body that fingers branch off, not one that arms branch off.
+    """
+    ends: dict[str, int] = {}
+    moved = (joint.child for joint in tree.into.values() if joint.moves)
+    for link in dict.fromkeys((tree.root, *moved)):
+        way = [joint for joint in tree.way(link) if joint.moves]
+        onwards = tree.onwards(link)
+        goes_on = len(onwards) == 1 and onwards[0].independent
+        if way and all(joint.independent for joint in way) and not goes_on:
+            end = onwards[0].parent if onwards else tree.body(link)[-1]
+            ends[end] = len(way) * (2 if len(onwards) > 1 else 1)
+    if not ends:
+        return ""
+    longest = sorted(ends, key=lambda end: -ends[end])
+    file = tree.source.where.rpartition("/")[2]
+    named = ", ".join(f"{file}:{end}" for end in longest[:4])
+    remedy = f"{before}say at which link the arm ends, after a colon: {named}"
+    return f'{remedy}; in a description or a recipe also tip_link = "{longest[0]}"'
+
+
+def _joint(element: Element, source: _Source) -> _Joint:
+    name = _name(element, source)
+    kind, place = element.get("type", ""), f"joint '{name}'"
+    if kind not in _TYPES:
+        words = f"has type '{kind}', which must be one of {', '.join(_TYPES)}"
+        raise source.wrong(f"{place} {words}")
+    ends = []
+    for side in ("parent", "child"):
+        part = element.find(side)
+        ends.append("" if part is None else part.get("link", ""))
+    if not all(ends):
+        raise source.wrong(f"{place} lacks its parent or child link")
+    xyz, rpy = _origin(element, place, source)
+    axis = _vector(element.find("axis"), "xyz", (1.0, 0.0, 0.0), place, source)
+    length = float(np.linalg.norm(axis))
+    if kind in _MOVING and length < URDF.short:
+        raise source.wrong(f"{place} has an axis without direction")
+    limit = element.find("limit")
+    low, high, velocity, effort = (
+        _limit(limit, key, place, source) for key in ("lower", "upper", "velocity", "effort")
+    )
+    if kind == "continuous":
+        low = high = 0.0
+    if velocity < 0.0 or effort < 0.0 or low > high:
+        words = "has a negative velocity or effort limit, or lower above upper"
+        raise source.wrong(f"{place} {words}")
+    ranged = (-math.inf, math.inf) if low == high else (low, high)
+    axis = axis / length if length else axis
+    mimics = element.find("mimic") is not None
+    velocity, effort = velocity or math.inf, effort or math.inf
+    parent, child = ends
+    return _Joint(name, kind, parent, child, xyz, rpy, axis, ranged, velocity, effort, mimics)
+
+
+def _name(element: Element, source: _Source) -> str:
+    name = element.get("name", "")
+    if not name.strip():
+        raise source.wrong(f"a <{element.tag}> has no name")
+    return name
+
+
+def _word(word: str, key: str, place: str, source: _Source) -> float:
+    if "${" in word or "$(" in word:
+        raise source.xacro()
+    try:
+        return float(word.replace("_", "?"))  # Python reads 1_0 as 10, no other reader does
+    except ValueError:
+        raise source.wrong(f"{place}: {key} holds '{word}', which is not a number") from None
+
+
+def _limit(element: Element | None, key: str, place: str, source: _Source) -> float:
+    """Return a limit: 0 where it is missing, infinite where it is too large to be one."""
+    if element is None or element.get(key) is None:
+        return 0.0
+    value = _word(str(element.get(key)), key, place, source)
+    if math.isnan(value):
+        raise source.wrong(f"{place}: {key} is not a number")
+    return value if abs(value) < URDF.number else math.copysign(math.inf, value)
+
+
+def _number(element: Element | None, key: str, place: str, source: _Source) -> float:
+    """Return a finite number, 0 where it is missing."""
+    if element is None or element.get(key) is None:
+        return 0.0
+    return _finite(str(element.get(key)), key, place, source)
+
+
+def _finite(word: str, key: str, place: str, source: _Source) -> float:
+    value = _word(word, key, place, source)
+    if not abs(value) <= URDF.number:
+        words = f"{key} holds {word}, which is not finite or absurdly large"
+        raise source.wrong(f"{place}: {words}")
+    return value
+
+
+def _vector(
+    element: Element | None, key: str, default: tuple[float, ...], place: str, source: _Source
+) -> Array:
+    text = None if element is None else element.get(key)
+    if text is None:
+        return np.array(default)
+    words = text.split()
+    if "$" not in text and len(words) != 3:
+        raise source.wrong(f"{place}: {key} must hold three numbers, not {len(words)}")
+    return np.array([_finite(word, key, place, source) for word in words])
+
+
+def _origin(element: Element, place: str, source: _Source) -> tuple[Array, Array]:
+    """Return xyz [m] and rpy [rad]."""
+    origin, zero = element.find("origin"), (0.0, 0.0, 0.0)
+    xyz = _vector(origin, "xyz", zero, place, source)
+    return xyz, _vector(origin, "rpy", zero, place, source)
+
+
+def _rotation_of(rpy: Array) -> Array:
+    """R = Rz(yaw) Ry(pitch) Rx(roll): turns about fixed axes, in the order roll, pitch, yaw."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def _link(tree: _Tree, first: str, stop: set[str]) -> LinkParameters | None:
+    """Return the parameters of a moving body about its joint's frame, all fixed to it included."""
     placed = {first: (np.eye(3), np.zeros(3))}
     mass, moment, inertia, known = 0.0, np.zeros(3), np.zeros((3, 3)), False
-    for name in below(tree, first, stop):
+    for name in tree.below(first, stop):
         if name != first:
             joint = tree.into[name]
             r, p = placed[joint.parent]
-            placed[name] = (r @ joint.rotation, r @ joint.position + p)
+            placed[name] = (r @ joint.rotation, r @ joint.xyz + p)
         element = tree.links[name].find("inertial")
         if element is not None:
-            m, h, i = _inertial(element, *placed[name], f"link '{name}'", source)
+            m, h, i = _inertial(element, *placed[name], f"link '{name}'", tree.source)
             mass, moment, inertia, known = mass + m, moment + h, inertia + i, True
     if not known:
         return None
-    com = moment / mass if mass else np.zeros(3)
-    xx, yy, zz, xy, xz, yz = (inertia[k] for k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
+    x, y, z = (moment / mass if mass else np.zeros(3)).tolist()
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tolist()
     # + 0.0: a zero product must not become -0.0 by the change of sign
-    return LinkParameters(float(mass), (float(com[0]), float(com[1]), float(com[2])),
-                          (float(xx), float(yy), float(zz), float(-xy + 0.0), float(-xz + 0.0), float(-yz + 0.0)))
+    six = (xx, yy, zz, -xy + 0.0, -xz + 0.0, -yz + 0.0)
+    return LinkParameters(float(mass), (x, y, z), six)
 
 
-def _impossible_links(tree: Tree, source: Source) -> tuple[Check, ...]:
-    """S17: a warning for every link whose inertial parameters no rigid body has."""
-    found = []
-    for name, link in tree.links.items():
-        element = link.find("inertial")
-        if element is None:
-            continue
-        mass = number(element.find("mass"), "value", f"link '{name}'", source)
-        if words := inconsistency(mass, _tensor(element, f"link '{name}'", source)):
-            found.append(Check.of("S17", "warn", f"no rigid body has the inertial parameters of link '{name}': {words}",
-                                  where=source.where, remedy="correct them in the URDF: what is known of its links is used"))
-    return tuple(found)
-
-
-def _tensor(element: Element, place: str, source: Source) -> Array:
-    """The inertia (3, 3) about the centre of mass, in the axes of <inertial>."""
-    xx, yy, zz, xy, xz, yz = (number(element.find("inertia"), k, place, source) for k in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
+def _tensor(element: Element, place: str, source: _Source) -> Array:
+    """Return the inertia (3, 3) about the centre of mass, in the axes of <inertial>."""
+    inertia = element.find("inertia")
+    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    xx, yy, zz, xy, xz, yz = (_number(inertia, key, place, source) for key in keys)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _inertial(element: Element, r: Array, p: Array, place: str, source: Source) -> tuple[float, Array, Array]:
-    """Mass, first moment and inertia tensor about the body's origin: I_o = R I_c Rᵀ + m (|c|² 1 - c cᵀ)."""
-    mass = number(element.find("mass"), "value", place, source)
+def _inertial(
+    element: Element, r: Array, p: Array, place: str, source: _Source
+) -> tuple[float, Array, Array]:
+    """Mass, first moment and inertia about the body's origin: I_o = R I_c Rᵀ + m (|c|² 1 - c cᵀ)."""
+    mass = _number(element.find("mass"), "value", place, source)
     if mass < 0.0:
         raise source.wrong(f"{place} has negative mass {mass}")
-    xyz, rpy = read_origin(element, place, source)
-    turn = r @ rotation_of(rpy)
+    xyz, rpy = _origin(element, place, source)
+    turn = r @ _rotation_of(rpy)
     c = r @ xyz + p
     about_com = turn @ _tensor(element, place, source) @ turn.T
     return mass, mass * c, about_com + mass * (float(c @ c) * np.eye(3) - np.outer(c, c))
 
 
-def _canonical(tree: Tree, way: list[TreeJoint]) -> str:
-    """The shortest URDF with the same chain: link names, joint origins, axes and limits."""
+def _impossible_links(tree: _Tree) -> tuple[Check, ...]:
+    """Warn of every link whose inertial parameters no rigid body has (S17)."""
+    found = []
+    for name, link in tree.links.items():
+        element, place = link.find("inertial"), f"link '{name}'"
+        if element is None:
+            continue
+        mass = _number(element.find("mass"), "value", place, tree.source)
+        if words := inconsistency(mass, _tensor(element, place, tree.source)):
+            words = f"no rigid body has the inertial parameters of {place}: {words}"
+            remedy = "correct them in the URDF: what is known of its links is used"
+            found.append(Check.of("S17", "warn", words, where=tree.source.where, remedy=remedy))
+    return tuple(found)
+
+
+def _canonical(tree: _Tree, way: list[_Joint]) -> str:
+    """Return the shortest URDF with the same chain: link names, joint origins, axes, limits."""
     from xml.sax.saxutils import quoteattr  # brings urllib and ssl along: 25 ms
+
+    def numbers(vector: Array) -> str:
+        return " ".join(map(repr, vector.tolist()))
 
     lines = [f"<robot name={quoteattr(tree.name)}>", f"  <link name={quoteattr(tree.root)}/>"]
     for joint in way:
-        (low, high), velocity, effort = joint.limits
-        kind = "continuous" if joint.type == "revolute" and math.isinf(low) and math.isinf(high) else joint.type
-        limits = {"velocity": velocity, "effort": effort}
-        if math.isfinite(low) or math.isfinite(high):  # a range open at one end has no other form: without it, that end is 0
-            limits |= {"lower": max(low, -_OPEN), "upper": min(high, _OPEN)}
-        xyz, rpy = (" ".join(map(repr, map(float, v))) for v in joint.origin)
-        lines += [f"  <link name={quoteattr(joint.child)}/>", f"  <joint name={quoteattr(joint.name)} type=\"{kind}\">",
-                  f"    <origin xyz=\"{xyz}\" rpy=\"{rpy}\"/>",
-                  f"    <parent link={quoteattr(joint.parent)}/>", f"    <child link={quoteattr(joint.child)}/>"]
+        low, high = joint.range
+        limits = {"velocity": joint.velocity, "effort": joint.effort}
+        kind = joint.type
+        if kind == "revolute" and math.isinf(low) and math.isinf(high):
+            kind = "continuous"
+        if math.isfinite(low) or math.isfinite(high):  # an end that is left out would be 0
+            limits |= {"lower": max(low, -URDF.no_limit), "upper": min(high, URDF.no_limit)}
+        lines += [
+            f"  <link name={quoteattr(joint.child)}/>",
+            f'  <joint name={quoteattr(joint.name)} type="{kind}">',
+            f'    <origin xyz="{numbers(joint.xyz)}" rpy="{numbers(joint.rpy)}"/>',
+            f"    <parent link={quoteattr(joint.parent)}/>",
+            f"    <child link={quoteattr(joint.child)}/>",
+        ]
         if joint.moves:
-            lines.append(f"    <axis xyz=\"{' '.join(repr(float(v)) for v in joint.axis)}\"/>")
-            written = [f"{k}=\"{float(v)!r}\"" for k, v in limits.items() if math.isfinite(v)]
+            lines.append(f'    <axis xyz="{numbers(joint.axis)}"/>')
+            written = [f'{k}="{float(v)!r}"' for k, v in limits.items() if math.isfinite(v)]
             lines += [f"    <limit {' '.join(written)}/>"] if written else []
         lines.append("  </joint>")
     return "\n".join([*lines, "</robot>", ""])

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pipelines.io.atomic import write_file
-from pipelines.io.shared_work import shared_out
 from pipelines.report.report import (
     Figure,
     Report,
@@ -30,7 +29,7 @@ from pipelines.report.report import (
     filled,
 )
 from pipelines.report.sentences import template
-from pipelines.report.style import figure_style, format_unit, prepare_matplotlib, printable
+from pipelines.report.style import figure_style, format_unit, printable
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -48,7 +47,6 @@ _WORDS: Final[dict[Tone, str]] = {
     "neutral": "Result",
 }
 _PARAGRAPH = 4000  # characters; longer ones are cut
-_MANY = 8  # figures, from which on a second process is worth its start
 _NUMBER_AND_UNIT = re.compile(
     r"(?<=[\d⁰¹²³⁴⁵⁶⁷⁸⁹]) (?=(%|°C|[mµnk]?(s|Hz|N|m|rad|g|A|V|W)\b|(min|deg|rev)\b))"
     r"|(?<=\bN) (?=m\b)|(?<=[\d)]) (?=[±×] [\d∞])|(?<=[±×]) (?=[\d∞])"
@@ -113,16 +111,8 @@ def _pictures(figures: Mapping[str, Figure]) -> dict[str, Picture]:
 def drawn(
     figures: Mapping[str, Figure], draw: Callable[[Figure, str], Picture]
 ) -> dict[str, Picture]:
-    """`draw(figure, name)` of each figure; many are shared out between two processes."""
-    if len(figures) < _MANY:
-        return {name: draw(figure, name) for name, figure in figures.items()}
-    prepare_matplotlib()  # and import what draws once, before there are two processes
-    import matplotlib.backends.backend_agg
-    import matplotlib.backends.backend_svg
-    import matplotlib.figure  # noqa: F401
-
-    pictures = shared_out(lambda name: draw(figures[name], name), list(figures))
-    return dict(zip(figures, pictures, strict=True))
+    """Return `draw(figure, name)` of each figure."""
+    return {name: draw(figure, name) for name, figure in figures.items()}
 
 
 def _prose(text: object) -> str:

@@ -14,13 +14,26 @@ from pathlib import Path, PurePath
 from typing import Any
 
 from pipelines import __version__
-from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean
-from pipelines.io.atomic import environment_faults, replace_folder, staging_folder
-from pipelines.io.earlier import Coming, put_in_place
-from pipelines.io.files import PROVENANCE, hash_file
-from pipelines.io.places import keep_apart, refuse_foreign, refuse_own_place, tilde
-from pipelines.io.results import decode, headed, json_text, read_foreign_series
-from pipelines.io.stored_result import StoredResult, listed_outputs, read_result
+from pipelines.errors import Check, InputRejected, RrridError, UsageError
+from pipelines.io.output import (
+    PROVENANCE,
+    environment_faults,
+    hash_file,
+    keep_apart,
+    refuse_foreign,
+    replace_folder,
+    staging_folder,
+    tilde,
+)
+from pipelines.io.results import (
+    StoredResult,
+    decode,
+    headed,
+    json_text,
+    listed_outputs,
+    read_foreign_series,
+    read_result,
+)
 from pipelines.recall.pictures import DRAWING, pictures_of, with_pictures, write_drawing
 from pipelines.recall.store import CACHE
 from pipelines.report.render import write_report
@@ -33,7 +46,7 @@ _AGAIN = "run the command again"
 
 
 def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[Report, Path, tuple[Check, ...]]:
-    """Draw the report of the result in `folder`, there or in `out`; the report, where it lies, and what was moved aside for it.
+    """Draw the report of the result in `folder`, there or in `out`; the report, and where it lies.
 
     Raises:
         UsageError: C04, no result there; C02, a result that has no report of its own; C05, files that rrrid did not write.
@@ -44,9 +57,7 @@ def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[
     home = stored.path.parent
     if out is not None:
         keep_apart(out, (stored.path,), (home,))
-    if out is None:
-        refuse_own_place(home, f"go out of it first: cd .. and 'rrrid report {clean(home.name)}'")
-    refuse_foreign(home if out is None else out, force)
+    refuse_foreign(home if out is None else out, force, command=stored.command if out is None else "report")
     report = tilde(_report(stored))
     about = _provenance(home)
     report = _with_figures(report, stored, about)
@@ -64,12 +75,10 @@ def redraw(folder: Path, out: Path | None = None, force: bool = False) -> tuple[
             "outputs": outputs}
         with environment_faults(staging):
             (staging / PROVENANCE).write_text(json_text(tilde(told)), encoding="utf-8")
-        if out is not None:
-            return report, out, put_in_place(staging, out, Coming("report", named=True, force=force))
-        replace_folder(staging, home)
+        replace_folder(staging, target)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
-    return report, home, ()
+    return report, target, ()
 
 
 def _report(stored: StoredResult) -> Report:

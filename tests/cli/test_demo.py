@@ -63,16 +63,13 @@ def test_an_arm_that_runs_away_is_told_of_the_fault() -> None:
 
 @pytest.mark.slow
 @pytest.mark.row("C05")
-def test_what_was_put_in_its_place_is_kept(tmp_path: Path) -> None:
-    """Another command's result lies where the logs shall: it is moved aside, and that is said, though recording has no page."""
+def test_what_was_put_in_its_place_is_not_replaced(tmp_path: Path) -> None:
+    """Another command's result is where the logs go: it is refused, with what to do."""
     write_log(tmp_path / "a.h5", small_log())
     assert rrrid("convert", "a.h5", "--out", "demo/recording", "--no-report", cwd=tmp_path).returncode == 0
     done = rrrid("demo", *QUICK, cwd=tmp_path)
-    assert "the earlier result of convert is kept: its whole output was moved to demo/recording-convert" in done.stderr
-    assert sorted(p.name for p in (tmp_path / "demo").iterdir()) == ["recording", "recording-convert", "run"]
-    again = rrrid("convert", "a.h5", "--out", "demo/recording", "--no-report", cwd=tmp_path)
-    assert "moved to demo/recording-demo" in again.stdout
-    assert len(list((tmp_path / "demo/recording-demo/logs").iterdir())) == 3
+    assert done.returncode == 2
+    assert "holds the earlier result of convert" in done.stderr
 
 
 def test_without_mujoco_and_network(tmp_path: Path) -> None:

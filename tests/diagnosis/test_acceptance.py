@@ -14,7 +14,6 @@ from bench import experiments
 from bench.draw import draw_machine
 from bench.plant import record
 from pipelines.diagnosis.findings import gain_of
-from pipelines.io import shared_work
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact
@@ -55,7 +54,6 @@ def test_a_window_in_which_the_arm_runs_away_is_not_left_out(monkeypatch: pytest
         return calls[-1]
 
     monkeypatch.setattr(gains, "simulate_windows", windows)
-    monkeypatch.setattr(shared_work, "processors", lambda: 1)  # `calls` counts in one process
     first, second = simulation_errors([arm, arm], prepared.motions)
     assert (first.how, second.how) == ("windowed", "none")
 

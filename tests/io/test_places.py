@@ -87,7 +87,7 @@ def test_a_large_folder_of_somebody_else_is_not_walked_through(tmp_path: Path, m
         (tmp_path / f"out/folder-{number:02}/file").write_text("")
     seen: list[object] = []
     look = os.listdir
-    monkeypatch.setattr("pipelines.io.places.os.listdir", lambda folder: seen.append(folder) or look(folder))
+    monkeypatch.setattr("pipelines.io.output.os.listdir", lambda folder: seen.append(folder) or look(folder))
     with pytest.raises(UsageError, match=r"RRID-C05 .*did not write there: folder-00/file, folder-01/file, folder-02/file\."):
         refuse_foreign(tmp_path / "out")
     assert len(seen) < 10

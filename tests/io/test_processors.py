@@ -13,15 +13,15 @@ from tests.cli.commands import REPO
 COUNTED = """
 import json, os
 from pipelines.installation import examine
-from pipelines.io import shared_work
+from pipelines.io.processors import processors
 doctor = next(one.found for one in examine.examine(self_test=False) if one.name == "processor")
-print(json.dumps([doctor.split()[0], shared_work.processors()]))
+print(json.dumps([doctor.split()[0], processors()]))
 """
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system holds no process to processors")
 def test_one_of_them() -> None:
-    """The doctor, and shared work and batches, which ask the same function."""
+    """The doctor and batches."""
     some = {min(os.sched_getaffinity(0))}
     done = subprocess.run([sys.executable, "-c", f"import os; os.sched_setaffinity(0, {some})\n{COUNTED}"], cwd=REPO, timeout=60,
                           capture_output=True, text=True, check=True)

@@ -195,5 +195,5 @@ def test_a_file_that_is_being_written_is_in_use(command: Command, tmp_path: Path
 def test_the_good_log_is_no_row(command: Command, tmp_path: Path) -> None:
     """What every case here spoils is taken as it is."""
     write_log(tmp_path / "a.h5", small_log())
-    assert command("convert", "a.h5", "--out", "out").exit == 0
+    assert command("convert", "a.h5", "--out", "converted").exit == 0
     assert _text(command, tmp_path, text(good())).exit == 0

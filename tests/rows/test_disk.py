@@ -144,11 +144,11 @@ def test_a_first_output_that_cannot_be_written_is_not_there(command: Command, tm
     assert command("convert", "a.h5", "--out", "out").exit == 0
 
 
-def test_samples_that_find_no_room_while_reading_are_no_damaged_log(command: Command, tmp_path: Path) -> None:
-    """The child that reads hands samples over in memory that counts as a file: a limit there is the machine's, not the log's."""
+def test_a_limit_of_files_is_no_damaged_log(command: Command, tmp_path: Path) -> None:
+    """A log is read where no file may grow: the limit is the machine's, not the log's."""
     write_log(tmp_path / "a.h5", small_log())
     with small_files(1000):
-        command("convert", "a.h5", "--out", "out").refused("P02", 6, "a.h5", "ulimit -f")
+        command("convert", "a.h5", "--out", "out").refused("P02", 6, "out", "ulimit -f")
     assert open_log(tmp_path / "a.h5").log == small_log()
 
 

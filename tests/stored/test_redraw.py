@@ -63,7 +63,6 @@ def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path,
         return own(figure, name)
 
     monkeypatch.setattr(render, "_draw", noted)
-    monkeypatch.setattr("pipelines.io.shared_work.processors", lambda: 1)
     redraw(tmp_path / "a")
     assert (len(figures) > 4, names) == (True, [])
     (tmp_path / f"a/figures/{figures[0]}.svg").unlink()
@@ -81,15 +80,14 @@ def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path,
 
 @pytest.mark.row("C05")
 def test_no_result_is_lost_to_a_report(results: Path, tmp_path: Path) -> None:
-    """C05: drawn into a folder with another command's result, which is kept; a report that lay there is replaced."""
+    """C05: a folder with another command's result is refused; a report that is there already is replaced."""
     shutil.copytree(results / "inspect", tmp_path / "there")
-    checks = redraw(results / "run", tmp_path / "there")[2]
-    assert [(c.code, str(tmp_path / "there-inspect") in c.message) for c in checks] == [("RRID-C05", True)]
-    assert contents(tmp_path / "there-inspect") == contents(results / "inspect")
-    assert redraw(results / "inspect", tmp_path / "there")[2] == ()
-    shutil.copytree(results / "inspect", tmp_path / "here")
-    said = rrrid("report", results / "run", "--out", "here", cwd=tmp_path).stdout
-    assert f"moved to {tmp_path / 'here-inspect'}" in said
+    with pytest.raises(UsageError, match="RRID-C05 .*earlier result of inspect"):
+        redraw(results / "run", tmp_path / "there")
+    assert contents(tmp_path / "there") == contents(results / "inspect")
+    redraw(results / "run", tmp_path / "here")
+    redraw(results / "inspect", tmp_path / "here")
+    assert rrrid("report", results / "run", "--out", "there", cwd=tmp_path).returncode == 2
 
 
 @pytest.mark.slow

@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from functools import partial
 
 from pipelines.errors import Check, InputRejected, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.io.derive import recording
 from pipelines.io.experiment import ExperimentLog
-from pipelines.io.shared_work import shared_out
 from pipelines.model.commanded import against_command
 from pipelines.model.plausibility import mismatches
 from pipelines.model.rows.prepare import Logs
@@ -34,7 +32,7 @@ def examined(
             together, with the repair, unless `skip_sanity_checks`.
     """
     every = list(logs)
-    said = shared_out(partial(_said, skip_sanity_checks=skip_sanity_checks), every)
+    said = [_said(log, skip_sanity_checks=skip_sanity_checks) for log in every]
     gates = [told for told in said if isinstance(told, Check)]
     if reject := next((told for told in gates if told.level == "reject"), None):
         raise reject.as_error()

@@ -11,7 +11,6 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.fit.least_squares import Errors
 from pipelines.fit.statistics import Triangles, gather
 from pipelines.io.experiment import Array, ExperimentLog
-from pipelines.io.shared_work import shared_out
 from pipelines.model.estimation.blocks import Stretches, by_blocks, by_stretches
 from pipelines.model.estimation.conditioning import condition, cutoff_at, wanted_cutoff
 from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
@@ -91,7 +90,7 @@ def of_each(logs: Sequence[ExperimentLog], work: Callable[[int], Reconstructed])
             return no
 
     longest = sorted(range(len(logs)), key=lambda place: -logs[place].n_samples)
-    found = dict(zip(longest, shared_out(moved, longest), strict=True))
+    found = dict(zip(longest, map(moved, longest), strict=True))
     motions = []
     for place, log in enumerate(logs):
         one = found[place]

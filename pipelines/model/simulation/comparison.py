@@ -18,7 +18,6 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.io.experiment import Array, ExperimentLog
-from pipelines.io.shared_work import shared_out
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
@@ -66,7 +65,11 @@ def in_loops(arms: Sequence[Arm], motions: Motions, seconds: float) -> list[list
     """
     first = [_first(log, seconds) for log, _ in motions]
     # One controller and arm: what suffices for a log suffices for the next.
-    steps = shared_out(lambda arm: _if_possible(lambda: choose_step(Plant.of(arm), first[0])), arms)
+
+    def step_of(arm: Arm) -> Step | None:
+        return _if_possible(lambda: choose_step(Plant.of(arm), first[0]))
+
+    steps = [step_of(arm) for arm in arms]
     pieces = [(k, step, places) for k, step in enumerate(steps) if step is not None for places in _apart(arms[k], first)]
     pieces.sort(key=lambda piece: -len(piece[2]))  # what takes arrays takes longest
 
@@ -75,7 +78,7 @@ def in_loops(arms: Sequence[Arm], motions: Motions, seconds: float) -> list[list
         return _if_possible(lambda: _moved(arms[k], [first[place] for place in places], step))
 
     found: list[dict[int, Array] | None] = [{} if step is not None else None for step in steps]
-    for (k, _, places), done in zip(pieces, shared_out(moved, pieces), strict=True):
+    for (k, _, places), done in zip(pieces, map(moved, pieces), strict=True):
         before = found[k]
         found[k] = None if before is None or done is None else before | dict(zip(places, done, strict=True))
     return [None if one is None else [(one[place], log.q[:len(one[place])], log.sample_time)
@@ -180,7 +183,7 @@ def _open(first: Simulation, last: Simulation) -> bool:
 def _each(arms: Sequence[Arm], motions: Motions, soft: bool, longest: float, *, closed: bool = True) -> list[Simulation]:
     """`soft`: something moves beside the joints of one of them; `longest` [s] of a log in a loop."""
     every = (in_loops(arms, motions, longest) if closed else
-             shared_out(partial(_in_windows, motions=motions, exact=_ROUGH if soft else _EXACT), arms))
+             map(partial(_in_windows, motions=motions, exact=_ROUGH if soft else _EXACT), arms))
     return [Simulation.none(arm.n_joints) if pairs is None else _all(arm, motions, pairs, closed)
             for arm, pairs in zip(arms, every, strict=True)]
 

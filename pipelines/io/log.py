@@ -1,0 +1,426 @@
+"""Hold one recorded or simulated experiment, frozen and in SI: what every stage reads."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields, replace
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected, UsageError
+from pipelines.io import schema
+from pipelines.io.robot import RobotDescription, format_robot, parse_robot
+from pipelines.io.sandbox import Answer
+
+__all__ = [
+    "Array",
+    "Controller",
+    "Derived",
+    "ExperimentLog",
+    "Signal",
+    "assembled",
+    "attributes_of",
+    "columns_in",
+    "created",
+    "derive",
+    "derived_by",
+    "digest_of",
+    "log_text",
+    "parts_of",
+    "recording",
+    "select_joints",
+    "with_robot",
+]
+
+Array = npt.NDArray[np.float64]
+
+PER_JOINT = ("kp", "kd", "ki", "observer_gain", "output_limit", "torque_resolution")
+_DERIVING = ("reconstruct", "estimate-bps", "validate-writing", "diagnose", "extend")
+
+
+def frozen(values: npt.ArrayLike) -> Array:
+    """Return `values` as a read-only array of float64."""
+    array = np.asarray(values, dtype=np.float64)
+    if array.flags.writeable:
+        array = array.view()
+        array.flags.writeable = False
+    return array
+
+
+def _same(a: object, b: object) -> bool:
+    """Return whether two values are equal, arrays bit for bit."""
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a.shape == b.shape and a.tobytes() == b.tobytes()
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(_same(a[key], b[key]) for key in a)
+    return type(a) is type(b) and a == b
+
+
+class _Bitwise:
+    """Equality of dataclasses that hold arrays; fields that are not compared do not count."""
+
+    def __eq__(self, other: object) -> bool:
+        fields = self.__dataclass_fields__  # type: ignore[attr-defined]
+        names = [name for name, one in fields.items() if one.compare]
+        return type(self) is type(other) and all(
+            _same(getattr(self, name), getattr(other, name)) for name in names
+        )
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, eq=False)
+class Signal(_Bitwise):
+    """Samples with their unit and their name in words."""
+
+    values: Array  # (samples,) or (samples, joints)
+    units: str
+    long_name: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", frozen(self.values))
+
+
+@dataclass(frozen=True, eq=False)
+class Controller(_Bitwise):
+    """What followed the reference. `None` means: the log does not say, and it is not guessed."""
+
+    law: str
+    kp: Array | None = None  # (n,) [N m/rad]; "computed-torque": [1/s^2]
+    kd: Array | None = None  # (n,) [N m s/rad]; "computed-torque": [1/s]
+    ki: Array | None = None  # (n,)
+    feedforward: tuple[str, ...] | None = None
+    velocity: str | None = None
+    observer_gain: Array | None = None  # (n, 3), k_i of eq. (20)
+    output_limit: Array | None = None  # (n,) [N m]
+    torque_resolution: Array | None = None  # (n,) [N m]
+    delay: int | None = None  # samples between q[k] and the tau it leads to
+    model: str | None = None  # text of the model.json that feed-forward used
+
+    def __post_init__(self) -> None:
+        for key in PER_JOINT:
+            if (value := getattr(self, key)) is not None:
+                object.__setattr__(self, key, frozen(value))
+        if self.feedforward is not None:
+            object.__setattr__(self, "feedforward", tuple(self.feedforward))
+
+
+@dataclass(frozen=True)
+class Derived:
+    """Where the samples of a derived log come from."""
+
+    command: str
+    settings: str  # JSON
+    source_sha256: str
+    created: str  # ISO 8601, UTC
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentLog(_Bitwise):
+    """One experiment on one robot (log-format.md), everything in SI.
+
+    `signals` always holds t and, but in planned logs, q and tau. Samples may be NaN: a recording
+    is shown as it is, and `pipelines.quality.checks` says what is wrong with it.
+    """
+
+    name: str
+    experiment: str
+    role: str
+    origin: str
+    robot_name: str
+    sample_time: float  # [s] nominal
+    robot_text: str
+    signals: Mapping[str, Signal]
+    torque: str | None = None
+    recorded: str | None = None
+    joint: int | None = None  # 1-based
+    posture: Array | None = None  # (n,) [rad]
+    period: float | None = None  # [s]
+    controller: Controller | None = None
+    derived: Derived | None = None
+    source: str = field(default="", compare=False)  # the file it was read from; no part of the log
+
+    def __post_init__(self) -> None:
+        # one order, whatever they were given in: equal logs make equal files
+        order = {name: place for place, name in enumerate((*schema.SIGNALS, *schema.DERIVED))}
+        names = sorted(self.signals, key=lambda name: (order.get(name, len(order)), name))
+        signals = {name: self.signals[name] for name in names}
+        object.__setattr__(self, "signals", MappingProxyType(signals))
+        if self.posture is not None:
+            object.__setattr__(self, "posture", frozen(self.posture))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        values = {key: getattr(self, key) for key in self.__dataclass_fields__}
+        return _rebuild, (values | {"signals": dict(self.signals)},)
+
+    def __getitem__(self, name: str) -> Array:
+        """Return the samples of signal `name`; KeyError where the log has none."""
+        return self.signals[name].values
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.signals
+
+    @property
+    def controlled(self) -> bool:
+        """Return whether it says how its controller works."""
+        return self.controller is not None and self.controller.law != "unknown"
+
+    @property
+    def t(self) -> Array:
+        """Return the time stamps (samples,) [s]."""
+        return self["t"]
+
+    @property
+    def q(self) -> Array:
+        """Return the joint positions (samples, n) [rad]."""
+        return self["q"]
+
+    @property
+    def tau(self) -> Array:
+        """Return the joint torques (samples, n) [N m]."""
+        return self["tau"]
+
+    @property
+    def n_samples(self) -> int:
+        """Return the number of samples."""
+        return int(self.t.shape[0])
+
+    @property
+    def n_joints(self) -> int:
+        """Return the number of joints of the robot."""
+        return self.robot.n_joints
+
+    @cached_property
+    def robot(self) -> RobotDescription:
+        """Return the description of the robot."""
+        return parse_robot(self.robot_text, where=self.source or self.name, inside_log=True)
+
+
+def _rebuild(values: dict[str, Any]) -> ExperimentLog:
+    return ExperimentLog(**values)
+
+
+def attributes_of(log: ExperimentLog) -> dict[str, dict[str, Any]]:
+    """Return the attributes that are there, grouped as in HDF5, without format and digest."""
+    owners = {"attributes": log, "controller": log.controller, "derived": log.derived}
+    groups = {}
+    for group, owner in owners.items():
+        names = [one.name for one in fields(schema.GROUPS[group])]
+        if owner is not None:
+            values = {name: getattr(owner, name) for name in names}
+            groups[group] = {name: value for name, value in values.items() if value is not None}
+    return groups
+
+
+def log_text(log: ExperimentLog) -> str:
+    """Return everything but the samples as canonical JSON: sorted keys, no blanks, ASCII."""
+    whole: dict[str, Any] = schema.plain(attributes_of(log))
+    whole["robot"] = log.robot_text
+    whole["signals"] = _words_of(log)
+    return json.dumps(whole, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _words_of(log: ExperimentLog) -> dict[str, dict[str, str]]:
+    return {k: {"units": s.units, "long_name": s.long_name} for k, s in log.signals.items()}
+
+
+def digest_of(log: ExperimentLog) -> str:
+    """Return the SHA-256 over the canonical attributes, the robot text and every sample."""
+    head = f"{schema.FORMAT}/{schema.FORMAT_VERSION}\n{log_text(log)}\n"
+    total = hashlib.sha256(head.encode())
+    for name in sorted(log.signals):
+        values = np.ascontiguousarray(log.signals[name].values, dtype="<f8")
+        total.update(f"{name} {values.shape}\n".encode())
+        total.update(values.data if values.size else b"")
+    return total.hexdigest()
+
+
+def parts_of(log: ExperimentLog) -> Answer:
+    """Return what a container holds of a log: groups of attributes, digest, signals."""
+    groups = {**attributes_of(log), "robot": log.robot_text}
+    about = {"groups": groups, "digest": digest_of(log), "signals": _words_of(log)}
+    return Answer(about, {name: signal.values for name, signal in log.signals.items()})
+
+
+def assembled(parts: Answer, where: str) -> ExperimentLog:
+    """Return the log of what a container holds.
+
+    Raises:
+        InputRejected: something is missing (S01), not in the format (S19), or wrong (S20).
+    """
+    groups = dict(parts.about["groups"])
+    values = schema.checked("attributes", groups.pop("attributes"), where)
+    robot = groups.pop("robot", None)
+    if not isinstance(robot, str):
+        remedy = "a log explains itself: write /robot"
+        words = "the robot description is missing"
+        raise InputRejected("S01", words, where=where, remedy=remedy)
+    for name, kind in (("controller", Controller), ("derived", Derived)):
+        if name in groups:
+            found = schema.checked(name, groups.pop(name), f"{where}, {name}")
+            values[name] = kind(**found)
+    if groups:
+        words = f"{sorted(groups)} are not in format version {schema.FORMAT_VERSION}"
+        raise InputRejected("S19", words, where=where, remedy="remove them")
+    signals = {}
+    for name, samples in parts.arrays.items():
+        words_of = dict(parts.about["signals"][name])
+        units, long_name = str(words_of.pop("units", "")), str(words_of.pop("long_name", ""))
+        if words_of:
+            words = f"attributes {sorted(words_of)} are not in the format"
+            place = f"{where}, signal {name}"
+            raise InputRejected("S19", words, where=place, remedy="remove them")
+        signals[name] = Signal(samples, units, long_name)
+    return ExperimentLog(**values, robot_text=robot, signals=signals, source=where)
+
+
+def created(recorded: str | None = None) -> str:
+    """Return the time stamp of a derived log: equal inputs give equal logs.
+
+    It is the time of the recording, or the one that reproducible builds agree on.
+    """
+    if recorded is not None:
+        return recorded
+    seconds = int(os.environ.get("SOURCE_DATE_EPOCH", "0"))
+    return time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(seconds))
+
+
+def derive(
+    log: ExperimentLog, command: str, settings: Mapping[str, Any], signals: Mapping[str, Array]
+) -> ExperimentLog:
+    """Return `log` with further `signals` that `command` derived with `settings`.
+
+    `source_sha256` is the digest of the recording, not of its file: a derived log fits its
+    recording in either container. What the recording says under /derived is kept in the settings.
+    """
+    bare = recording(log)
+    kept = {name: signal for name, signal in bare.signals.items() if name not in signals}
+    bare = replace(bare, signals=kept)
+    steps = {name: done for name, done in _steps(log).items() if name != command}
+    record = {
+        "steps": steps | {command: dict(settings)},
+        "recording": asdict(bare.derived) if bare.derived else None,
+        "own": [name for name in bare.signals if name in schema.DERIVED],
+    }
+    new = {
+        name: Signal(values, schema.unit_of(name), schema.DERIVED[name][1])
+        for name, values in signals.items()
+    }
+    text = json.dumps(record, sort_keys=True)
+    about = Derived(command, text, digest_of(bare), created(log.recorded))
+    return replace(log, signals={**log.signals, **new}, derived=about)
+
+
+def derived_by(log: ExperimentLog, command: str, settings: Mapping[str, Any]) -> bool:
+    """Return whether `log` holds what `command` with `settings` derives from its recording."""
+    done = _steps(log).get(command)
+    if done is None or done != json.loads(json.dumps(dict(settings))) or log.derived is None:
+        return False
+    return log.derived.source_sha256 == digest_of(recording(log))
+
+
+def recording(log: ExperimentLog) -> ExperimentLog:
+    """Return `log` without what rrrid derived from it."""
+    if log.derived is None or log.derived.command not in _DERIVING:
+        return log
+    record = _record(log)
+    before, own = record.get("recording"), record.get("own")
+    names = own if isinstance(own, list) else []
+    kept = {k: s for k, s in log.signals.items() if k not in schema.DERIVED or k in names}
+    derived = Derived(**before) if isinstance(before, dict) else None
+    return replace(log, signals=kept, derived=derived)
+
+
+def _steps(log: ExperimentLog) -> dict[str, Any]:
+    """Return every command that derived something, with its settings."""
+    steps = _record(log).get("steps")
+    return steps if isinstance(steps, dict) else {}
+
+
+def _record(log: ExperimentLog) -> dict[str, Any]:
+    """Return the settings under /derived; those of another program need not be ours."""
+    if log.derived is None or log.derived.command not in _DERIVING:
+        return {}
+    try:
+        found = json.loads(log.derived.settings)
+    except ValueError:
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def columns_in(log: ExperimentLog) -> int:
+    """Return how many joints the samples have, whatever the description says; 0 for none."""
+    samples = log.t.size if "t" in log else -1
+    shapes = [s.values.shape for k, s in log.signals.items() if s.values.ndim == 2 and k != "t"]
+    wide = [shape for shape in shapes if 1 not in shape] or shapes
+    return max((n if count == samples else count for count, n in wide), default=0)
+
+
+def with_robot(log: ExperimentLog, robot: RobotDescription) -> ExperimentLog:
+    """Return `log` with another description of its robot; S02 where that has other joints."""
+    columns = columns_in(log)
+    if columns not in (0, robot.n_joints):
+        words = f"log has {columns} joints, model {robot.n_joints}"
+        remedy = "give the description of this robot, or choose the columns with --joints"
+        raise InputRejected("S02", words, where=log.source or log.name, remedy=remedy)
+    return replace(log, robot_text=format_robot(robot))
+
+
+def select_joints(
+    log: ExperimentLog, joints: tuple[int, ...], robot: RobotDescription | None = None
+) -> ExperimentLog:
+    """Return `log` with the columns of `joints` (1-based) alone, in that order.
+
+    A serial arm cannot lose a joint from its description: where the log's own robot has another
+    number of joints than are chosen, `robot` must describe the arm that is left.
+
+    Raises:
+        UsageError: C02, a joint the log does not have, or twice; or no description fits.
+        InputRejected: S02, the log is about a joint that is not chosen.
+    """
+    columns, where = columns_in(log), log.source or log.name
+    absent = [str(joint) for joint in joints if not 1 <= joint <= columns]
+    if absent or len(set(joints)) != len(joints):
+        words = f"'{','.join(map(str, joints))}' names a joint twice"
+        if absent:
+            words = f"a log with {columns} joints has no joint {' or '.join(absent)}"
+        remedy = "give each of --joints once, counted from 1"
+        raise UsageError("C02", words, where=where, remedy=remedy)
+    if robot is None and log.n_joints != len(joints):
+        words = f"{len(joints)} joint{' is' if len(joints) == 1 else 's are'} chosen"
+        words = f"{words}, but the log describes a robot of {log.n_joints}"
+        remedy = "describe the arm that is left with --robot"
+        raise UsageError("C02", words, where=where, remedy=remedy)
+    if log.joint is not None and log.joint not in joints:
+        words = f"the log moves joint {log.joint}, which --joints leaves out"
+        remedy = "choose it too, or leave this log out"
+        raise InputRejected("S02", words, where=where, remedy=remedy)
+    chosen = np.array(joints) - 1
+    samples = log.t.size if "t" in log else -1
+
+    def rows(values: Array | None) -> Array | None:
+        return values[chosen] if values is not None and len(values) == columns else values
+
+    signals = {}
+    for name, signal in log.signals.items():
+        values = signal.values
+        if values.ndim == 2 and values.shape == (samples, columns):
+            values = np.ascontiguousarray(values[:, chosen])
+        elif values.ndim == 2 and values.shape == (columns, samples):  # turned round (S11)
+            values = values[chosen]
+        signals[name] = replace(signal, values=values)
+    controller = log.controller
+    if controller is not None:
+        changes: dict[str, Any] = {key: rows(getattr(controller, key)) for key in PER_JOINT}
+        controller = replace(controller, **changes)
+    joint = None if log.joint is None else joints.index(log.joint) + 1
+    posture = rows(log.posture)
+    return replace(log, signals=signals, joint=joint, posture=posture, controller=controller)

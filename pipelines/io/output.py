@@ -1,0 +1,441 @@
+"""Write results: a reader sees the old file or folder or the new one, never anything else.
+
+A file is written under a hidden name beside its target and moved over it. A folder is filled under
+a hidden name and takes the place of rrrid's own earlier output; any other folder is refused (C05).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import errno
+import hashlib
+import json
+import os
+import platform
+import re
+import shutil
+import tempfile
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from pipelines.errors import EnvironmentFault, RrridError, UsageError, clean
+
+__all__ = [
+    "PROVENANCE",
+    "environment_faults",
+    "fault_of",
+    "given_names",
+    "hash_file",
+    "keep_apart",
+    "provenance_of",
+    "refuse_foreign",
+    "refuse_own_place",
+    "refuse_unwritable",
+    "remove_folder",
+    "renamed",
+    "replace_folder",
+    "short_names",
+    "slug",
+    "staging_folder",
+    "staging_place",
+    "sweep",
+    "temporary_folder",
+    "tilde",
+    "told_apart",
+    "write_file",
+    "write_text",
+    "written_by",
+]
+
+PROVENANCE = "provenance.json"
+_MARK = ".rrrid-tmp-"
+_ELSEWHERE = "choose another folder with --out"
+_RESERVED = re.compile(r"(CON|PRN|AUX|NUL|COM[1-9]|LPT[1-9])(\..*)?", re.IGNORECASE)
+
+
+@contextlib.contextmanager
+def environment_faults(path: Path) -> Iterator[None]:
+    """Turn an OSError while writing below `path` into the fault of the environment (exit 6)."""
+    try:
+        yield
+    except BrokenPipeError:  # the reader of our output has left: no fault of a file
+        raise
+    except OSError as problem:
+        raise fault_of(problem, path) from problem
+    except RuntimeError as problem:
+        # HDF5 cannot close a file whose last bytes found no room, and h5py says that instead.
+        if not isinstance(problem.__context__, OSError):
+            raise
+        raise fault_of(problem.__context__, path) from problem
+
+
+def fault_of(problem: OSError, path: Path) -> RrridError:
+    """Return the error behind an operating-system error, at the file it names or at `path`."""
+    named = problem.filename
+    draft = named and os.path.basename(os.fsdecode(named)).startswith(_MARK)
+    where = named if named and not draft else path
+    if problem.errno in (errno.ENAMETOOLONG, errno.ELOOP):
+        return UsageError("C07", "not a path of this system", where=where, remedy="check the path")
+    if problem.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+        remedy = "choose another --out, or change its permissions"
+        return EnvironmentFault("F13", "permission denied", where=where, remedy=remedy)
+    words, remedy = "cannot be read or written: ", "check the disk and the path"
+    words += os.strerror(problem.errno) if problem.errno else str(problem)
+    if problem.errno == errno.EFBIG:
+        words, remedy = "larger than this process may write", "raise its limit (ulimit -f)"
+    if problem.errno in (errno.ENOSPC, errno.EDQUOT):
+        words, remedy = "no space left on the disk", "free space and run again"
+    return EnvironmentFault("P02", words, where=where, remedy=remedy)
+
+
+def hash_file(path: Path) -> str:
+    """Return the SHA-256 of the bytes of `path`, in hexadecimal."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as problem:
+        raise fault_of(problem, path) from None
+
+
+def write_file(path: Path, fill: Callable[[Path], object]) -> None:
+    """Let `fill` write a hidden file beside `path`, then move it over `path`.
+
+    Inside a staging folder nothing is flushed yet: `replace_folder` does it for all at once.
+
+    Raises:
+        EnvironmentFault: disk full, no permission; the old file is untouched.
+    """
+    with environment_faults(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        sweep(path.parent)
+        staged = any(part.startswith(_MARK) for part in path.parts[:-1])
+        draft = path.parent / f"{_draft_name()}{path.suffix}"  # writers look at the ending
+        try:
+            fill(draft)
+            if not staged:
+                _sync(draft)
+            os.replace(draft, path)
+        except BaseException:
+            draft.unlink(missing_ok=True)
+            raise
+        if not staged:
+            _sync(path.parent)
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write `text` to `path` as UTF-8, whole or not at all."""
+    write_file(path, lambda draft: draft.write_text(text, encoding="utf-8"))
+
+
+def staging_place(target: Path) -> Path:
+    """Return a free hidden name beside `target`; what killed processes left there is removed."""
+    with environment_faults(target):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        sweep(target.parent)
+        return target.parent / _draft_name()
+
+
+def staging_folder(target: Path) -> Path:
+    """Make an empty hidden folder beside `target`, to be given to `replace_folder`."""
+    folder = staging_place(target)
+    with environment_faults(target):
+        folder.mkdir()
+    return folder
+
+
+def temporary_folder() -> Path:
+    """Make an empty folder among the system's temporary files; the caller removes it."""
+    return staging_folder(Path(tempfile.gettempdir()) / "rrrid")
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder and all that is in it, wholly even if interrupted meanwhile."""
+    try:
+        shutil.rmtree(folder, ignore_errors=True)
+    except BaseException:
+        shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def replace_folder(staging: Path, target: Path) -> None:
+    """Put `staging` in the place of `target`, and remove what was there.
+
+    A folder cannot be moved over another: the old one gets a hidden name first. Of a process that
+    is killed between the two moves, `sweep` brings the old folder back.
+    """
+    with environment_faults(target):
+        for path in (*staging.rglob("*"), staging):
+            _sync(path)
+        old = staging.with_name(f"{staging.name}{_OLD}{target.name}")
+        if target.exists():
+            os.replace(target, old)
+        try:
+            os.replace(staging, target)
+        except BaseException:
+            if old.exists():
+                os.replace(old, target)
+            raise
+        try:
+            if old.exists():
+                shutil.rmtree(old)
+        finally:
+            remove_folder(old)
+        _sync(target.parent)
+
+
+_OLD = "-of-"  # between the name of a draft and that of the folder whose place it takes
+
+
+def _draft_name() -> str:
+    """Return a new hidden name: the machine, whose processes alone can be asked, and the process."""
+    return f"{_machine()}{os.getpid()}-{os.urandom(4).hex()}"
+
+
+def _machine() -> str:
+    return f"{_MARK}{zlib.crc32(platform.node().encode()):08x}-"
+
+
+def sweep(folder: Path) -> None:
+    """Remove what killed processes of this machine left in `folder`; bring back a moved result."""
+    for left in folder.glob(f"{_machine()}*"):
+        process = left.name.removeprefix(_machine()).split("-")[0]
+        if not process.isdigit() or _alive(int(process)):
+            continue
+        target = folder / left.name.partition(_OLD)[2]
+        if target != folder and not target.exists():
+            os.replace(left, target)
+        elif left.is_dir():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    try:  # Linux: a dead process whose parent has not waited for it still has its number
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except (OSError, IndexError):
+        return True
+
+
+def _sync(path: Path) -> None:
+    handle = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    except OSError as problem:
+        if problem.errno not in (errno.EINVAL, errno.ENOTSUP):  # some file systems sync no folder
+            raise
+    finally:
+        os.close(handle)
+
+
+def keep_apart(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> None:
+    """Refuse an `out` that holds one of the `sources`, or lies inside an input folder (C05)."""
+    target = out.resolve()
+    for source in sources:
+        # a link in `out` would be deleted as well, wherever it leads
+        linked = Path(os.path.abspath(source)).is_relative_to(os.path.abspath(out))
+        if linked or source.resolve().is_relative_to(target):
+            words = f"holds the input {source}, and would be replaced with it"
+            raise UsageError("C05", words, where=out, remedy=_ELSEWHERE)
+    for folder in folders:
+        if os.path.isdir(folder) and target.is_relative_to(folder.resolve()):
+            words = f"lies inside the input {folder}"
+            raise UsageError("C05", words, where=out, remedy=_ELSEWHERE)
+
+
+def refuse_own_place(out: Path) -> None:
+    """Refuse the folder one is in, or around it: a shell would stay in the old one (C05)."""
+    try:
+        here = Path.cwd()
+    except FileNotFoundError:
+        return
+    if here.is_relative_to(out.resolve()):
+        words = "is the folder you are in, or around it, and would be replaced under you"
+        remedy = f"{_ELSEWHERE}, or call from outside of it (cd)"
+        raise UsageError("C05", words, where=out, remedy=remedy)
+
+
+def refuse_foreign(
+    out: Path,
+    force: bool = False,
+    remade: Callable[[str], bool] = lambda name: False,
+    command: str = "",
+) -> tuple[str, ...]:
+    """Refuse an output folder that is not new, empty, or rrrid's own earlier output (C05).
+
+    Args:
+        force: replace rrrid's output of any command, and with files added or changed since.
+        remade: own files, by their names in `out`, that nobody edits: they are made again (P10).
+        command: refuse the output of another command than this one; "" for none.
+
+    Returns:
+        The names of the files that are made again.
+    """
+    if out.is_symlink() or (out.exists() and not out.is_dir()):
+        raise UsageError("C05", "is not a folder", where=out, remedy=_ELSEWHERE)
+    refuse_own_place(out)
+    if not out.exists() or not any(out.iterdir()):
+        return ()
+    about = provenance_of(out)
+    outputs = about.get("outputs")
+    ours = outputs if isinstance(outputs, dict) else {}
+    if ours and force:
+        return ()
+    known = {*ours, PROVENANCE} if ours else set()
+    foreign = list(islice((name for name in _members(out) if name not in known), 3))
+    if foreign:
+        words = f"holds files that rrrid did not write there: {', '.join(foreign)}"
+        raise UsageError("C05", words, where=out, remedy=f"{_ELSEWHERE}, or move them")
+    if command and about.get("command") != command:
+        words = f"holds the earlier result of {clean(about.get('command'), 40)}"
+        remedy = f"{_ELSEWHERE}, or replace it with --force"
+        raise UsageError("C05", words, where=out, remedy=remedy)
+    edited = [
+        name for name in _members(out) if name in ours and hash_file(out / name) != ours[name]
+    ]
+    if kept := [name for name in edited if not remade(name)]:
+        words = f"holds files that were changed since rrrid wrote them: {', '.join(kept[:3])}"
+        remedy = f"{_ELSEWHERE}, or replace them with --force"
+        raise UsageError("C05", words, where=out, remedy=remedy)
+    return tuple(edited)
+
+
+def refuse_unwritable(out: Path) -> None:
+    """Refuse an `out` that cannot be made where it should be (F13, C05)."""
+    above = next(path for path in out.absolute().parents if path.exists())
+    if not above.is_dir():
+        words = f"lies below {above}, which is not a folder"
+        raise UsageError("C05", words, where=out, remedy=_ELSEWHERE)
+    if not os.access(above, os.W_OK | os.X_OK):
+        remedy = "choose another --out, or change its permissions"
+        raise EnvironmentFault("F13", "permission denied", where=above, remedy=remedy)
+
+
+def _members(folder: Path, above: str = "") -> Iterator[str]:
+    """Yield the names of all files below `folder`, in order; also of unreadable folders."""
+    for name in sorted(os.listdir(folder)):
+        path = folder / name
+        if path.is_symlink() or not path.is_dir() or not os.access(path, os.R_OK | os.X_OK):
+            yield f"{above}{name}"
+        else:
+            yield from _members(path, f"{above}{name}/")
+
+
+def provenance_of(folder: Path) -> dict[str, Any]:
+    """Return the provenance.json of rrrid's own output in `folder`; empty where there is none."""
+    try:
+        about = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return about if isinstance(about, dict) and about.get("tool") == "rrrid" else {}
+
+
+def written_by(folder: Path) -> str:
+    """Return the command whose output `folder` is; "" where it is none."""
+    return str(provenance_of(folder).get("command", ""))
+
+
+def slug(text: str) -> str:
+    """Return `text` as a file name: [A-Za-z0-9._-], at most 80, hashed where changed (X11)."""
+    plain = re.sub(r"[^A-Za-z0-9._-]+", "-", text).strip("-.")[:69]
+    reserved = _RESERVED.fullmatch(plain) is not None
+    if plain == text and plain and not reserved:
+        return plain
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()[:8]
+    return f"{'x-' if reserved else ''}{plain or 'x'}-{digest}"
+
+
+def short_names(paths: Iterable[Path]) -> dict[str, str]:
+    """Map every input folder to its name in a result: "" for one, else unlike the others.
+
+    A result then does not depend on where its inputs lie: equal inputs give equal bytes.
+    """
+    roots = list(dict.fromkeys(path if os.path.isdir(path) else path.parent for path in paths))
+    if len(roots) == 1:
+        return {str(roots[0]): ""}
+    names: dict[str, str] = {}
+    for root in roots:
+        name, number = root.name, 1
+        while name and name in names.values():
+            number += 1
+            name = f"{root.name}-{number}"
+        names[str(root)] = name
+    return names
+
+
+def told_apart(paths: Iterable[str]) -> dict[str, str]:
+    """Map every path to its last part, or to as many from its end as no other ends in."""
+    parts = {path: Path(path).parts for path in paths}
+    names: dict[str, str] = {}
+    depth = 0
+    while left := [path for path in parts if path not in names]:
+        depth += 1
+        ends = Counter(parts[path][-depth:] for path in left)
+        for path in left:
+            end = parts[path][-depth:]
+            if ends[end] == 1 or depth >= len(parts[path]):
+                names[path] = str(Path(*end))
+    return names
+
+
+def given_names(paths: Iterable[Path]) -> dict[str, str]:
+    """Map every absolute input to the way it was written on the command line."""
+    return {str(path.absolute()): str(path) for path in paths if not path.is_absolute()}
+
+
+def renamed(value: Any, names: Mapping[str, str]) -> Any:
+    """Return `value` with every path that begins with one of `names` written by its name."""
+    roots = sorted((root for root in names if root != os.sep), key=len, reverse=True)
+    # messages hold the path as `clean` leaves it, on one line
+    rules = [(text, names[root]) for root in roots for text in dict.fromkeys((root, clean(root)))]
+
+    def rename(text: str) -> str:
+        for place, name in rules:
+            if place not in text:
+                continue
+            below, itself = (f"{name}/", name) if name else ("", ".")
+            pattern = rf"(?<![^\s,:;(\['\"]){re.escape(place)}(?:(/)|(?![^\s,:;)\]'\"]))"
+            text = re.sub(pattern, lambda found: below if found[1] else itself, text)  # noqa: B023
+        return text
+
+    return _texts(value, rename) if rules else value
+
+
+def tilde(value: Any) -> Any:
+    """Return `value` with the home folder written as ~, so that no report names its user (X14)."""
+    home = os.path.expanduser("~")
+    return _texts(value, lambda text: text.replace(home, "~")) if len(home) > 1 else value
+
+
+def _texts(value: Any, change: Callable[[str], str]) -> Any:
+    """Return `value` with `change` done to its texts; the very object where nothing changed."""
+    if isinstance(value, str | Path):
+        text = change(str(value))
+        return value if text == str(value) else type(value)(text)
+    if isinstance(value, Mapping):
+        return {_texts(key, change): _texts(item, change) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        items = [_texts(item, change) for item in value]
+        same = all(new is old for new, old in zip(items, value, strict=True))
+        return value if same else type(value)(items)
+    if not dataclasses.is_dataclass(value) or isinstance(value, type):
+        return value
+    changes = {}
+    for field in dataclasses.fields(value):
+        if field.init and field.metadata.get("stored", True):
+            old = getattr(value, field.name)
+            new = _texts(old, change)
+            if new is not old:
+                changes[field.name] = new
+    return dataclasses.replace(value, **changes) if changes else value

@@ -1,0 +1,348 @@
+"""Read files of unknown origin: small texts within bounds, all else in a child that may crash.
+
+    answer = guarded(work, path)      `work` reads `path` in a child process of its own
+
+HDF5 and Parquet are read by large C libraries; a damaged file has sent them into a crash or an
+endless loop before. The child is a fork with limits of time and memory. It answers with JSON and
+the bytes of arrays, which are held against the limits before anything is allocated for them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import faulthandler
+import json
+import math
+import multiprocessing
+import os
+import re
+import signal
+import stat
+import sys
+import time
+import tomllib
+import warnings
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+
+from pipelines.errors import EnvironmentFault, InputRejected, RrridError, UsageError
+from pipelines.io.config import SANDBOX, TEXT
+from pipelines.io.output import fault_of
+
+if TYPE_CHECKING:  # --help needs no NumPy
+    import numpy as np
+    import numpy.typing as npt
+
+    Array = npt.NDArray[np.float64]
+
+__all__ = ["Answer", "TomlError", "guarded", "parse_toml", "read_small_text", "regular_file"]
+
+T = TypeVar("T")
+
+_AGAIN = "copy the file again"
+_STOPPING = (signal.SIGINT, signal.SIGTERM)
+# An unterminated string reaches to the end of its line or of the text: one pass is enough.
+_STRING_OR_COMMENT = re.compile(
+    r'"""(?:[^"\\]++|\\.|"(?!""))*+(?:"""|\Z)'
+    r"|'''(?:[^']++|'(?!''))*+(?:'''|\Z)"
+    r'|"(?:[^"\\\n]++|\\[^\n])*+"?'
+    r"|'[^'\n]*+'?"
+    r"|\#[^\n]*+",
+    re.DOTALL,
+)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a child found: a JSON object and named arrays."""
+
+    about: dict[str, Any]
+    arrays: Mapping[str, Array]
+
+
+class TomlError(ValueError):
+    """The text is not TOML, or exceeds the bounds."""
+
+
+def regular_file(
+    path: Path, *, what: str = "a log, or a folder of logs", empty: bool = False
+) -> os.stat_result:
+    """Return the status of `path`; refuse all but a regular file that can be read and has bytes.
+
+    Args:
+        what: what belongs there, for the remedy.
+        empty: let a file without bytes pass (F01).
+    """
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        raise UsageError("C04", "no such file", where=path, remedy="check the path") from None
+    except ValueError:
+        words = "not a path of this system"
+        raise UsageError("C07", words, where=path, remedy="check the path") from None
+    except OSError as problem:
+        raise fault_of(problem, path) from None
+    if not stat.S_ISREG(status.st_mode):
+        raise InputRejected("F12", "not a regular file", where=path, remedy=f"give {what}")
+    if not os.access(path, os.R_OK):
+        remedy = "change its permissions"
+        raise EnvironmentFault("F13", "permission denied", where=path, remedy=remedy)
+    if status.st_size == 0 and not empty:
+        raise InputRejected(
+            "F01", "empty file", where=path, remedy="copy it again, or record again"
+        )
+    return status
+
+
+def read_small_text(path: Path, limit: int = TEXT.size, *, what: str = "a TOML file") -> str:
+    """Return the text in `path`, a regular file of at most `limit` bytes in UTF-8.
+
+    Raises:
+        UsageError: C04 no such file, C02 too long or not a text.
+        InputRejected: F12, not a regular file. EnvironmentFault: F13, no permission.
+    """
+    regular_file(path, what=what, empty=True)
+    try:
+        # the path may have become a pipe meanwhile, and opening one would wait for ever
+        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
+            data = file.read(limit + 1)
+    except OSError as problem:
+        raise fault_of(problem, path) from None
+    if len(data) > limit:
+        words = f"longer than the {limit} bytes that such a text may have"
+        raise UsageError("C02", words, where=path, remedy=f"give {what}")
+    try:
+        return data.decode("utf-8").replace("\r\n", "\n")
+    except UnicodeDecodeError as problem:
+        words = f"not a text in UTF-8: byte {problem.start} is {data[problem.start]:#04x}"
+        remedy = f"give {what}, saved as UTF-8"
+        raise UsageError("C02", words, where=path, remedy=remedy) from None
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """Return the table that `text` holds.
+
+    Raises:
+        TomlError: it is not TOML, or longer, wider or deeper than the bounds.
+    """
+    bare = _STRING_OR_COMMENT.sub(
+        lambda found: "" if found[0].startswith("#") else '""', text.replace("\r\n", "\n")
+    )
+    pieces = re.split(r"[=\n,{}\[\]]", bare)
+    depth = deepest = 0
+    for bracket in re.findall(r"[\[\]{}]", bare):
+        depth += 1 if bracket in "[{" else -1
+        deepest = max(deepest, depth)
+    for found, bound, words in (
+        (len(text), TEXT.size, "characters"),
+        (bare.count("\n"), TEXT.lines, "lines"),
+        (len(pieces), TEXT.values, "values"),
+        (max(map(len, pieces)), TEXT.key, "characters in a key or a value"),
+        (max(piece.count(".") + 1 for piece in pieces), TEXT.parts, "parts of a key"),
+        (deepest, TEXT.depth, "arrays or tables in each other"),
+    ):
+        if found > bound:
+            raise TomlError(f"more than {bound} {words}")
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as problem:
+        raise TomlError(str(problem)) from None
+
+
+def guarded(
+    work: Callable[[], Answer],
+    path: Path,
+    *,
+    seconds: float | None = None,
+    memory: int | None = None,
+) -> Answer:
+    """Run `work` in a child process and return its answer.
+
+    Args:
+        work: reads `path`; the modules that it needs are imported before, so the child has them.
+        seconds: the child is killed after so long; by default longer for larger files.
+        memory: [B] that the child may use beyond what this process does; by default as `seconds`.
+
+    Raises:
+        RrridError: what `work` raised.
+        InputRejected: F03 where the library crashed or hung on the file, or what it gave is
+            nonsense; X05 where it describes the file in an endless text.
+    """
+    size = path.stat().st_size
+    if seconds is None:
+        seconds = SANDBOX.seconds + size / SANDBOX.bytes_a_second
+    if memory is None:
+        memory = min(SANDBOX.memory + SANDBOX.memory_a_byte * size, SANDBOX.most_memory)
+    longest = SANDBOX.description + SANDBOX.description_a_byte * size
+    longest = min(longest, SANDBOX.most_description)
+    receiver, sender = multiprocessing.Pipe(duplex=False)
+    child = _fork(work, receiver, sender, seconds, memory)
+    sender.close()
+    ended, reason = False, "what came of reading it makes no sense"
+    try:
+        return _received(receiver, time.monotonic() + seconds, longest, memory, path)
+    except EOFError:
+        ended, reason = True, "the reading library ended its process"
+    except TimeoutError:
+        reason = f"reading did not end within {seconds:.0f} s"
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        pass  # a child that the file has taken over
+    finally:
+        receiver.close()
+        crashed = _reaped(child, kill=not ended)
+    if ended and crashed:
+        reason = f"the reading library crashed on it (signal {crashed})"
+    raise InputRejected("F03", f"{reason}, the file is damaged", where=path, remedy=_AGAIN)
+
+
+def _fork(
+    work: Callable[[], Answer],
+    receiver: Connection,
+    sender: Connection,
+    seconds: float,
+    memory: int,
+) -> int:
+    """Return the process number of a child that does `work`."""
+    # a signal between the fork and the child's own handlers would run the parent's program in it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # of a fork beside threads
+            child = os.fork()
+        if child == 0:
+            receiver.close()
+            _serve(work, sender, seconds, memory)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    return child
+
+
+def _serve(work: Callable[[], Answer], sender: Connection, seconds: float, memory: int) -> NoReturn:
+    """Do the work in the child, send what it found, and leave without any clean-up."""
+    try:
+        # a signal for the whole group is the parent's to answer, and it ends this child
+        for number in _STOPPING:
+            signal.signal(number, signal.SIG_IGN)
+        faulthandler.disable()
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        for stream in (0, 1, 2):  # HDF5 prints its error stack
+            os.dup2(nowhere, stream)
+        reply, arrays = _replied(work, seconds, memory)
+        sender.send_bytes(json.dumps(reply).encode())
+        for values in arrays:
+            sender.send_bytes(memoryview(values.reshape(-1)).cast("B"))
+    finally:
+        os._exit(0)
+
+
+def _replied(
+    work: Callable[[], Answer], seconds: float, memory: int
+) -> tuple[dict[str, Any], list[Array]]:
+    """Return what `work` found, or why it found nothing, as JSON; and its arrays that have bytes."""
+    import numpy as np
+
+    problem: RrridError
+    lowered = False
+    try:
+        lowered = _limit(seconds, memory)
+        answer = work()
+        arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in answer.arrays.items()}
+        shapes = {name: values.shape for name, values in arrays.items()}
+        reply = {"about": answer.about, "shapes": shapes}
+        return reply, [values for values in arrays.values() if values.size]
+    except RrridError as refused:
+        problem = refused
+    except OSError as fault:
+        problem = fault_of(fault, Path())
+        problem.where = ""
+    except MemoryError:
+        split = "split the recording"
+        problem = InputRejected("X05", "needs more memory than a log may", remedy=split)
+        if lowered:
+            words = "memory: reading it needs more than this process may use"
+            problem = EnvironmentFault("P03", words, remedy=split)
+    except BaseException as fault:
+        return {"internal": f"{type(fault).__name__}: {fault}"}, []
+    return {"error": {"exit": problem.exit_code, **problem.as_dict()}}, []
+
+
+def _limit(seconds: float, memory: int) -> bool:
+    """Limit time and memory of this process; True where it had less memory before."""
+    import resource
+
+    lowered = False
+    if sys.platform == "linux":
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        wanted = pages * resource.getpagesize() + memory
+        lowered = hard != resource.RLIM_INFINITY and hard < wanted
+        resource.setrlimit(resource.RLIMIT_AS, (hard if lowered else wanted, hard))
+    hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    if hard == resource.RLIM_INFINITY:  # an endless loop ends, also where the parent is gone
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(seconds) + 1, hard))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    return lowered
+
+
+def _received(
+    receiver: Connection, deadline: float, longest: int, memory: int, path: Path
+) -> Answer:
+    """Return what the child sends; raise what its work raised."""
+    import numpy as np
+
+    try:
+        text = _next(receiver, deadline, lambda: receiver.recv_bytes(longest))
+    except TimeoutError:
+        raise
+    except OSError:
+        words = f"its description is longer than {longest / 1e6:.0f} MB"
+        remedy = "keep samples in signals, and texts short"
+        raise InputRejected("X05", words, where=path, remedy=remedy) from None
+    reply = json.loads(text)
+    if "internal" in reply:
+        raise RuntimeError(f"reading {path}: {reply['internal']}")
+    if "error" in reply:
+        raise _error(reply["error"], path)
+    if sum(8 * math.prod(shape) for shape in reply["shapes"].values()) > memory:
+        raise ValueError("more samples than memory")
+    arrays = {}
+    for name, shape in reply["shapes"].items():
+        values = np.empty(shape)
+        if values.size:
+            place = memoryview(values.reshape(-1)).cast("B")
+            _next(receiver, deadline, lambda: receiver.recv_bytes_into(place))  # noqa: B023
+        values.flags.writeable = False
+        arrays[name] = values
+    return Answer(dict(reply["about"]), arrays)
+
+
+def _next(receiver: Connection, deadline: float, receive: Callable[[], T]) -> T:
+    """Return the next message; EOFError where the child ended before all of it was there."""
+    if not receiver.poll(max(0.0, deadline - time.monotonic())):
+        raise TimeoutError
+    try:
+        return receive()
+    except OSError as problem:
+        if "end of file" in str(problem):
+            raise EOFError from None
+        raise
+
+
+def _error(error: Mapping[str, Any], path: Path) -> RrridError:
+    kinds = {kind.exit_code: kind for kind in (UsageError, InputRejected, EnvironmentFault)}
+    kind, code = kinds.get(error["exit"], InputRejected), error["code"].removeprefix("RRID-")
+    where = error["where"] or path
+    return kind(code, error["message"], where=where, remedy=error["remedy"])
+
+
+def _reaped(child: int, *, kill: bool) -> int:
+    """Wait for the child, killed before where it may live on; return the signal it died of, or 0."""
+    with contextlib.suppress(ProcessLookupError, ChildProcessError):
+        if kill:
+            os.kill(child, signal.SIGKILL)
+        _, status = os.waitpid(child, 0)
+        return os.WTERMSIG(status) if os.WIFSIGNALED(status) else 0
+    return 0  # a parent that ignores ends of children (SIGCHLD) does not learn how it ended
