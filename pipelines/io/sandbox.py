@@ -233,7 +233,7 @@ def _serve(work: Callable[[], Answer], sender: Connection, seconds: float, memor
         reply, arrays = _replied(work, seconds, memory)
         sender.send_bytes(json.dumps(reply).encode())
         for values in arrays:
-            sender.send_bytes(memoryview(values.reshape(-1)).cast("B"))
+            sender.send_bytes(values.reshape(-1).data.cast("B"))
     finally:
         os._exit(0)
 
@@ -312,7 +312,7 @@ def _received(
     for name, shape in reply["shapes"].items():
         values = np.empty(shape)
         if values.size:
-            place = memoryview(values.reshape(-1)).cast("B")
+            place = values.reshape(-1).data.cast("B")
             _next(receiver, deadline, lambda: receiver.recv_bytes_into(place))  # noqa: B023
         values.flags.writeable = False
         arrays[name] = values
