@@ -61,6 +61,6 @@ def excitation(subject: Subject) -> Estimate:
 
 def _held(subject: Subject, found: Estimate) -> list[str]:
     """The joints that hardly move, and whose friction seems to show all the same."""
-    steps = np.array([step or 0.0 for step in subject.steps])
+    steps = np.array([step or 0.0 for step in subject.good.steps])
     held = np.flatnonzero(subject.travel < np.maximum(_LEAST_TRAVEL, _STEPS * steps)) + 1
     return [str(joint) for joint in held if f"coulomb:{joint}:level" not in found.unresolved.parameters]

@@ -93,67 +93,57 @@ def columns_first(checks: Iterable[Check]) -> tuple[Check, ...]:
 
 
 def check_together(opened: Sequence[Opened], subjects: Sequence[Subject]) -> tuple[Check, ...]:
-    """D14, S21 and D10: what only several logs show."""
-    return (*_leaks(opened), *_names(opened), *_one_way_friction(subjects))
-
-
-def _leaks(opened: Iterable[Opened]) -> list[Check]:
-    """D14: a log that a fit uses must not judge it."""
-    files: dict[str, list[Opened]] = defaultdict(list)
-    samples: dict[bytes, list[Opened]] = defaultdict(list)
-    for one in opened:
-        files[one.sha256].append(one)
-        if one.log.origin != "planned" and one.log.n_samples > 1:
-            content = hashlib.sha256(one.log.q.tobytes() + one.log.tau.tobytes()).digest()
-            samples[content].append(one)
+    """D14, S21 and D10: what only several logs show, copies, names and one-way friction logs."""
     found = []
-    for group in (group for group in files.values() if len(group) > 1):
+    for group in _groups(opened, lambda one: one.sha256):
         words = f"the same file {len(group)} times: {_listed(group)}"
         remedy = "keep one of them; a copy counts twice in a fit"
         found.append(Check.of("D14", "warn", words, where=group[0].path, remedy=remedy))
-    for group in samples.values():
+    sampled = [one for one in opened if one.log.origin != "planned" and one.log.n_samples > 1]
+    for group in _groups(sampled, lambda one: _digest(one.log)):
         roles = sorted({one.log.role for one in group})
         if len(roles) > 1:
             words = f"leak: {_listed(group)} hold the same samples with roles {' and '.join(roles)}"
-            remedy = "judge on another recording; a fit always explains what it was made from"
-            where = group[0].path
+            remedy, where = "judge on a recording that no model was fitted to", group[0].path
             found.append(Check.of("D14", "reject", words, where=where, gate=True, remedy=remedy))
-    return found
+    for group in _groups(opened, lambda one: (one.path.parent, one.log.name)):
+        if len({one.sha256 for one in group}) > 1:
+            words = f"{len(group)} logs are named '{group[0].log.name}': {_listed(group)}"
+            remedy, where = "give each log of a folder a name of its own", group[0].path.parent
+            found.append(Check.of("S21", "warn", words, where=where, remedy=remedy))
+    return (*found, *_one_way_friction(subjects))
+
+
+def _groups(opened: Iterable[Opened], key: Callable[[Opened], object]) -> list[list[Opened]]:
+    """Return the groups of several logs with one `key`."""
+    groups: dict[object, list[Opened]] = defaultdict(list)
+    for one in opened:
+        groups[key(one)].append(one)
+    return [group for group in groups.values() if len(group) > 1]
+
+
+def _digest(log: ExperimentLog) -> bytes:
+    return hashlib.sha256(log.q.tobytes() + log.tau.tobytes()).digest()
 
 
 def _listed(group: Iterable[Opened]) -> str:
     return ", ".join(one.path.name for one in group)
 
 
-def _names(opened: Iterable[Opened]) -> list[Check]:
-    """S21: a log's name is unique within its folder: results are filed under it."""
-    named: dict[tuple[str, str], list[Opened]] = defaultdict(list)
-    for one in opened:
-        named[str(one.path.parent), one.log.name].append(one)
-    found = []
-    for (folder, name), group in named.items():
-        if len({one.sha256 for one in group}) > 1:
-            words = f"{len(group)} logs are named '{name}': {_listed(group)}"
-            remedy = "give each log of a folder a name of its own"
-            found.append(Check.of("S21", "warn", words, where=folder, remedy=remedy))
-    return found
-
-
 def _one_way_friction(subjects: Iterable[Subject]) -> list[Check]:
     """D10: all friction logs of a joint together move it both ways."""
-    groups: dict[tuple[str, int], list[tuple[Subject, float, float]]] = defaultdict(list)
+    groups: dict[tuple[str, int], list[tuple[float, float, Subject]]] = defaultdict(list)
     for subject in subjects:
         if subject.log.experiment == "friction" and subject.sampled:
             for joint, (up, down) in both_ways(subject).items():
-                groups[subject.log.robot_name, joint].append((subject, up, down))
-    found = []
+                groups[subject.log.robot_name, joint].append((up, down, subject))
+    found, remedy = [], "record the joint in both directions"
     for (_, joint), members in groups.items():
-        first, ups, downs = zip(*members, strict=True)
+        ups, downs, logs = zip(*members, strict=True)
         if min(max(ups), max(downs)) < CONFIG.one_way:
             words = (
                 f"the speed of joint {joint + 1} never changes sign in its friction logs: Coulomb "
             )
             words += f"offset unidentifiable joint {joint + 1}"
-            remedy = "record the joint in both directions"
-            found.append(first[0].say("D10", "warn", words, remedy, True, signal="q", joint=joint))
+            found.append(logs[0].say("D10", "warn", words, remedy, True, signal="q", joint=joint))
     return found

@@ -5,16 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipelines.errors import Check, Level
-from pipelines.io.limits import (
-    FEWEST,
-    GAP_LIMIT,
-    LARGEST_JITTER,
-    MOST_STEPS,
-    SHORTEST,
-    percent,
-    recorded_span,
-    shorter_than_period,
-)
+from pipelines.io import limits
+from pipelines.io.limits import FEWEST, GAP_LIMIT, SHORTEST, percent
 from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import long_blocks
 from pipelines.quality.subject import Subject, many
@@ -28,13 +20,13 @@ def length(s: Subject) -> list[Check]:
     if n < FEWEST:
         words = f"{many(n, 'sample')}, fewer than the {FEWEST} that any check needs"
         return [s.say("T08", "reject", words, "record a longer log", signal="t")]
-    span = recorded_span(s.good.log.t, log.sample_time)
+    span = limits.recorded_span(s.good.log.t, log.sample_time)
     if n < SHORTEST:
         words = f"{n} samples, {span:.3g} s: too short for any fit, which needs {SHORTEST} samples"
         return [s.say("T08", "warn", words, "record some seconds of the motion", signal="t")]
     if log.period is not None:
         periods = f", periods: {span / log.period:.3g}"
-        if shorter_than_period(s.good.log.t, log.sample_time, log.period):
+        if limits.shorter_than_period(s.good.log.t, log.sample_time, log.period):
             remedy = "record at least one whole period, or correct the attribute period"
             words = f"{span:.4g} s < {log.period:.4g} s period"
             return [s.say("T07", "reject", words, remedy, signal="t")]
@@ -71,7 +63,7 @@ def order(s: Subject) -> list[Check]:
         back = (s.log.t[k] - s.log.t[k + 1]) * time.scale
         words = f"time steps back {many(steps.size, 'time')}, first by {back:.4g} s; split there"
         remedy = "record with a monotonic clock, not with the time of day"
-        level: Level = "repair" if steps.size <= MOST_STEPS else "reject"
+        level: Level = "repair" if steps.size <= limits.MOST_STEPS else "reject"
         found.append(s.say("T01", level, words, remedy, signal="t", sample=k + 1))
     return found or s.ok("T01", "time runs forward throughout", signal="t")
 
@@ -116,12 +108,10 @@ def _stale(s: Subject) -> str:
         return ""
     share, rate = float(old.mean()), 1.0 / s.log.sample_time
     every = round(1.0 / (1.0 - share))
-    if np.mean(np.diff(np.flatnonzero(~old)) == every) < 1.0 - CONFIG.stale_share:
-        words = f"{percent(share, 2)} of the samples repeat the one before under a new stamp"
-        return f"{words}: {rate * (1.0 - share):.4g} Hz on average"
-    known = {2: "every second sample repeats the one before"}
-    words = known.get(every, f"only one in {every} samples is new")
-    return f"{words}: {rate / every:.4g} Hz"
+    even = np.mean(np.diff(np.flatnonzero(~old)) == every) >= 1.0 - CONFIG.stale_share
+    words = f"{percent(share, 2)} of the samples repeat the one before under a new stamp"
+    known = {2: "every second sample repeats the one before"} if even else {}
+    return f"{known.get(every, words)}: {rate * (1.0 - share):.3g} Hz"
 
 
 def lost_samples(s: Subject) -> list[Check]:
@@ -155,10 +145,10 @@ def jitter(s: Subject) -> list[Check]:
     """T05: samples come at even intervals."""
     rms, worst = percent(s.good.time.jitter), percent(s.good.time.worst)
     words = f"the interval varies: rms {rms}, at most {worst} of the sample time"
-    if s.good.time.jitter <= LARGEST_JITTER:
+    if s.good.time.jitter <= limits.LARGEST_JITTER:
         return s.ok("T05", words, signal="t")
     remedy = "sample by a timer; a frequency response needs even sampling"
-    words += f"; more than {percent(LARGEST_JITTER)} rms"
+    words += f"; more than {percent(limits.LARGEST_JITTER)} rms"
     return [s.say("T05", "warn", words, remedy, signal="t")]
 
 
@@ -181,7 +171,7 @@ def _undersampled(s: Subject, joint: int) -> bool:
     which it does not contribute.
     """
     q, described = s.position[:, joint], s.log.robot.joints[joint].encoder_resolution
-    step = s.steps[joint] or described or 0.0
+    step = s.good.steps[joint] or described or 0.0
     even = np.abs(np.diff(s.good.log.t) / s.log.sample_time - 1.0) < CONFIG.even
     even &= np.isfinite(np.diff(q)) & ~s.good.jumped[1:, joint]
     d = np.where(even, np.diff(q), 0.0)

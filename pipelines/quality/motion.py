@@ -150,40 +150,42 @@ def follows_reference(s: Subject) -> list[Check]:
     if "q_ref" not in s.log or s.log.experiment in ("hold", "frf"):
         return []
     asked = np.flatnonzero(spread(s.good.log["q_ref"]) > CONFIG.travel).tolist()
-    off = {(j, k): _distance(*_pair(s, j, k)) for j in asked for k in asked}
-    shares = {j: off[j, j] for j in asked if np.isfinite(off[j, j])}
-    found = [_elsewhere(s, j, off) for j, share in shares.items() if share > CONFIG.follows]
+    fits = {(j, k): _fit(s, j, k) for j in asked for k in asked}
+    shares = {j: fits[j, j][0] for j in asked if np.isfinite(fits[j, j][0])}
+    found = [_elsewhere(s, j, fits) for j, share in shares.items() if share > CONFIG.follows]
     words = ", ".join(percent(share, 2) for share in shares.values())
     within = f" within {words} of the motion" if words else ""
     return found or s.ok("S16", f"the position follows its reference{within}", signal="q_ref")
 
 
-def _pair(s: Subject, j: int, k: int) -> tuple[Array, Array]:
-    """Return the position of joint `j` and the reference of joint `k` where both are known."""
+def _fit(s: Subject, j: int, k: int) -> tuple[float, float, float]:
+    """Compare the position of joint `j` with the reference of joint `k`.
+
+    Returns:
+        how far it is away, as a share of the reference (infinite if unknown); how many times the
+        reference it is, in least squares; the share of the position that this leaves.
+    """
     q, reference = s.position[: s.good.end, j], s.good.log["q_ref"][: s.good.end, k]
     known = np.isfinite(q) & np.isfinite(reference)
-    return q[known], reference[known]
-
-
-def _distance(q: Array, reference: Array) -> float:
-    """Return how far a position is from a reference, as a share of it; infinite if unknown."""
-    if q.size < FEWEST:
-        return np.inf
-    return float(np.std(q - reference)) / max(float(np.std(reference)), 1e-12)
-
-
-def _elsewhere(s: Subject, j: int, off: dict[tuple[int, int], float]) -> Check:
-    """Return why joint `j` is not at its reference; `off`: distances of joints and references."""
-    q, reference = _pair(s, j, j)
-    x, y = reference - reference.mean(), q - q.mean()
+    if known.sum() < FEWEST:
+        return np.inf, 0.0, np.inf
+    x, y = reference[known] - reference[known].mean(), q[known] - q[known].mean()
     scale = float(x @ y) / max(float(x @ x), 1e-300)
-    rest = float(np.std(y - scale * x)) / max(float(np.std(y)), 1e-12)
+    away = float(np.std(y - x)) / max(float(np.std(x)), 1e-12)
+    return away, scale, float(np.std(y - scale * x)) / max(float(np.std(y)), 1e-12)
+
+
+def _elsewhere(
+    s: Subject, j: int, fits: dict[tuple[int, int], tuple[float, float, float]]
+) -> Check:
+    """Return why joint `j` is not at its reference."""
+    away, scale, rest = fits[j, j]
     in_scale = rest < CONFIG.proportional and abs(scale) > CONFIG.moves
-    near, k = min(((off[j, k], k) for i, k in off if i == j != k), default=(np.inf, j))
+    near, k = min(((fits[j, k][0], k) for i, k in fits if i == j != k), default=(np.inf, j))
     # where joint k follows its own reference, that of joint j is only like it
-    mixed = near <= CONFIG.others and not (in_scale and off[k, k] <= CONFIG.others)
+    mixed = near <= CONFIG.others and not (in_scale and fits[k, k][0] <= CONFIG.others)
     limit = _torque_at_top(s.good.log.tau[: s.good.end, j])
-    level: Level = "reject" if off[j, j] > CONFIG.away and limit is None else "warn"
+    level: Level = "reject" if away > CONFIG.away and limit is None else "warn"
     if mixed and limit is None:
         words = f"position of joint {j + 1} follows the reference of joint {k + 1}, within "
         words += f"{percent(near, 2)} of it, and not its own: their columns are mixed up"
@@ -195,12 +197,14 @@ def _elsewhere(s: Subject, j: int, off: dict[tuple[int, int], float]) -> Check:
         words = f"position of joint {j + 1} is {scale:.3g} times its reference, within "
         words += f"{percent(rest, 2)} of it{unit}"
         return s.say("S15", level, words, remedy, True, signal="q", joint=j)
-    words = f"position and reference differ by {percent(off[j, j], 2)} of the motion: "
-    if limit is None:
-        words += "they are not of the same run, or not of the same joint"
-        remedy = "log both in one recorder, or leave the reference out"
-    else:
-        words += f"the torque is at ±{limit:.3g} {s.unit('tau', j)}, and the joint cannot follow"
+    words = (
+        f"position and reference differ by {percent(away, 2)} of the motion: they are not of the "
+    )
+    words += "same run, or not of the same joint"
+    remedy = "log both in one recorder, or leave the reference out"
+    if limit is not None:
+        words = f"position and reference differ by {percent(away, 2)} of the motion: the torque is "
+        words += f"at ±{limit:.3g} {s.unit('tau', j)}, and the joint cannot follow"
         remedy = "look for what limits the drive, or drive it more gently"
     return s.say("S16", level, words, remedy, True, signal="q_ref", joint=j)
 

@@ -152,8 +152,8 @@ def wraps(s: Subject) -> list[Check]:
 def resolution(s: Subject) -> Sequence[Check | NotTested]:
     """D08: encoders count as finely as described; the observer's noise is R = δ² / 12."""
     found: list[Check | NotTested] = []
-    hidden = ", ".join(str(j + 1) for j, step in enumerate(s.steps) if step is None)
-    for j, step in enumerate(s.steps):
+    hidden = ", ".join(str(j + 1) for j, step in enumerate(s.good.steps) if step is None)
+    for j, step in enumerate(s.good.steps):
         declared, q = s.log.robot.joints[j].encoder_resolution, s.good.log.q[:, j]
         if step is None or distinct(q[np.isfinite(q)]).size < CONFIG.distinct:
             continue
@@ -166,8 +166,8 @@ def resolution(s: Subject) -> Sequence[Check | NotTested]:
             words += f"R = δ²/12 = {step**2 / 12.0:.3g} {unit}² from the data"
             remedy = "correct encoder_resolution, or look for bits lost on the way"
             found.append(s.say("D08", "warn", words, remedy, signal="q", joint=j))
-    if not found and any(s.steps):
-        found += s.ok("D08", f"encoder steps: {s.with_units('q', s.steps)}", signal="q")
+    if not found and any(s.good.steps):
+        found += s.ok("D08", f"encoder steps: {s.with_units('q', s.good.steps)}", signal="q")
     if hidden:
         words = f"no step of the encoder shows in the positions of joint {hidden}"
         found += s.cannot_tell("D08", words, signal="q")

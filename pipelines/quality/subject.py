@@ -51,11 +51,6 @@ class Subject:
         """Return whether there are signals to judge; T08 is of logs with fewer samples."""
         return self.log.origin != "planned" and self.log.n_samples >= FEWEST
 
-    @property
-    def steps(self) -> tuple[float | None, ...]:
-        """Step in which each encoder counts, where it is visible. [rad]"""
-        return self.good.steps
-
     @cached_property
     def travel(self) -> Array:
         """(joints,) [rad] distance between the extreme positions."""
