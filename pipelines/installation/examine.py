@@ -25,7 +25,7 @@ __all__ = ["Finding", "examine"]
 Level = Literal["ok", "warn", "bad"]
 
 _THREADS: Final = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-_EXTRAS: Final = {"bench": "virtual test bench", "cluster": "rrrid batch on a Dask cluster", "lmi": "physical consistency"}
+_EXTRAS: Final = {"bench": "virtual test bench", "cluster": "rrrid batch on a Dask cluster"}
 _NEEDS: Final = re.compile(r"\s*([A-Za-z0-9._-]+)(?:\[[^\]]*\])?\s*(?:\(?\s*>=\s*([0-9][0-9.]*))?")
 _EXTRA: Final = re.compile(r"""extra\s*==\s*['"]([\w-]+)['"]""")
 
