@@ -30,8 +30,7 @@ from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.writing.cases import tip_std
 from pipelines.model.writing.first_validation import first_validation
 from pipelines.model.writing.reference import writing_task
-from sample_logs.bench_session import arm_of
-from sample_logs.controller_model import controller_model
+from sample_logs.bench_session import arm_of, controller_model
 
 PAPER_MM = (1.0586183, 1.7499008, 4.5700627)  # Kostić et al. 2004, Table IV, case 1
 PAPER_RATIOS = (3.2, 6.9, 4.3)  # case 1 over case 6

@@ -1,13 +1,15 @@
-"""The machine of rrr-healthy and rrr-changed, the model its controllers run on, and how its logs are kept small.
+"""The machine of rrr-healthy and rrr-changed, the model its controllers use, and its logs kept
+small.
 
-Another arm of the kind of robots/rrr.toml, on the virtual test bench: links within ±10 % and friction within ±20 % of
-that one's, drives and encoders with their small imperfections, on a table that gives way.
+Another arm of the kind of robots/rrr.toml, on the virtual test bench: links within ±10 % and
+friction within ±20 % of that one's, drives and encoders with their small imperfections, on a soft
+table.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -20,39 +22,69 @@ from bench.motions import Reference
 from bench.plan import Solid
 from bench.plant import record
 from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.model_file import model_text
 from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
-from sample_logs.controller_model import ControllerModel, controller_model
+from pipelines.model.online import OnlineModel, OnlineTorque
 
-__all__ = ["arm_of", "controllers_model", "machine", "recorded", "rounded"]
+SEED = 28  # numerics: of the machine and of its controllers' model
+# Bits behind the point that a number keeps, by its signal. What a computer computed is given to far
+# below one step of the encoder; the zeros that follow take no room in a compressed file.
+BITS = {
+    "q_ref": 34,
+    "dq_ref": 30,
+    "ddq_ref": 26,
+    "r": 20,
+    "v": 20,
+    "tau_friction": 24,
+    "tau_feedforward": 24,
+    "q_obs": 30,
+    "dq_obs": 24,
+    "ddq_obs": 14,
+}
 
-_SEED = 28
-_TABLE = BaseResonance(None, frequency=28.0, damping_ratio=0.04, inertia=8.0)  # [Hz], [1], [kg m^2]
-_LINK_ERROR, _FRICTION_ERROR = 0.05, 0.08  # of each number that the controllers' model has
-# Bits behind the point that a number keeps, by its signal. What a computer computed is given to far below one step of
-# the encoder; the zeros that follow take no room in a compressed file.
-_BITS = {"q_ref": 34, "dq_ref": 30, "ddq_ref": 26, "r": 20, "v": 20, "tau_friction": 24, "tau_feedforward": 24,
-         "q_obs": 30, "dq_obs": 24, "ddq_obs": 14}
-_OBSERVED = ("q_obs", "dq_obs", "ddq_obs")
-_BETWEEN = timedelta(seconds=60)  # from the end of one log to the start of the next, and what is left of a second
+
+@dataclass(frozen=True)
+class ControllerModel:
+    """A model as a controller of the bench uses it, one sample at a time."""
+
+    text: str  # model.json, for the log
+    online: OnlineModel
+
+    def parts(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> OnlineTorque:
+        """Return friction, inertia, Coriolis and gravity [N m], each a list of n."""
+        return self.online.parts(q, dq, ddq)
+
+    def inertia_times(self, q: Sequence[float], r: Sequence[float]) -> list[float]:
+        """Return D(q) r [N m], a list of n."""
+        return self.online.inertia_times(q, r)
+
+
+def controller_model(arm: Arm) -> ControllerModel:
+    """Return the model of `arm` for a controller of the bench."""
+    return ControllerModel(model_text(arm.to_model()), OnlineModel(arm))
 
 
 def machine() -> Machine:
-    """The machine as it stood from its first day."""
-    drawn = draw_machine(_SEED, "paper")
-    return replace(drawn, standing=(*drawn.standing, _TABLE))
+    """Return the machine as on its first day, on its table."""
+    drawn = draw_machine(SEED, "paper")
+    table = BaseResonance(None, frequency=28.0, damping_ratio=0.04, inertia=8.0)
+    return replace(drawn, standing=(*drawn.standing, table))
 
 
 def arm_of(robot: RobotDescription, friction: Iterable[Friction], name: str = "rrr") -> Arm:
-    """The arm whose links `robot` describes, with this friction."""
+    """Return the arm whose links `robot` describes, with this friction.
+
+    Its numbers have seven digits: the last of a double depend on the processor, and logs carry it.
+    """
     arm = Arm.from_links(robot)
     base = tuple(replace(one, value=_digits(one.value)) for one in arm.base)
-    return Arm(name, arm.body, base, tuple(_acting(joint, law) for joint, law in enumerate(friction, start=1)))
+    laws = tuple(_acting(joint, law) for joint, law in enumerate(friction, start=1))
+    return Arm(name, arm.body, base, laws)
 
 
 def _digits(value: float) -> float:
-    """Seven of them: the last of a double depend on the processor, and the logs carry the model."""
     return float(f"{value:.7g}")
 
 
@@ -65,47 +97,61 @@ def _acting(joint: int, law: Friction) -> Acting:
 
 
 def controllers_model(machine: Machine) -> ControllerModel:
-    """What an earlier, hasty identification left: links within 5 % and friction within 8 % of the truth."""
-    rng = np.random.default_rng([24, _SEED])
-    links = [Solid.of_link(joint.link).drawn(rng, _LINK_ERROR).as_link() for joint in machine.robot.joints if joint.link]
-    friction = [law.drawn(rng, _FRICTION_ERROR) for law in machine.friction]
-    return controller_model(arm_of(with_links(machine.described, links), friction, "rrr-earlier"))
+    """Return an earlier, hasty identification: links within 5 % and friction within 8 % of the
+    truth.
+    """
+    rng = np.random.default_rng([24, SEED])
+    bodies = [Solid.of_link(joint.link) for joint in machine.robot.joints if joint.link]
+    links = [body.drawn(rng, 0.05).as_link() for body in bodies]
+    friction = [law.drawn(rng, 0.08) for law in machine.friction]
+    robot = with_links(machine.described, links)
+    return controller_model(arm_of(robot, friction, "rrr-earlier"))
 
 
-def recorded(machine: Machine, experiments: Iterable[Experiment], begun: datetime, faults: Sequence[Fault] = (), seed: int = 0,
-             only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
-    """The log of each experiment, after the name of its file. What it says of its reference is so to the last bit.
+def recorded(
+    machine: Machine,
+    experiments: Iterable[Experiment],
+    begun: datetime,
+    faults: Sequence[Fault] = (),
+    seed: int = 0,
+    only: str | None = None,
+) -> Iterator[tuple[str, ExperimentLog]]:
+    """Record the log of each experiment, after the name of its file, its reference exactly as
+    followed.
 
     Args:
-        begun: UTC; when the first log was recorded, the others follow minute by minute.
+        machine: that is recorded.
+        experiments: of the session.
+        begun: UTC; when the first log was recorded, the others follow a minute after each other.
+        faults: of the machine, beside its own.
         seed: of the session's noise.
         only: the name of an experiment, where no other has to be recorded.
     """
     for place, one in enumerate(experiments):
-        at, begun = begun, begun + _BETWEEN + timedelta(seconds=round(float(one.reference.t[-1])))
+        lasting = round(float(one.reference.t[-1]))
+        at, begun = begun, begun + timedelta(seconds=60 + lasting)
         if only not in (None, one.name):
             continue
         plan = replace(one, reference=rounded(one.reference))
         (log,) = record(machine, faults, [plan], seed=1000 * seed + place)
-        yield f"{log.name}.h5", replace(_compact(log), recorded=f"{at:%Y-%m-%dT%H:%M:%SZ}")
+        # Of writing alone, what the controller observed is kept.
+        signals = {
+            name: _shortened(name, signal)
+            for name, signal in log.signals.items()
+            if log.experiment == "writing" or not name.endswith("_obs")
+        }
+        yield f"{log.name}.h5", replace(log, signals=signals, recorded=f"{at:%Y-%m-%dT%H:%M:%SZ}")
 
 
 def rounded(reference: Reference) -> Reference:
-    """The same motion, its numbers as short as the log's."""
-    q, dq, ddq = (_kept(getattr(reference, key), _BITS[f"{key}_ref"]) for key in ("q", "dq", "ddq"))
-    return replace(reference, q=q, dq=dq, ddq=ddq)
+    """Return the same motion, its numbers as short as the log's."""
+    paths = {key: _kept(getattr(reference, key), BITS[f"{key}_ref"]) for key in ("q", "dq", "ddq")}
+    return replace(reference, **paths)
 
 
 def _kept(values: Array, bits: int) -> Array:
     return np.asarray(np.ldexp(np.rint(np.ldexp(values, bits)), -bits))
 
 
-def _compact(log: ExperimentLog) -> ExperimentLog:
-    """What the controller observed is kept of writing alone."""
-    kept = {name: _shortened(name, signal) for name, signal in log.signals.items()
-            if log.experiment == "writing" or name not in _OBSERVED}
-    return replace(log, signals=kept)
-
-
 def _shortened(name: str, signal: Signal) -> Signal:
-    return replace(signal, values=_kept(signal.values, _BITS[name])) if name in _BITS else signal
+    return replace(signal, values=_kept(signal.values, BITS[name])) if name in BITS else signal

@@ -1,7 +1,7 @@
 """The logs of rrr-closed-form/: the RRR arm of models/rrr.json moved along prescribed motions.
 
-There is no controller: the torque is that of inverse dynamics. Every run gives the same logs, digest by digest, and the
-quantisation keeps it so on machines whose sine differs in the last bit.
+There is no controller: the torque is that of inverse dynamics. Every run gives the same logs,
+digest by digest, and the quantisation keeps it so on machines whose sine differs in the last bit.
 """
 
 from __future__ import annotations
@@ -9,9 +9,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from bench.config import CONFIG, SAMPLE_TIME
 from pipelines.io import schema
 from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
@@ -19,12 +21,7 @@ from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 from sample_logs.make_model import synthetic_arm
 
-SAMPLE_TIME = 1e-3  # [s]
 NOISE = np.array([0.020, 0.010, 0.005])  # [N m] rms, white, of the amplifier
-BITS = 12  # of the torque command, over twice the nominal torque
-HARMONICS = 60
-CORNER_HZ = 0.6  # amplitudes of speed fall beyond it, or the acceleration limit would leave no speed
-
 Movement = Callable[[Array], Motion]
 
 
@@ -32,7 +29,7 @@ Movement = Callable[[Array], Motion]
 class Fourier:
     """A periodic motion. Kostić et al. 2004, eq. (22), w_j = 2 pi j df:
 
-        q = q0 + sum_j (a_j sin w_j t - b_j cos w_j t)/w_j
+    q = q0 + sum_j (a_j sin w_j t - b_j cos w_j t)/w_j
     """
 
     q0: Array  # [rad] (joints,)
@@ -43,13 +40,23 @@ class Fourier:
     def __call__(self, t: Array) -> Motion:
         w = 2 * math.pi * self.df * np.arange(1, self.a.shape[1] + 1)
         s, c = np.sin(np.outer(t, w)), np.cos(np.outer(t, w))
-        return Motion(t, self.q0 + s @ (self.a / w).T - c @ (self.b / w).T, c @ self.a.T + s @ self.b.T,
-                      -s @ (self.a * w).T + c @ (self.b * w).T)
+        return Motion(
+            t,
+            self.q0 + s @ (self.a / w).T - c @ (self.b / w).T,
+            c @ self.a.T + s @ self.b.T,
+            -s @ (self.a * w).T + c @ (self.b * w).T,
+        )
 
 
-def from_rest(rng: np.random.Generator, q0: Array, df: float, moving: Array, corner_hz: float = CORNER_HZ,
-              harmonics: int = HARMONICS) -> Fourier:
-    """Random coefficients with sum a = 0 and sum j b = 0: the motion starts with neither speed nor acceleration."""
+def from_rest(
+    rng: np.random.Generator,
+    q0: Array,
+    df: float,
+    moving: Array,
+    corner_hz: float = CONFIG.corner_hz,
+    harmonics: int = 60,
+) -> Fourier:
+    """Draw coefficients with sum a = 0 and sum j b = 0, from neither speed nor acceleration."""
     j = np.arange(1, harmonics + 1)
     spectrum = 1 / (1 + (j * df / corner_hz) ** 2)
     a, b = rng.normal(size=(2, len(q0), harmonics)) * spectrum
@@ -60,17 +67,21 @@ def from_rest(rng: np.random.Generator, q0: Array, df: float, moving: Array, cor
 
 
 def within_limits(motion: Fourier, arm: Arm, part: float = 0.85, speed: float = 1.0) -> Fourier:
-    """`motion` scaled joint by joint to `part` of its limits of speed and acceleration, then as a whole by torque.
+    """Scale a motion joint by joint to `part` of its limits of speed and acceleration, then by
+    torque.
 
-    Args:
-        speed: further part of the speed limit, for slow motions.
+    `speed` is a further part of the speed limit, for slow motions.
     """
     joints = arm.robot.joints
     t: Array = np.arange(0.0, 1 / motion.df, 5e-3)
     now = motion(t)
-    allowed = np.minimum([speed * joint.velocity for joint in joints] / (np.abs(now.dq).max(axis=0) + 1e-9),
-                         [joint.acceleration for joint in joints] / (np.abs(now.ddq).max(axis=0) + 1e-9))
-    scaled = replace(motion, a=motion.a * (part * allowed)[:, None], b=motion.b * (part * allowed)[:, None])
+    allowed = np.minimum(
+        [speed * joint.velocity for joint in joints] / (np.abs(now.dq).max(axis=0) + 1e-9),
+        [joint.acceleration for joint in joints] / (np.abs(now.ddq).max(axis=0) + 1e-9),
+    )
+    scaled = replace(
+        motion, a=motion.a * (part * allowed)[:, None], b=motion.b * (part * allowed)[:, None]
+    )
     limit = part * np.array([joint.torque for joint in joints])
     while (np.abs(arm.torque(scaled(t))) > limit).any():
         scaled = replace(scaled, a=0.95 * scaled.a, b=0.95 * scaled.b)
@@ -78,10 +89,10 @@ def within_limits(motion: Fourier, arm: Arm, part: float = 0.85, speed: float = 
 
 
 def averaged_torque(arm: Arm, motion: Movement, t: Array) -> Array:
-    """The mean of the torque over [t_k, t_k + T): what a drive that holds each command has to be told.
+    """Return the mean torque (samples, n) [N m] over [t_k, t_k + T), as a drive holds each command.
 
-    Gauss-Legendre on the two halves of each interval, 6 points each: friction turns over within one sample where the
-    joint reverses quickly.
+    Gauss-Legendre on the two halves of each interval, 6 points each: friction turns over within one
+    sample where the joint reverses quickly.
     """
     nodes, weights = np.polynomial.legendre.leggauss(6)
     fractions = np.concatenate([0.25 * (nodes + 1), 0.25 * (nodes + 3)])
@@ -91,66 +102,89 @@ def averaged_torque(arm: Arm, motion: Movement, t: Array) -> Array:
 
 
 def quantised(values: Array, step: Array | float) -> Array:
+    """Round to whole steps."""
     return np.asarray(np.round(values / step) * step)
 
 
 def torque_step(robot: RobotDescription) -> Array:
-    """[N m] of one bit of the torque command."""
-    return np.array([2 * joint.torque / 2**BITS for joint in robot.joints])
+    """Return one bit of the torque command (n,) [N m]."""
+    return np.array([2 * joint.torque / 2**CONFIG.command_bits for joint in robot.joints])
 
 
-def recorded(arm: Arm, motion: Movement, duration: float, rng: np.random.Generator, **about: object) -> ExperimentLog:
-    """What encoders and drive would have written down."""
+def recorded(
+    arm: Arm, motion: Movement, duration: float, rng: np.random.Generator, **about: Any
+) -> ExperimentLog:
+    """Return the log as encoders and drive would have written it down."""
     robot = arm.robot
     t: Array = np.arange(round(duration / SAMPLE_TIME), dtype=np.float64) * SAMPLE_TIME
     resolution = np.array([joint.encoder_resolution for joint in robot.joints], dtype=np.float64)
     tau = averaged_torque(arm, motion, t)
-    values = {"t": t, "q": quantised(motion(t).q, resolution),
-              "tau": quantised(tau + NOISE * rng.normal(size=tau.shape), torque_step(robot))}
-    signals = {name: Signal(array, schema.unit_of(name), schema.SIGNALS[name][1]) for name, array in values.items()}
-    common = {"origin": "simulated", "robot_name": robot.name, "sample_time": SAMPLE_TIME,
-              "robot_text": format_robot(robot)}
-    return ExperimentLog(**(common | about), signals=signals)  # type: ignore[arg-type]
+    values = {
+        "t": t,
+        "q": quantised(motion(t).q, resolution),
+        "tau": quantised(tau + NOISE * rng.normal(size=tau.shape), torque_step(robot)),
+    }
+    signals = {
+        name: Signal(array, schema.unit_of(name), schema.SIGNALS[name][1])
+        for name, array in values.items()
+    }
+    return ExperimentLog(
+        origin="simulated",
+        robot_name=robot.name,
+        sample_time=SAMPLE_TIME,
+        robot_text=format_robot(robot),
+        signals=signals,
+        **about,
+    )
 
 
 def closed_form_logs() -> dict[str, ExperimentLog]:
-    """Every log of `rrr-closed-form/` by the name of its file."""
+    """Return every log of `rrr-closed-form/` by the name of its file."""
     arm = synthetic_arm()
-    logs = [excitation(arm, 1, "identify"), excitation(arm, 2, "validate"), slow(arm), hold(arm),
-            *(one_joint(arm, joint) for joint in (1, 2, 3))]
+    logs = [
+        excitation(arm, 1, "identify"),
+        excitation(arm, 2, "validate"),
+        slow(arm),
+        hold(arm),
+        *(one_joint(arm, joint) for joint in (1, 2, 3)),
+    ]
     return {f"{log.name}.h5": log for log in logs}
 
 
 def excitation(arm: Arm, number: int, role: str) -> ExperimentLog:
-    """All joints, one period of 10 s, from rest."""
+    """Move all joints for one period of 10 s, from rest."""
     rng = np.random.default_rng([22, number])
-    hanging = np.array([0.0, -math.pi / 2, 1.0])  # or gravity takes the torque that the motion needs
-    motion = within_limits(from_rest(rng, hanging, 0.1, np.ones(3)), arm)
-    return recorded(arm, motion, 10.0, rng, name=f"excitation-{number}", experiment="excitation", role=role,
-                    period=10.0)
+    # Hanging, or gravity takes the torque that the motion needs.
+    q0 = np.array([0.0, -math.pi / 2, 1.0])
+    motion = within_limits(from_rest(rng, q0, 0.1, np.ones(3)), arm)
+    about = {"name": f"excitation-{number}", "experiment": "excitation", "role": role}
+    return recorded(arm, motion, 10.0, rng, **about, period=10.0)
 
 
 def slow(arm: Arm) -> ExperimentLog:
-    """All joints slowly through many postures: gravity and friction at low speed."""
+    """Move all joints slowly through many postures: gravity and friction at low speed."""
     rng = np.random.default_rng([22, 3])
-    sweep = from_rest(rng, np.array([0.0, 0.5, -0.5]), 1 / 15, np.ones(3), corner_hz=0.15, harmonics=12)
-    return recorded(arm, within_limits(sweep, arm, speed=0.12), 15.0, rng, name="free-1", experiment="free",
-                    role="identify")
+    q0 = np.array([0.0, 0.5, -0.5])
+    sweep = from_rest(rng, q0, 1 / 15, np.ones(3), corner_hz=0.15, harmonics=12)
+    motion = within_limits(sweep, arm, speed=0.12)
+    about = {"name": "free-1", "experiment": "free", "role": "identify"}
+    return recorded(arm, motion, 15.0, rng, **about)
 
 
 def hold(arm: Arm) -> ExperimentLog:
-    """At rest: gravity, and what a torque sensor would call its offset."""
+    """Rest: gravity, and what a torque sensor would call its offset."""
     rng = np.random.default_rng([22, 4])
     posture = np.array([0.4, 0.6, -1.1])
     still = Fourier(posture, np.zeros((3, 1)), np.zeros((3, 1)), 1.0)
-    return recorded(arm, still, 3.0, rng, name="hold-1", experiment="hold", role="identify", posture=posture)
+    about = {"name": "hold-1", "experiment": "hold", "role": "identify"}
+    return recorded(arm, still, 3.0, rng, **about, posture=posture)
 
 
 def one_joint(arm: Arm, joint: int) -> ExperimentLog:
-    """One joint through all its speeds with reversals, the others held, the elbow stretched."""
+    """Move one joint (1-based) through all its speeds with reversals, the elbow stretched."""
     rng = np.random.default_rng([22, 4 + joint])
     moving = np.arange(1, 4) == joint
     q0 = np.array([0.0, -math.pi / 2, 0.0])
     sway = from_rest(rng, q0, 0.1, moving.astype(np.float64), harmonics=30)
-    return recorded(arm, within_limits(sway, arm), 10.0, rng, name=f"friction-{joint}", experiment="friction",
-                    role="identify", joint=joint, period=10.0)
+    about = {"name": f"friction-{joint}", "experiment": "friction", "role": "identify"}
+    return recorded(arm, within_limits(sway, arm), 10.0, rng, **about, joint=joint, period=10.0)

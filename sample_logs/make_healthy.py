@@ -1,4 +1,4 @@
-"""The logs of rrr-healthy/: every kind of experiment on a machine that is in order."""
+"""The logs of rrr-healthy/: every kind of experiment on a healthy machine."""
 
 from __future__ import annotations
 
@@ -16,25 +16,23 @@ from pipelines.io.experiment import ExperimentLog
 from pipelines.model.writing.reference import writing_task
 from sample_logs.bench_session import controllers_model, machine, recorded
 
-__all__ = ["RECORDED", "WRITING_STIFFNESS", "healthy_logs", "plans", "text"]
-
 RECORDED = datetime(2026, 3, 2, 9, 0)  # UTC
-POSTURES = ((0.4, 0.6, -1.1), (0.0, -1.2, 0.8))  # [rad] at rest
-WRITING_STIFFNESS = 1.1  # times the machine's gains: PD alone then errs by millimetres, as in Kostić et al. 2004, Table IV
-FRF_SECONDS = 32.0  # eight periods of the excitation
+# Times the machine's gains: PD alone then errs by millimetres, as in Kostić et al. 2004, Table IV.
+WRITING_STIFFNESS = 1.1  # numerics
 
 
 def text(machine: Machine, words: str) -> Reference:
-    """The joint motion that writes `words`."""
+    """Return the joint motion that writes `words`."""
     motion = writing_task(machine.described, words).sampled(SAMPLE_TIME).motion
     return Reference(motion.t, motion.q, motion.dq, motion.ddq)
 
 
 def plans(machine: Machine) -> Iterator[Experiment]:
-    """The whole session."""
+    """Yield the whole session."""
     model, joints = controllers_model(machine), (1, 2, 3)
     yield from (experiments.friction(machine, joint, seed=1) for joint in joints)
-    yield from (experiments.hold(np.array(posture), number) for number, posture in enumerate(POSTURES, start=1))
+    yield experiments.hold(np.array([0.4, 0.6, -1.1]), 1)
+    yield experiments.hold(np.array([0.0, -1.2, 0.8]), 2)
     yield experiments.excitation(machine, seed=1, periods=3)
     yield experiments.excitation(machine, seed=2, periods=2).judging()
     yield experiments.free(machine, seed=1)
@@ -42,10 +40,11 @@ def plans(machine: Machine) -> Iterator[Experiment]:
     yield from experiments.writing(text(machine, "RRRID"), model, WRITING_STIFFNESS)
     bent, straight, _ = experiments.frf_postures(machine)
     for seed, posture in ((1, bent), (2, straight)):
-        yield from (experiments.frf(machine, joint, posture, model, seed, FRF_SECONDS) for joint in joints)
+        for joint in joints:  # eight periods of the excitation
+            yield experiments.frf(machine, joint, posture, model, seed, duration=32.0)
 
 
 def healthy_logs(only: str | None = None) -> Iterator[tuple[str, ExperimentLog]]:
-    """Every log of `rrr-healthy/`, after the name of its file; or the one of this name."""
+    """Yield every log of `rrr-healthy/`, after the name of its file; or the one of this name."""
     at_hand = machine()
     return recorded(at_hand, plans(at_hand), RECORDED, seed=1, only=only)

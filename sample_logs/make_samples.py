@@ -1,8 +1,9 @@
 """Make the sample logs and the example model: python -m sample_logs.make_samples [FOLDER…]
 
-Every run gives the same logs, digest by digest; those of the virtual test bench, which take some minutes, with the same MuJoCo
-and where LAPACK rounds the same (`rounds_alike`): its code differs from processor to processor, and dry friction makes a count of
-an encoder of a last bit. With folders named, only these are made.
+Every run gives the same logs, digest by digest; those of the virtual test bench, which take some
+minutes, with the same MuJoCo and where LAPACK rounds the same (`rounds_alike`): its code differs
+from processor to processor, and dry friction makes a count of an encoder of a last bit. With
+folders named, only these are made.
 """
 
 from __future__ import annotations
@@ -23,12 +24,11 @@ from sample_logs.make_closed_form import closed_form_logs
 from sample_logs.make_healthy import healthy_logs
 from sample_logs.make_model import HERE, example_text
 
-__all__ = ["FOLDERS", "main", "rounds_alike"]
-
-_MUJOCO = "4.0.0"  # that made the committed logs; another rounds the last bit otherwise
-_AXES = "7a1fa61904f35503"  # digest of the principal axes of the machine's bodies, as LAPACK found them there
 FOLDERS: dict[str, Callable[[], Iterator[tuple[str, ExperimentLog]]]] = {
-    "rrr-closed-form": lambda: iter(closed_form_logs().items()), "rrr-healthy": healthy_logs, "rrr-changed": changed_logs}
+    "rrr-closed-form": lambda: iter(closed_form_logs().items()),
+    "rrr-healthy": healthy_logs,
+    "rrr-changed": changed_logs,
+}
 
 
 def main(names: list[str]) -> None:
@@ -48,10 +48,13 @@ def main(names: list[str]) -> None:
 
 
 def rounds_alike() -> bool:
-    """Return whether MuJoCo and LAPACK are, here, those that made the committed logs of the bench, to the last bit."""
+    """Return whether MuJoCo and LAPACK round here as they did for the committed logs of the bench.
+
+    LAPACK is judged by the digest of the principal axes of the machine's bodies.
+    """
     model = build(plan_of(machine().robot), SAMPLE_TIME).model
     axes = hashlib.sha256(model.body_inertia.tobytes() + model.body_iquat.tobytes()).hexdigest()
-    return version("mujoco") == _MUJOCO and axes.startswith(_AXES)
+    return version("mujoco") == "4.0.0" and axes.startswith("7a1fa61904f35503")
 
 
 if __name__ == "__main__":

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from sample_logs.controller_model import ControllerModel, controller_model
+from sample_logs.bench_session import ControllerModel, controller_model
 
 __all__ = ["ControllerModel", "controller_model"]

@@ -34,8 +34,7 @@ from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
-from sample_logs.bench_session import recorded
-from sample_logs.controller_model import ControllerModel, controller_model
+from sample_logs.bench_session import ControllerModel, controller_model, recorded
 
 __all__ = ["Session", "machine_of_case", "record_case"]
 

@@ -17,8 +17,7 @@ from bench.faults.structure import BaseResonance, JointElasticity
 from bench.machine import Fault, Machine
 from bench.plant import record
 from pipelines.io.experiment import Array, ExperimentLog
-from sample_logs.bench_session import controllers_model
-from sample_logs.controller_model import ControllerModel
+from sample_logs.bench_session import ControllerModel, controllers_model
 from tests.frf.linearised import Truth, linearised
 
 __all__ = ["Case", "accuracy_case", "controller_inertia", "recorded", "sealed_case", "truth_of"]
