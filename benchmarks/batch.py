@@ -1,10 +1,12 @@
-"""`rrrid batch` on 200 logs of 10 s, beside one process for each log: CPU seconds of all processes, in turn.
+"""`rrrid batch` on 200 logs of 10 s, beside one process for each log: CPU seconds of all processes,
+in turn.
 
     python -m benchmarks.batch [--logs 200] [--stage reconstruct] [--alone 20] [--memory 1000]
 
-Goals (performance.md): 15 times less than a process a log; 5 ms an item beyond what its stage takes in a process that is warm; with
---memory, memory that does not grow after the first 20 items. CPU seconds first of all: the machine is shared. Reports are left
-out. The processes of their own are timed on --alone logs, in turn with batches, and scaled to all.
+Goals (performance.md): 15 times less than a process a log; 5 ms an item beyond what its stage takes
+in a process that is warm; with --memory, memory that does not grow after the first 20 items. CPU
+seconds first of all: the machine is shared. Reports are left out. The processes of their own are
+timed on --alone logs, in turn with batches, and scaled to all.
 """
 
 from __future__ import annotations
@@ -33,24 +35,45 @@ from pipelines.stage import Request, run_stage
 REPO = Path(__file__).resolve().parents[1]
 SAMPLE = REPO / "sample_logs/rrr-closed-form/excitation-1.h5"
 RRRID = (sys.executable, "-m", "rrrid_cli.main")
-_PR_SET_CHILD_SUBREAPER = 36  # prctl(2): whose processes lose their parent, gets them, and their CPU time with them
+_PR_SET_CHILD_SUBREAPER = (
+    36  # prctl(2): whose processes lose their parent, gets them, and their CPU time with them
+)
 
 
 def lay(root: Path, count: int, seconds: float = 10.0) -> None:
     """`count` folders of one log, each log another."""
     log = open_log(SAMPLE).log
     keep = log.signals["t"].values < log.signals["t"].values[0] + seconds
-    signals = {name: replace(signal, values=signal.values[keep]) for name, signal in log.signals.items()}
+    signals = {
+        name: replace(signal, values=signal.values[keep]) for name, signal in log.signals.items()
+    }
     for i in range(count):
         tau = replace(signals["tau"], values=signals["tau"].values * (1.0 + 1e-6 * i))
-        write_log(root / f"{i:04d}/log.h5", replace(log, signals={**signals, "tau": tau}, period=None))
+        write_log(
+            root / f"{i:04d}/log.h5", replace(log, signals={**signals, "tau": tau}, period=None)
+        )
 
 
 def batch(root: Path, out: Path, stage: str, jobs: int) -> tuple[float, float]:
     """[s] CPU of a batch, all its processes together, and by the clock."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.monotonic()
-    subprocess.run([*RRRID, "batch", str(root), "--stage", stage, "--jobs", str(jobs), "--no-report", "-q", "--out", str(out)],
-                   check=False, cwd=REPO)
+    subprocess.run(
+        [
+            *RRRID,
+            "batch",
+            str(root),
+            "--stage",
+            stage,
+            "--jobs",
+            str(jobs),
+            "--no-report",
+            "-q",
+            "--out",
+            str(out),
+        ],
+        check=False,
+        cwd=REPO,
+    )
     lasted = time.monotonic() - began
     while True:  # the server of its workers comes to us when it has ended, and brings theirs
         try:
@@ -68,7 +91,10 @@ def warm_cpu(root: Path, out: Path, stage: str) -> float:
     module = load_stage(module_of(stage))
 
     def mine() -> float:
-        own, children = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
+        own, children = (
+            resource.getrusage(resource.RUSAGE_SELF),
+            resource.getrusage(resource.RUSAGE_CHILDREN),
+        )
         return own.ru_utime + own.ru_stime + children.ru_utime + children.ru_stime + _living()
 
     began = 0.0
@@ -76,7 +102,11 @@ def warm_cpu(root: Path, out: Path, stage: str) -> float:
     for i, folder in enumerate(folders):
         if i == 5:
             began = mine()
-        run_stage(module, Request((folder,), out / folder.name, no_report=True, check=True), module.settings())
+        run_stage(
+            module,
+            Request((folder,), out / folder.name, no_report=True, check=True),
+            module.settings(),
+        )
         gc.collect()  # what an item leaves in cycles is part of it
         if i < 3:
             gc.freeze()
@@ -90,15 +120,34 @@ def _living() -> float:
     spent = 0.0
     for child in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split():
         fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
-        spent += (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")  # proc(5): utime, stime
+        spent += (int(fields[11]) + int(fields[12])) / os.sysconf(
+            "SC_CLK_TCK"
+        )  # proc(5): utime, stime
     return spent
 
 
 def memory(root: Path, out: Path, stage: str) -> list[tuple[int, float]]:
     """(items done, MB of the largest process) all along a batch with one worker."""
-    words = ("batch", str(root), "--stage", stage, "--jobs", "1", "--no-report", "-v", "--out", str(out))
-    process = subprocess.Popen([*RRRID, *words], cwd=REPO, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True,
-                               start_new_session=True)
+    words = (
+        "batch",
+        str(root),
+        "--stage",
+        stage,
+        "--jobs",
+        "1",
+        "--no-report",
+        "-v",
+        "--out",
+        str(out),
+    )
+    process = subprocess.Popen(
+        [*RRRID, *words],
+        cwd=REPO,
+        stderr=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        text=True,
+        start_new_session=True,
+    )
     assert process.stderr is not None
     seen = []
     for line in process.stderr:
@@ -115,7 +164,9 @@ def _resident(group: int) -> list[float]:
     for path in Path("/proc").glob("[0-9]*"):
         try:
             if int((path / "stat").read_text().rpartition(")")[2].split()[2]) == group:
-                found.append(int((path / "statm").read_text().split()[1]) * resource.getpagesize() / 1e6)
+                found.append(
+                    int((path / "statm").read_text().split()[1]) * resource.getpagesize() / 1e6
+                )
         except (OSError, IndexError):
             continue  # it has just ended
     return found or [0.0]
@@ -133,8 +184,13 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         lay(folder / "root", max(given.logs, given.alone))
-        print(f"{given.stage}, {given.logs} logs of 10 s: CPU of all processes, and by the clock [s]")
-        ratios = [_side_by_side(folder, given.stage, given.logs, given.alone) for _ in range(given.repeats)]
+        print(
+            f"{given.stage}, {given.logs} logs of 10 s: CPU of all processes, and by the clock [s]"
+        )
+        ratios = [
+            _side_by_side(folder, given.stage, given.logs, given.alone)
+            for _ in range(given.repeats)
+        ]
         cpu, clock = (statistics.median(one) for one in zip(*ratios, strict=True))
         print(f"median: ×{cpu:.1f} by CPU, ×{clock:.1f} by the clock with two workers")
         _overhead(folder, given.stage, given.logs)
@@ -148,20 +204,36 @@ def main() -> None:
 
 
 def _side_by_side(folder: Path, stage: str, logs: int, alone: int) -> tuple[float, float]:
-    """How many times more a process a log takes than a batch: CPU, and by the clock one after another."""
+    """How many times more a process a log takes than a batch: CPU, and by the clock one after
+    another.
+    """
     whole, lasted = batch(folder / "root", folder / "out", stage, 2)
     began = time.monotonic()
-    single = statistics.mean(cpu_seconds([
-        *RRRID, stage, str(folder / f"root/{i:04d}"), "--no-report", "-q", "--out", str(folder / "one")])
-                             for i in range(alone))
+    single = statistics.mean(
+        cpu_seconds(
+            [
+                *RRRID,
+                stage,
+                str(folder / f"root/{i:04d}"),
+                "--no-report",
+                "-q",
+                "--out",
+                str(folder / "one"),
+            ]
+        )
+        for i in range(alone)
+    )
     clock = (time.monotonic() - began) / alone
-    print(f"  batch {whole:7.2f} {lasted:7.2f}   a process a log {single * logs:7.2f} {clock * logs:7.2f}"
-          f"   ×{single * logs / whole:.1f} ×{clock * logs / lasted:.1f}")
+    print(
+        f"  batch {whole:7.2f} {lasted:7.2f}   a process a log {single * logs:7.2f} "
+        f"{clock * logs:7.2f}"
+        f"   ×{single * logs / whole:.1f} ×{clock * logs / lasted:.1f}"
+    )
     return single * logs / whole, clock * logs / lasted
 
 
 def _overhead(folder: Path, stage: str, logs: int) -> None:
-    """What an item costs in a batch with one worker beyond its stage in a process that is warm; beginning and end apart."""
+    """Print what an item costs in a batch with one worker, beyond its stage in a warm process."""
     for i in range(10):
         shutil.copytree(folder / f"root/{i:04d}", folder / f"few/{i:04d}")
     differences = []
@@ -170,7 +242,10 @@ def _overhead(folder: Path, stage: str, logs: int) -> None:
         few, whole = (batch(folder / name, folder / "out", stage, 1)[0] for name in ("few", "root"))
         item = (whole - few) / (logs - 10)
         differences.append(item - warm)
-        print(f"  an item in a warm process {1e3 * warm:.1f} ms CPU, in a batch {1e3 * item:.1f} ms; a batch of ten {few:.2f} s")
+        print(
+            f"  an item in a warm process {1e3 * warm:.1f} ms CPU, in a batch {1e3 * item:.1f} ms; "
+            f"a batch of ten {few:.2f} s"
+        )
     print(f"overhead {1e3 * statistics.median(differences):.1f} ms an item")
 
 

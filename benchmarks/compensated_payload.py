@@ -3,8 +3,9 @@
     python -m benchmarks.compensated_payload --healthy 100 --loaded 30 --first 9000
 
 Machines of `torque_boundary`; a third are described exactly, a third wrong by up to 30 %, a sixth
-by up to 5 %, a sixth not at all. Their reference logs have another motion, and friction that differs by up to 15 % of
-each joint's. The controller of a loaded machine subtracts a body as heavy as 0.3 to 1.5 last links.
+by up to 5 %, a sixth not at all. Their reference logs have another motion, and friction that
+differs by up to 15 % of each joint's. The controller of a loaded machine subtracts a body as heavy
+as 0.3 to 1.5 last links.
 """
 
 from __future__ import annotations
@@ -29,8 +30,6 @@ from pipelines.estimation.checks.boundary import torque_boundary
 from pipelines.estimation.checks.payload import CompensatedPayload
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.robot import RobotDescription
-
-__all__ = ["described", "main", "session", "subtracted"]
 
 
 def _machine(seed: int) -> Machine:

@@ -1,15 +1,20 @@
 """`rrrid design-excitation` against its bars. CPU seconds on one core; medians of several seeds.
 
-    python -m benchmarks.excitation [paper-10 paper-60 paper-300 default bench limits gradient six-axes] [--seeds 5]
+    python -m benchmarks.excitation [NAMES] [--seeds 5]
 
-paper-…     the paper's problem (N = 100, 13 parameters, limits of speed and acceleration): condition number after so many
-            seconds of the whole command, start-up included. The paper: 3.1; the bound: √(3/2) = 1.22474
-default     30 s, 13 and 15 parameters: condition number, and predicted relative standard deviation beside the
-            condition-optimal design's
-bench       the same confirmed: parameter error of a least-squares fit on logs of the virtual test bench, 20 noise seeds
-limits      every default design on a grid of 0.1 ms, series summed and torque recursed anew: largest share of a limit
+paper-10 paper-60 paper-300
+            the paper's problem (N = 100, 13 parameters, limits of speed and acceleration):
+            condition number after so many seconds of the whole command, start-up included. The
+            paper: 3.1; the bound: √(3/2) = 1.22474
+default     30 s, 13 and 15 parameters: condition number, and predicted relative standard deviation
+            beside the condition-optimal design's
+bench       the same confirmed: parameter error of a least-squares fit on logs of the virtual test
+            bench, 20 noise seeds
+limits      every default design on a grid of 0.1 ms, series summed and torque recursed anew:
+            largest share of a limit
 gradient    against the complex step, and beside forward differences
-six-axes    a Stäubli TX40 by its URDF, rigid and friction columns, 60 s: condition number beside 50 random motions'
+six-axes    a Stäubli TX40 by its URDF, rigid and friction columns, 60 s: condition number beside
+            50 random motions'
 """
 
 from __future__ import annotations
@@ -57,7 +62,14 @@ from pipelines.stage import Request, run_stage
 from tests.model.excitation.test_gradient import SHARP, TASKS, WEIGHT, _complex_value, _problem
 
 TX40 = Path(__file__).resolve().parents[2] / "shared" / "real" / "tx40" / "tx40.urdf"
-PAPER = ("--criterion", "condition", "--symmetric", "--no-rest", "--set", "design-excitation.speed_share=1")
+PAPER = (
+    "--criterion",
+    "condition",
+    "--symmetric",
+    "--no-rest",
+    "--set",
+    "design-excitation.speed_share=1",
+)
 NOISE_SEEDS = 20
 
 
@@ -65,10 +77,24 @@ def command(*words: str) -> tuple[dict[str, object], Path, float]:
     """result.json of one command in a fresh process, its folder, and the CPU seconds it took."""
     folder = Path(tempfile.mkdtemp()) / "out"
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    line = [sys.executable, "-m", "rrrid_cli.main", "design-excitation", *words, "--json", "-q", "--out", str(folder)]
+    line = [
+        sys.executable,
+        "-m",
+        "rrrid_cli.main",
+        "design-excitation",
+        *words,
+        "--json",
+        "-q",
+        "--out",
+        str(folder),
+    ]
     done = subprocess.run(line, capture_output=True, text=True, check=True, env=os.environ)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return json.loads(done.stdout), folder, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return (
+        json.loads(done.stdout),
+        folder,
+        after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+    )
 
 
 def figure(result: dict[str, object], name: str) -> float:
@@ -79,10 +105,14 @@ def figure(result: dict[str, object], name: str) -> float:
 
 @cache
 def bare_robot() -> str:
-    """The paper's arm with the paper's limits alone: no links, no torques."""
+    """Write the paper's arm with the paper's limits alone: no links, no torques."""
     robot = load_robot("rrr")
     path = Path(tempfile.mkdtemp()) / "paper.toml"
-    path.write_text(format_robot(replace(robot, joints=tuple(replace(j, link=None, torque=np.inf) for j in robot.joints))))
+    path.write_text(
+        format_robot(
+            replace(robot, joints=tuple(replace(j, link=None, torque=np.inf) for j in robot.joints))
+        )
+    )
     return str(path)
 
 
@@ -90,16 +120,31 @@ def paper(seconds: float, bar: float, seeds: int) -> None:
     found, cpu = [], []
     for seed in range(1, seeds + 1):
         # start-up, finishing and files take their share of the time
-        result, _, used = command(bare_robot(), *PAPER, "--no-report", "--time-limit", str(seconds - 2.0), "--seed", str(seed))
+        result, _, used = command(
+            bare_robot(),
+            *PAPER,
+            "--no-report",
+            "--time-limit",
+            str(seconds - 2.0),
+            "--seed",
+            str(seed),
+        )
         found.append(figure(result, "condition_number"))
         cpu.append(used)
-    row(f"the paper's problem, {seconds:.0f} s", statistics.median(found), bar, f"{np.round(found, 4)}, CPU {np.round(cpu, 1)} s")
+    row(
+        f"the paper's problem, {seconds:.0f} s",
+        statistics.median(found),
+        bar,
+        f"{np.round(found, 4)}, CPU {np.round(cpu, 1)} s",
+    )
 
 
 @cache
 def designed(criterion: str, seed: int, parameters: int = 15) -> tuple[dict[str, object], Path]:
     symmetric = ("--symmetric",) if parameters == 13 else ()
-    result, folder, _ = command("rrr", "--criterion", criterion, *symmetric, "--time-limit", "28", "--seed", str(seed))
+    result, folder, _ = command(
+        "rrr", "--criterion", criterion, *symmetric, "--time-limit", "28", "--seed", str(seed)
+    )
     return result, folder
 
 
@@ -109,13 +154,29 @@ def default(seeds: int) -> None:
 
 
 def _default(every: range, parameters: int) -> None:
-    """13, as the paper fits; of all 15 two are zero, and are compared with 0.5 % of the largest of their unit."""
-    mine, other = ([designed(c, seed, parameters)[0] for seed in every] for c in ("default", "condition"))
+    """13, as the paper fits; of all 15 two are zero, and are compared with 0.5 % of the largest of
+    their unit.
+    """
+    mine, other = (
+        [designed(c, seed, parameters)[0] for seed in every] for c in ("default", "condition")
+    )
     condition = [figure(r, "condition_number") for r in mine]
-    row(f"the default design, {parameters} parameters: condition number", statistics.median(condition), 3.0,
-        str(np.round(condition, 3)))
-    ratio = [figure(a, "predicted_relative_std") / figure(b, "predicted_relative_std") for a, b in zip(mine, other, strict=True)]
-    row("… predicted relative std / the condition-optimal one's", statistics.median(ratio), 0.5, str(np.round(ratio, 3)))
+    row(
+        f"the default design, {parameters} parameters: condition number",
+        statistics.median(condition),
+        3.0,
+        str(np.round(condition, 3)),
+    )
+    ratio = [
+        figure(a, "predicted_relative_std") / figure(b, "predicted_relative_std")
+        for a, b in zip(mine, other, strict=True)
+    ]
+    row(
+        "… predicted relative std / the condition-optimal one's",
+        statistics.median(ratio),
+        0.5,
+        str(np.round(ratio, 3)),
+    )
 
 
 def limits(seeds: int) -> None:
@@ -125,7 +186,10 @@ def limits(seeds: int) -> None:
         c = json.loads((folder / "coefficients.json").read_text())
         a, b = np.zeros((3, 100)), np.zeros((3, 100))
         for j, joint in enumerate(c["joints"]):
-            a[j, np.array(joint["harmonics"]) - 1], b[j, np.array(joint["harmonics"]) - 1] = joint["a"], joint["b"]
+            a[j, np.array(joint["harmonics"]) - 1], b[j, np.array(joint["harmonics"]) - 1] = (
+                joint["a"],
+                joint["b"],
+            )
         series = FourierSeries(c["period"], np.array([j["q0"] for j in c["joints"]]), a, b)
         q, dq, ddq = series.at(np.arange(0.0, c["period"], 1e-4))
         arm = BaseArm(load_robot("rrr"))
@@ -133,9 +197,22 @@ def limits(seeds: int) -> None:
         assert p is not None
         tau = arm.torque(q.T, dq.T, ddq.T, p).T
         joints = arm.robot.joints
-        largest.append(max(max(np.abs(dq[j]).max() / (0.95 * joint.velocity), np.abs(ddq[j]).max() / joint.acceleration,
-                               np.abs(tau[j]).max() / (0.9 * joint.torque)) for j, joint in enumerate(joints)))
-    row("limits on a grid of 0.1 ms, largest share used", max(largest), 1.0, str(np.round(largest, 6)))
+        largest.append(
+            max(
+                max(
+                    np.abs(dq[j]).max() / (0.95 * joint.velocity),
+                    np.abs(ddq[j]).max() / joint.acceleration,
+                    np.abs(tau[j]).max() / (0.9 * joint.torque),
+                )
+                for j, joint in enumerate(joints)
+            )
+        )
+    row(
+        "limits on a grid of 0.1 ms, largest share used",
+        max(largest),
+        1.0,
+        str(np.round(largest, 6)),
+    )
 
 
 def gradient() -> None:
@@ -145,16 +222,29 @@ def gradient() -> None:
         problem, rng = _problem(task), np.random.default_rng(1)
         x = problem.start(rng)
         _, g, _ = problem.value(x, SHARP, WEIGHT)
-        d = problem.space.project(rng.normal(size=x.shape)) - problem.space.project(np.zeros_like(x))
+        d = problem.space.project(rng.normal(size=x.shape)) - problem.space.project(
+            np.zeros_like(x)
+        )
         exact = _complex_value(task, problem, x + 1e-30j * d).imag / 1e-30
         worst = max(worst, abs(float(g @ d) - exact) / float(np.linalg.norm(g) * np.linalg.norm(d)))
     row("gradient against the complex step, six problems", worst, 1e-8, "")
     robot = load_robot("rrr")
-    fine = landscape(plan_task(robot, None, Wishes("condition", symmetric=True, rest=False, speed_share=1.0)))
+    fine = landscape(
+        plan_task(robot, None, Wishes("condition", symmetric=True, rest=False, speed_share=1.0))
+    )
     x = fine.start(np.random.default_rng(1))
-    timed = race(lambda: [fine.value(x, 8.0, 0.01) for _ in range(100)], lambda: forward_differences(fine, x), 5)
-    row("… times as fast as forward differences, 603 coefficients", 100 * timed.ratio, 30.0,
-        f"{100 * timed.low:.0f}-{100 * timed.high:.0f}", least=True)
+    timed = race(
+        lambda: [fine.value(x, 8.0, 0.01) for _ in range(100)],
+        lambda: forward_differences(fine, x),
+        5,
+    )
+    row(
+        "… times as fast as forward differences, 603 coefficients",
+        100 * timed.ratio,
+        30.0,
+        f"{100 * timed.low:.0f}-{100 * timed.high:.0f}",
+        least=True,
+    )
 
 
 def forward_differences(problem: DesignProblem, x: np.ndarray) -> np.ndarray:
@@ -177,22 +267,42 @@ def six_axes(seeds: int) -> None:
     found, ratio = [], []
     median = _random_six_axes()
     for seed in range(1, seeds + 1):
-        result, _, _ = command(str(TX40), "--criterion", "condition", "--harmonics", "20", "--time-limit", "55", "--no-report",
-                               "--set", "design-excitation.rehearse=false", "--seed", str(seed))
+        result, _, _ = command(
+            str(TX40),
+            "--criterion",
+            "condition",
+            "--harmonics",
+            "20",
+            "--time-limit",
+            "55",
+            "--no-report",
+            "--set",
+            "design-excitation.rehearse=false",
+            "--seed",
+            str(seed),
+        )
         found.append(figure(result, "condition_number"))
         ratio.append(found[-1] / median)
-    row("TX40: condition number / median of 50 random motions", statistics.median(ratio), 0.2,
-        f"{np.round(found, 1)}, random {median:.0f}")
+    row(
+        "TX40: condition number / median of 50 random motions",
+        statistics.median(ratio),
+        0.2,
+        f"{np.round(found, 1)}, random {median:.0f}",
+    )
 
 
 def _random_six_axes() -> float:
     robot = import_urdf(TX40)
-    problem = landscape(plan_task(robot, Arm.from_links(robot), Wishes("condition", harmonics=(20,))))
+    problem = landscape(
+        plan_task(robot, Arm.from_links(robot), Wishes("condition", harmonics=(20,)))
+    )
     rng, goal, columns = np.random.default_rng(0), problem.arm.goal, problem.arm.columns
     found = []
     for _ in range(50):
         rows = columns.rows(problem.space.motion(problem.start(rng, 0.999), problem.samples))
-        found.append(goal.figures(grams_of(columns.columns, rows, len(columns.names))).condition_number)
+        found.append(
+            goal.figures(grams_of(columns.columns, rows, len(columns.names))).condition_number
+        )
     return statistics.median(found)
 
 
@@ -208,12 +318,26 @@ def bench(seeds: int) -> None:
         series = problem.space.series(problem.start(np.random.default_rng(seed), 0.999))
         t = np.arange(10001, dtype=np.float64) * 1e-3
         kinds["random"].append(Reference(t, *(np.ascontiguousarray(x.T) for x in series.at(t))))
-    errors = {kind: [_errors(machine, them[seed % len(them)], seed) for seed in range(NOISE_SEEDS)] for kind, them in kinds.items()}
-    ways = ("friction known", "friction from experiments of its own", "Coulomb and viscous fitted as well")
+    errors = {
+        kind: [_errors(machine, them[seed % len(them)], seed) for seed in range(NOISE_SEEDS)]
+        for kind, them in kinds.items()
+    }
+    ways = (
+        "friction known",
+        "friction from experiments of its own",
+        "Coulomb and viscous fitted as well",
+    )
     for other in ("condition", "random"):
         for k, words in enumerate(ways):
-            mine, theirs = (statistics.median(error[k] for error in errors[kind]) for kind in ("default", other))
-            row(f"bench, {words}: error / that of {other}", mine / theirs, 0.7, f"{100 * mine:.3g} % against {100 * theirs:.3g} %")
+            mine, theirs = (
+                statistics.median(error[k] for error in errors[kind]) for kind in ("default", other)
+            )
+            row(
+                f"bench, {words}: error / that of {other}",
+                mine / theirs,
+                0.7,
+                f"{100 * mine:.3g} % against {100 * theirs:.3g} %",
+            )
 
 
 def _reference(folder: Path) -> Reference:
@@ -222,46 +346,73 @@ def _reference(folder: Path) -> Reference:
 
 @cache
 def _friction_first(seed: int) -> Arm:
-    """The friction that fit-friction finds in experiments of its own."""
+    """Return the arm with the friction that fit-friction finds in experiments of its own."""
     machine, folder = paper_machine(), Path(tempfile.mkdtemp())
-    for log in record(machine, (), [experiments.friction(machine, joint, seed) for joint in (1, 2, 3)], 50 + seed):
+    for log in record(
+        machine, (), [experiments.friction(machine, joint, seed) for joint in (1, 2, 3)], 50 + seed
+    ):
         write_log(folder / f"{log.name}.h5", log)
     request = Request((folder,), out=Path(tempfile.mkdtemp()) / "out", no_report=True)
-    return Arm.from_model(run_stage(fit_friction.STAGE, request, fit_friction.Settings()).result.model)
+    return Arm.from_model(
+        run_stage(fit_friction.STAGE, request, fit_friction.Settings()).result.model
+    )
 
 
 def _errors(machine: Machine, reference: Reference, seed: int) -> tuple[float, ...]:
-    """Root mean square of the base parameters' errors over their sizes: friction known, fitted first, fitted with the rest.
+    """Root mean square of the base parameters' errors over their sizes: friction known, fitted
+    first, fitted with the rest.
 
-    The machine's friction is three sigmoids. Coulomb and viscous columns leave a part of it, and that part, the same for every
-    noise seed, is then most of the error; the paper fits friction by experiments of its own and compensates it.
+    The machine's friction is three sigmoids. Coulomb and viscous columns leave a part of it, and
+    that part, the same for every noise seed, is then most of the error; the paper fits friction by
+    experiments of its own and compensates it.
     """
-    log = record(machine, (), [Experiment("excitation", "excitation", reference, Decentralised())], seed)[0]
+    log = record(
+        machine, (), [Experiment("excitation", "excitation", reference, Decentralised())], seed
+    )[0]
     known, how = Arm.from_links(load_robot("rrr")).p, Reconstruction()
     laws = [friction.law() for friction in machine.friction]
 
     def friction(motion: Motion) -> np.ndarray:
-        return np.array([[law(v) for law, v in zip(laws, speeds, strict=True)] for speeds in motion.dq.tolist()])
+        return np.array(
+            [[law(v) for law, v in zip(laws, speeds, strict=True)] for speeds in motion.dq.tolist()]
+        )
 
     found = ((log, reconstruct(log, how)),)
     rigid, first = nominal_columns(log.robot, friction=False), _friction_first(seed % 3)
-    fits = (fit_logs(found, rigid, Recipe(how, known=friction)), fit_logs(found, rigid, Recipe(how, known=first.friction_torque)),
-            fit_logs(found, nominal_columns(log.robot), Recipe(how)))
-    sizes = np.maximum(np.abs(known), 0.005 * np.where(np.isin(np.arange(15), [2, 3, 13, 14]), 1.66, 0.818))
-    return tuple(float(np.sqrt(np.mean(((fit.estimate.beta[:15] - known) / sizes) ** 2))) for fit in fits)
+    fits = (
+        fit_logs(found, rigid, Recipe(how, known=friction)),
+        fit_logs(found, rigid, Recipe(how, known=first.friction_torque)),
+        fit_logs(found, nominal_columns(log.robot), Recipe(how)),
+    )
+    sizes = np.maximum(
+        np.abs(known), 0.005 * np.where(np.isin(np.arange(15), [2, 3, 13, 14]), 1.66, 0.818)
+    )
+    return tuple(
+        float(np.sqrt(np.mean(((fit.estimate.beta[:15] - known) / sizes) ** 2))) for fit in fits
+    )
 
 
 def row(name: str, value: float, bar: float, more: str, least: bool = False) -> None:
     good = value >= bar if least else value <= bar
-    print(f"{name:58s}{value:12.4g}{bar:9.4g}  {'reached' if good else 'MISSED '}  {more}", flush=True)
+    print(
+        f"{name:58s}{value:12.4g}{bar:9.4g}  {'reached' if good else 'MISSED '}  {more}", flush=True
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     bars: dict[str, Callable[[int], None]] = {
-        "paper-10": lambda n: paper(10.0, 1.30, n), "paper-60": lambda n: paper(60.0, 1.26, n),
-        "paper-300": lambda n: paper(300.0, 1.25, n), "default": default, "bench": bench, "limits": limits,
-        "gradient": lambda n: gradient(), "six-axes": six_axes}
+        "paper-10": lambda n: paper(10.0, 1.30, n),
+        "paper-60": lambda n: paper(60.0, 1.26, n),
+        "paper-300": lambda n: paper(300.0, 1.25, n),
+        "default": default,
+        "bench": bench,
+        "limits": limits,
+        "gradient": lambda n: gradient(),
+        "six-axes": six_axes,
+    }
     parser.add_argument("bars", nargs="*", default=[], help=", ".join(bars))
     parser.add_argument("--seeds", type=int, default=5)
     given = parser.parse_args()

@@ -37,19 +37,21 @@ from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from sample_logs.bench_session import controllers_model
 
-__all__ = ["KINDS", "PLANTS", "Session", "recorded"]
-
 PLANTS = ("equations", "arms", "bench")
 KINDS = ("rigid", "base", "joint", "gap")
 SECONDS, SPEED, LEG, RAMP = 24.0, 0.4, 6.0, 0.3
 ENCODER = 1e-5  # [rad]
 _INNER = 8000  # [Hz] at least
 _SWING = 0.125  # of the speed of the turn, by the excitation
-_TWO = ('name = "two"\ngravity = [0.0, 0.0, -9.81]\n[kinematics]\nconvention = "dh"\n'
-        "tool = [0.0, 0.0, 0.0]\n") + "".join(
+_TWO = (
+    'name = "two"\ngravity = [0.0, 0.0, -9.81]\n[kinematics]\nconvention = "dh"\n'
+    "tool = [0.0, 0.0, 0.0]\n"
+) + "".join(
     f'[[joint]]\nname = "{name}"\ntype = "revolute"\na = 0.3\nalpha = 0.0\nd = 0.0\noffset = 0.0\n'
     f"position = [-inf, inf]\nvelocity = 6.0\nacceleration = 60.0\ntorque = 200.0\n"
-    f"encoder_resolution = {ENCODER}\n" for name in ("first", "second"))
+    f"encoder_resolution = {ENCODER}\n"
+    for name in ("first", "second")
+)
 _EXCITED = {"table": (1,), "planar": (1,), "upright": (1, 2), "scara": (1,), "six": (1, 2)}
 
 
@@ -81,11 +83,12 @@ class Session:
         """Frequency [Hz] and damping ratio."""
         high = min(0.6 * self.known[1], 45.0)
         return float(rng.uniform(min(max(3.0 * self.band[0], 10.0), 0.7 * high), high)), float(
-            rng.uniform(0.02, 0.06))
+            rng.uniform(0.02, 0.06)
+        )
 
 
 def recorded(sessions: list[Session]) -> list[list[ExperimentLog]]:
-    """The logs of both postures of each session; all of one plant and rate."""
+    """Return the logs of both postures of each session, all of one plant and rate."""
     if sessions[0].plant == "equations":
         return _equations(sessions)
     return [(_arm if one.plant == "arms" else _bench)(one) for one in sessions]
@@ -118,18 +121,28 @@ def _reference(rate: int) -> tuple[Array, Array, Array]:
     return np.cumsum(dq) / rate, dq, np.gradient(dq, 1.0 / rate)
 
 
-def _log(s: Session, place: int, robot: str, text: str, joint: int, posture: Array,
-         values: dict[str, Array], controller: Controller) -> ExperimentLog:
-    signals = {name: Signal(x, schema.unit_of(name, s.law), schema.SIGNALS[name][1])
-               for name, x in values.items()}
+def _log(
+    s: Session, place: int, values: dict[str, Array], controller: Controller, **about: Any
+) -> ExperimentLog:
+    """Return the log of posture `place`; `about` has robot_name, robot_text, joint and posture."""
+    signals = {
+        name: Signal(x, schema.unit_of(name, s.law), schema.SIGNALS[name][1])
+        for name, x in values.items()
+    }
     return ExperimentLog(
-        name=f"{s.name}-{place + 1}", experiment="frf", role="identify", origin="simulated",
-        robot_name=robot, sample_time=1.0 / s.rate, robot_text=text, signals=signals, joint=joint,
-        posture=posture, controller=controller)
+        name=f"{s.name}-{place + 1}",
+        experiment="frf",
+        role="identify",
+        origin="simulated",
+        sample_time=1.0 / s.rate,
+        signals=signals,
+        controller=controller,
+        **about,
+    )
 
 
 def _controller(s: Session, inertia: Array) -> Controller:
-    """The gains of w², 1.4 w, in torque where they are no accelerations."""
+    """Return the gains of w², 1.4 w, in torque where they are no accelerations."""
     w, unit = 2.0 * np.pi * s.loop_hz, np.ones_like(inertia)
     size = unit if s.law == "computed-torque" else inertia
     return Controller(s.law, size * w**2, size * 1.4 * w, velocity="backward-difference", delay=0)
@@ -148,8 +161,9 @@ class _Two:
 
     @classmethod
     def drawn(cls, sessions: list[Session]) -> _Two:
-        return cls(*(np.array(x) for x in zip(
-            *(own for s in sessions for own in cls._of(s)), strict=True)))
+        return cls(
+            *(np.array(x) for x in zip(*(own for s in sessions for own in cls._of(s)), strict=True))
+        )
 
     @staticmethod
     def _of(s: Session) -> list[tuple[Any, ...]]:
@@ -168,12 +182,22 @@ class _Two:
         heavy = rng.uniform(4.0, 12.0) * first
         w = 2.0 * np.pi * hertz
         there = (s.kind == "base", True, s.kind in ("joint", "gap"), True)
-        return [(j, c, other, (heavy, heavy * w**2, 2.0 * ratio * w * heavy),
-                 (stiffness, damping, motor, gap), there)
-                for j, c in zip(inertia, coupling, strict=True)]
+        return [
+            (
+                j,
+                c,
+                other,
+                (heavy, heavy * w**2, 2.0 * ratio * w * heavy),
+                (stiffness, damping, motor, gap),
+                there,
+            )
+            for j, c in zip(inertia, coupling, strict=True)
+        ]
 
     def steps(self, h: float) -> tuple[Array, Array]:
-        """By what a force and a speed (4,) become the speed after h [s], damping at its midpoint."""
+        """By what a force and a speed (4,) become the speed after h [s], damping at its
+        midpoint.
+        """
         n, link = len(self.inertia), self.inertia - self.spring[:, 2]
         mass, lost = np.zeros((n, 4, 4)), np.zeros((n, 4, 4))  # x, q, w, r
         mass[:, 0, 0], mass[:, 1, 1] = self.base[:, 0] + self.inertia, self.inertia
@@ -186,26 +210,39 @@ class _Two:
         for i, there in enumerate(self.there):
             own = np.ix_(there, there)
             middle = np.linalg.inv(mass[i][own] + 0.5 * h * lost[i][own])
-            kick[i][own], kept[i][own] = h * middle, middle @ (mass[i][own] - 0.5 * h * lost[i][own])
+            kick[i][own], kept[i][own] = (
+                h * middle,
+                middle @ (mass[i][own] - 0.5 * h * lost[i][own]),
+            )
         return kick, kept
 
-    def forces(self, state: Array, speed: Array, tau: Array, drive: Array, friction: Array) -> Array:
-        """(runs, 4) [N m]."""
+    def forces(
+        self, state: Array, speed: Array, tau: Array, drive: Array, friction: Array
+    ) -> Array:
+        """Return the forces (runs, 4) [N m]."""
         stiffness, damping, _, gap = self.spring.T
         twist = state[:, 2]
         bent = np.where(np.abs(twist) > 0.5 * gap, twist - 0.5 * gap * np.sign(twist), 0.0)
         open_ = (bent == 0.0) & (gap > 0.0)
-        return np.stack([-self.base[:, 1] * state[:, 0], drive - friction[:, 0],
-                         -stiffness * bent + damping * speed[:, 2] * open_,
-                         tau[:, 1] - friction[:, 1]], axis=1)
+        return np.stack(
+            [
+                -self.base[:, 1] * state[:, 0],
+                drive - friction[:, 0],
+                -stiffness * bent + damping * speed[:, 2] * open_,
+                tau[:, 1] - friction[:, 1],
+            ],
+            axis=1,
+        )
 
 
 def _equations(sessions: list[Session]) -> list[list[ExperimentLog]]:
     rate, two = sessions[0].rate, _Two.drawn(sessions)
     q_ref, dq_ref, ddq_ref = (np.stack([x, np.zeros_like(x)], axis=1) for x in _reference(rate))
     samples, runs = len(q_ref), [(s, p) for s in sessions for p in (0, 1)]
-    v = np.stack([_excitation(s, p, samples, j, SPEED)
-                  for (s, p), j in zip(runs, two.inertia, strict=True)], axis=1)
+    v = np.stack(
+        [_excitation(s, p, samples, j, SPEED) for (s, p), j in zip(runs, two.inertia, strict=True)],
+        axis=1,
+    )
     tau_of = _two_laws([s for s, _ in runs], two)
     kept = {name: np.zeros((samples, len(runs), 2)) for name in ("q", "tau", "r")}
     size = np.stack([two.inertia, two.other], axis=1)
@@ -230,29 +267,39 @@ def _equations(sessions: list[Session]) -> list[list[ExperimentLog]]:
             state = state + half * speed
     logs: list[list[ExperimentLog]] = [[] for _ in sessions]
     for i, (s, p) in enumerate(runs):
-        values = {"t": np.arange(samples) / rate, "q": kept["q"][:, i], "tau": kept["tau"][:, i],
-                  "v": np.stack([v[:, i], np.zeros(samples)], axis=1), "q_ref": q_ref,
-                  "dq_ref": dq_ref, "ddq_ref": ddq_ref}
+        values = {
+            "t": np.arange(samples) / rate,
+            "q": kept["q"][:, i],
+            "tau": kept["tau"][:, i],
+            "v": np.stack([v[:, i], np.zeros(samples)], axis=1),
+            "q_ref": q_ref,
+            "dq_ref": dq_ref,
+            "ddq_ref": ddq_ref,
+        }
         if s.law == "computed-torque":
             values |= {"r": kept["r"][:, i], "v": values["v"] / two.inertia[i]}
-        logs[i // 2].append(_log(s, p, "two", _TWO, 1, np.array([0.0, 0.5 * p]), values,
-                                 _controller(s, size[i])))
+        about = {"robot_name": "two", "robot_text": _TWO, "joint": 1}
+        about["posture"] = np.array([0.0, 0.5 * p])
+        logs[i // 2].append(_log(s, p, values, _controller(s, size[i]), **about))
     return logs
 
 
 def _two_laws(runs: list[Session], two: _Two) -> Callable[..., tuple[Array, Array]]:
-    """τ and r (runs, 2) of e, ė (runs, 2), v (runs,), and the reference's speed and acceleration."""
+    """τ and r (runs, 2) of e, ė (runs, 2), v (runs,), and the reference's speed and
+    acceleration.
+    """
     w = 2.0 * np.pi * np.array([[s.loop_hz] for s in runs])
     size = np.stack([two.inertia, two.other], axis=1)
     linear = np.array([[s.law == "computed-torque"] for s in runs])
     ahead = np.array([[s.law == "pd+feedforward"] for s in runs])
     wrong = 1.0 + 0.03 * np.random.default_rng(runs[0].seed).standard_normal(len(runs))
-    theirs = wrong[:, None, None] * np.array([[[j, c], [c, k]] for j, c, k in zip(
-        two.inertia, two.coupling, two.other, strict=True)])
+    theirs = wrong[:, None, None] * np.array(
+        [[[j, c], [c, k]] for j, c, k in zip(two.inertia, two.coupling, two.other, strict=True)]
+    )
     across = np.stack([two.inertia, two.coupling], axis=1)
 
     def law(e: Array, de: Array, v: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
-        back = -w**2 * e - 1.4 * w * de
+        back = -(w**2) * e - 1.4 * w * de
         r = back + np.stack([v / two.inertia, np.zeros_like(v)], axis=1)
         friction = 0.9 * size * (0.4 * np.tanh(dq / 0.02) + 0.6 * dq)
         tau = size * back + ahead * (friction + across * ddq[0])
@@ -274,9 +321,16 @@ class _Soft:
     damping: float = 0.0
     gap: float = 0.0  # [rad]
 
-    def run(self, law: Callable[..., tuple[Array, Array]], friction: Friction, start: Array,
-            path: tuple[Array, Array, Array], noise: Array, rng: np.random.Generator,
-            substeps: int) -> dict[str, Array]:
+    def run(
+        self,
+        law: Callable[..., tuple[Array, Array]],
+        friction: Friction,
+        start: Array,
+        path: tuple[Array, Array, Array],
+        noise: Array,
+        rng: np.random.Generator,
+        substeps: int,
+    ) -> dict[str, Array]:
         """q, tau, r (samples, joints) along `path`."""
         data, at = mujoco.MjData(self.model), self.places
         data.qpos[at] = start
@@ -289,8 +343,10 @@ class _Soft:
             if self.twist is not None:
                 x = now.qpos[self.twist]
                 if abs(x) > 0.5 * self.gap:
-                    now.qfrc_passive[self.twist] -= self.stiffness * (
-                        x - np.copysign(0.5 * self.gap, x)) + self.damping * now.qvel[self.twist]
+                    now.qfrc_passive[self.twist] -= (
+                        self.stiffness * (x - np.copysign(0.5 * self.gap, x))
+                        + self.damping * now.qvel[self.twist]
+                    )
 
         mujoco.set_mjcb_passive(passive)
         try:
@@ -315,8 +371,13 @@ def _arm(s: Session) -> list[ExperimentLog]:
     soft, substeps = _softened(s, arm, joint - 1, own, rng)
     size = np.diag(mass[0])
     slow = np.full(len(size), float(rng.uniform(0.01, 0.03)))
-    friction = Friction(str(rng.choice(["tanh", "root", "arctan"])), rng.uniform(0.2, 1.0) * size,
-                        rng.uniform(0.3, 1.0) * size, slow, slow)
+    friction = Friction(
+        str(rng.choice(["tanh", "root", "arctan"])),
+        rng.uniform(0.2, 1.0) * size,
+        rng.uniform(0.3, 1.0) * size,
+        slow,
+        slow,
+    )
     wrong = arm.model(1e-3, scale=1.0 + 0.03 * float(rng.standard_normal()))
     robot = arm.described((ENCODER,) * len(size), np.ceil(60.0 * size + 20.0), True)
     logs = []
@@ -332,17 +393,38 @@ def _arm(s: Session) -> list[ExperimentLog]:
             v /= own[p]
         law = _law(s, wrong, size, friction, path, v)
         values = soft.run(law, friction, posture, path, noise, rng, substeps)
-        values |= {"t": np.arange(len(v)) / s.rate, "v": v, "q_ref": path[0], "dq_ref": path[1],
-                   "ddq_ref": path[2]}
+        values |= {
+            "t": np.arange(len(v)) / s.rate,
+            "v": v,
+            "q_ref": path[0],
+            "dq_ref": path[1],
+            "ddq_ref": path[2],
+        }
         if s.law != "computed-torque":
             del values["r"]
-        logs.append(_log(s, p, robot.name, format_robot(robot), joint, posture, values,
-                         _controller(s, size)))
+        logs.append(
+            _log(
+                s,
+                p,
+                values,
+                _controller(s, size),
+                robot_name=robot.name,
+                robot_text=format_robot(robot),
+                joint=joint,
+                posture=posture,
+            )
+        )
     return logs
 
 
-def _law(s: Session, model: Any, size: Array, friction: Friction, path: tuple[Array, Array, Array],
-         v: Array) -> Callable[[int, Array], tuple[Array, Array]]:
+def _law(
+    s: Session,
+    model: Any,
+    size: Array,
+    friction: Friction,
+    path: tuple[Array, Array, Array],
+    v: Array,
+) -> Callable[[int, Array], tuple[Array, Array]]:
     """τ and r (joints,) at sample k from the angles as read; `model` is the controller's own."""
     w, data, before = 2.0 * np.pi * s.loop_hz, mujoco.MjData(model), np.zeros((2, len(size)))
     out = np.zeros(len(size))
@@ -360,7 +442,7 @@ def _law(s: Session, model: Any, size: Array, friction: Friction, path: tuple[Ar
         e = q - q_ref
         de = np.zeros_like(e) if k == 0 else (e - before[0]) * s.rate
         before[0] = e
-        back = -w**2 * e - 1.4 * w * de
+        back = -(w**2) * e - 1.4 * w * de
         known = 0.9 * (friction.dry(dq_ref) + friction.viscous * dq_ref)
         if s.law == "computed-torque":
             return inverse(q, dq_ref, ddq_ref + back + v[k]) + known, back + v[k]
@@ -382,14 +464,17 @@ def _unlike(arm: Arm, model: Any, j: int, rng: np.random.Generator) -> tuple[Arr
     """Of twenty postures the two whose inertia about joint `j` differs most."""
     home, reach = np.array([(axis.home, axis.reach) for axis in arm.axes]).T
     tried = home + rng.uniform(-1.0, 1.0, (20, len(home))) * reach
-    tried[:, :j + 1] = home[:j + 1]
+    tried[:, : j + 1] = home[: j + 1]
     order = np.argsort([_mass(model, q)[j, j] for q in tried])
     return tried[order[0]], tried[order[-1]]
 
 
-def _softened(s: Session, arm: Arm, j: int, inertia: Array,
-              rng: np.random.Generator) -> tuple[_Soft, int]:
-    """Return the compliant arm and its steps a sample; `inertia` about its joint in both postures."""
+def _softened(
+    s: Session, arm: Arm, j: int, inertia: Array, rng: np.random.Generator
+) -> tuple[_Soft, int]:
+    """Return the compliant arm and its steps a sample; `inertia` about its joint in both
+    postures.
+    """
     motor = arm.axes[j].rotor
     link, fastest = float(inertia.min()) - motor, 0.0
     spec = arm.spec()
@@ -409,15 +494,21 @@ def _softened(s: Session, arm: Arm, j: int, inertia: Array,
         fastest = np.sqrt(stiffness * (1.0 / motor + 1.0 / link))
         hinge = bodies[j].first_joint()
         hinge.name, hinge.armature = "twist", 0.0
-        bodies[j].add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=hinge.axis,
-                            name=f"axis {j + 1}", armature=motor)
+        bodies[j].add_joint(
+            type=mujoco.mjtJoint.mjJNT_HINGE, axis=hinge.axis, name=f"axis {j + 1}", armature=motor
+        )
     if s.kind == "base":
         hertz, ratio = s.base(rng)
         heavy = float(rng.uniform(4.0, 12.0) * inertia.min())
         w = 2.0 * np.pi * hertz
-        bodies[0].add_joint(type=mujoco.mjtJoint.mjJNT_HINGE, axis=bodies[0].first_joint().axis,
-                            name="base", armature=heavy, stiffness=heavy * w**2,
-                            damping=2.0 * ratio * w * heavy)
+        bodies[0].add_joint(
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=bodies[0].first_joint().axis,
+            name="base",
+            armature=heavy,
+            stiffness=heavy * w**2,
+            damping=2.0 * ratio * w * heavy,
+        )
         fastest = 2.0 * w
     substeps = max(int(np.ceil(2000 / s.rate)), int(np.ceil(2.0 * fastest / s.rate)))
     spec.option.timestep = 1.0 / (s.rate * substeps)
@@ -462,18 +553,24 @@ def _bench(s: Session) -> list[ExperimentLog]:
         inertia = float(RigidDynamics(machine.robot).mass_matrix(posture)[joint - 1, joint - 1])
         v = np.zeros_like(reference.q)
         v[:, joint - 1] = _excitation(s, p, len(v), inertia, float(np.abs(reference.dq).max()))
-        law: Any = {"pd": lambda v=v: _Injected(Decentralised("backward-difference", 0.3), v),
-                    "pd+feedforward": lambda v=v: _Injected(
-                        FeedForward(model, velocity="backward-difference", stiffness=0.3), v),
-                    "computed-torque": lambda v=v, j=inertia: ComputedTorque(
-                        model, v / j, (w**2,) * machine.n, (1.4 * w,) * machine.n)}[s.law]()
-        experiments.append(Experiment(f"{s.name}-{p + 1}", "frf", reference, law, joint=joint,
-                                      posture=posture))
+        law: Any = {
+            "pd": lambda v=v: _Injected(Decentralised("backward-difference", 0.3), v),
+            "pd+feedforward": lambda v=v: _Injected(
+                FeedForward(model, velocity="backward-difference", stiffness=0.3), v
+            ),
+            "computed-torque": lambda v=v, j=inertia: ComputedTorque(
+                model, v / j, (w**2,) * machine.n, (1.4 * w,) * machine.n
+            ),
+        }[s.law]()
+        experiments.append(
+            Experiment(f"{s.name}-{p + 1}", "frf", reference, law, joint=joint, posture=posture)
+        )
     return record(machine, faults, experiments, seed=s.seed % 100_000)
 
 
-def _bench_faults(s: Session, machine: Machine, joint: int,
-                  rng: np.random.Generator) -> tuple[Fault, ...]:
+def _bench_faults(
+    s: Session, machine: Machine, joint: int, rng: np.random.Generator
+) -> tuple[Fault, ...]:
     if s.kind == "rigid":
         return ()
     if s.kind == "base":

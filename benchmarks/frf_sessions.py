@@ -3,10 +3,11 @@
     nice python -m benchmarks.frf_sessions [--seed 1] [--count 60] [--logs FOLDER] [--only NAME …]
 
 A rigid arm, a soft base, a spring in a joint, or a gap in it, on the plants of `frf_plants`. Each
-session has two postures, v as a multisine, as band-limited noise or as a periodic sweep, PD, PD with
-feed-forward or computed torque, 100 Hz to 5 kHz (the bench 1 kHz), and one of three bands. Printed:
-right, undecided, wrong of each plant and rate, with intervals of 95 % (Wilson 1927). Undecided is an
-answer; of a gap, it is right where the gap is among the candidates. Logs stay in FOLDER.
+session has two postures, v as a multisine, as band-limited noise or as a periodic sweep, PD, PD
+with feed-forward or computed torque, 100 Hz to 5 kHz (the bench 1 kHz), and one of three bands.
+Printed: right, undecided, wrong of each plant and rate, with intervals of 95 % (Wilson 1927).
+Undecided is an answer; of a gap, it is right where the gap is among the candidates. Logs stay in
+FOLDER.
 """
 
 from __future__ import annotations
@@ -28,8 +29,6 @@ from pipelines.io.files import open_log, write_log
 from pipelines.model.frf.findings import Findings, frf_findings, grouped
 from pipelines.model.frf.grouping import GroupingConfig
 
-__all__ = ["drawn", "judged", "main"]
-
 RATES = (100, 250, 500, 1000, 2000, 5000)  # [Hz]
 _RUNAWAY = 1.0  # [rad] from the reference: a controller too fast for its rate and a light motor
 BANDS = ((3.0, 80.0), (4.0, 150.0), (2.0, 220.0))  # [Hz] of v, at most .4 of the rate
@@ -46,11 +45,16 @@ def _draw(seed: int, number: int) -> Session:
     rate = 1000 if plant == "bench" else int(rng.choice(RATES))
     low, high = BANDS[int(rng.integers(len(BANDS)))]
     return Session(
-        f"{seed}-{number}", plant, KINDS[number // len(PLANTS) % len(KINDS)],
+        f"{seed}-{number}",
+        plant,
+        KINDS[number // len(PLANTS) % len(KINDS)],
         str(rng.choice(["multisine", "noise", "sweep"])),
-        str(rng.choice(["pd", "pd+feedforward", "computed-torque"])), rate,
-        (low, min(high, 0.4 * rate)), float(rng.uniform(min(3.0, 0.016 * rate), min(8.0, 0.032 * rate))),
-        int(rng.integers(1 << 30)))
+        str(rng.choice(["pd", "pd+feedforward", "computed-torque"])),
+        rate,
+        (low, min(high, 0.4 * rate)),
+        float(rng.uniform(min(3.0, 0.016 * rate), min(8.0, 0.032 * rate))),
+        int(rng.integers(1 << 30)),
+    )
 
 
 def logs_of(sessions: list[Session], folder: Path) -> Iterator[tuple[Session, list[ExperimentLog]]]:
@@ -74,19 +78,24 @@ def judged(session: Session, found: Findings) -> str:
     if session.kind == "gap":
         if said:
             return "wrong"
-        return "right" if any("backlash" in one.candidates for one in found.undecided) else "undecided"
+        return (
+            "right" if any("backlash" in one.candidates for one in found.undecided) else "undecided"
+        )
     if said - {session.kind}:
         return "wrong"
     return "right" if said and not found.undecided else "undecided"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--only", nargs="*", help="names of sessions")
-    parser.add_argument("--logs", type=Path, default=Path(tempfile.gettempdir()) / "rrrid-frf-sessions")
+    parser.add_argument(
+        "--logs", type=Path, default=Path(tempfile.gettempdir()) / "rrrid-frf-sessions"
+    )
     given = parser.parse_args()
     sessions = [s for s in drawn(given.seed, given.count) if not given.only or s.name in given.only]
     tally: Counter[tuple[str, str]] = Counter()
@@ -105,18 +114,31 @@ def main() -> None:
         print(_line(session, verdict, found, time.process_time() - begun), flush=True)
     for group in dict.fromkeys(group for group, _ in sorted(tally)):
         total = sum(tally[group, v] for v in ("right", "undecided", "wrong"))
-        print(f"{group:10}", *("{}: {} of {}, {:.2f} to {:.2f};".format(
-            v, tally[group, v], total, *wilson(tally[group, v], total))
-            for v in ("right", "undecided", "wrong")))
+        print(
+            f"{group:10}",
+            *(
+                "{}: {} of {}, {:.2f} to {:.2f};".format(
+                    v, tally[group, v], total, *wilson(tally[group, v], total)
+                )
+                for v in ("right", "undecided", "wrong")
+            ),
+        )
 
 
 def _line(s: Session, verdict: str, found: Findings, seconds: float) -> str:
-    named = [(one.kind, one.joint, {name: f"{x.value:.5g} ± {x.std:.2g}"
-                                    for name, x in one.parameters.items()})
-             for one in found.classification]
-    return (f"{s.name}: {s.plant}, {s.kind}, {s.excitation}, {s.law}, {s.rate} Hz, {s.band[0]:g} to "
-            f"{s.band[1]:g} Hz: {verdict} ({seconds:.0f} s) {named} "
-            f"{[one.evidence for one in found.undecided]}")
+    named = [
+        (
+            one.kind,
+            one.joint,
+            {name: f"{x.value:.5g} ± {x.std:.2g}" for name, x in one.parameters.items()},
+        )
+        for one in found.classification
+    ]
+    return (
+        f"{s.name}: {s.plant}, {s.kind}, {s.excitation}, {s.law}, {s.rate} Hz, {s.band[0]:g} to "
+        f"{s.band[1]:g} Hz: {verdict} ({seconds:.0f} s) {named} "
+        f"{[one.evidence for one in found.undecided]}"
+    )
 
 
 if __name__ == "__main__":

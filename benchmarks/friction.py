@@ -1,13 +1,16 @@
-"""The friction fit of one joint beside a filterpy extended Kalman filter. Goal: ×100 at 20 s (performance.md).
+"""The friction fit of one joint beside a filterpy extended Kalman filter. Goal: ×100 at 20 s
+(performance.md).
 
     python -m benchmarks.friction [--seeds 6] [--repeats 3]
 
-Both take position and torque of one joint, 20 s at 1 kHz, friction of three sigmoids, and give inertia, gravity and friction
-(ten numbers). Theirs is the paper's filter: filterpy's ExtendedKalmanFilter over q, dq and the ten, one pass, started 15 % off
-the truth and told the true noise of torque and encoder; its model and derivatives are plain scalar arithmetic, faster than
-arrays of one. Ours is one call, `fit_driven_alone`, and is told neither, nor a start: only the step of the encoder. It tunes a
-smoother, fits roughly, refines the motion about that once (by default) or twice, fits again and gives the covariance. Errors are
-of the friction curve over the driven speeds, rms over its rms, medians over the seeds.
+Both take position and torque of one joint, 20 s at 1 kHz, friction of three sigmoids, and give
+inertia, gravity and friction (ten numbers). Theirs is the paper's filter: filterpy's
+ExtendedKalmanFilter over q, dq and the ten, one pass, started 15 % off the truth and told the true
+noise of torque and encoder; its model and derivatives are plain scalar arithmetic, faster than
+arrays of one. Ours is one call, `fit_driven_alone`, and is told neither, nor a start: only the step
+of the encoder. It tunes a smoother, fits roughly, refines the motion about that once (by default)
+or twice, fits again and gives the covariance. Errors are of the friction curve over the driven
+speeds, rms over its rms, medians over the seeds.
 """
 
 from __future__ import annotations
@@ -44,7 +47,9 @@ STD = np.array([ENCODER, 0.01, 2.0, 0.4, 0.3, 0.4, 0.2, 30.0, 20.0, 5.0, 0.05, 0
 def ours(y: np.ndarray, tau: np.ndarray, rounds: int) -> LawFit:
     joint, law = OneJoint.of(recorded("three_sigmoid", 0).robot, JOINT), law_named("three_sigmoid")
     assert law is not None
-    return fit_driven_alone(np.arange(len(y), dtype=np.float64) * STEP, y, tau, joint, law, ENCODER, rounds=rounds)
+    return fit_driven_alone(
+        np.arange(len(y), dtype=np.float64) * STEP, y, tau, joint, law, ENCODER, rounds=rounds
+    )
 
 
 def theirs(y: np.ndarray, tau: np.ndarray) -> np.ndarray:
@@ -57,7 +62,9 @@ def theirs(y: np.ndarray, tau: np.ndarray) -> np.ndarray:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seeds", type=int, default=6)
     parser.add_argument("--repeats", type=int, default=3)
     arguments = parser.parse_args()
@@ -69,14 +76,27 @@ def main() -> None:
         for name, rounds in ROUNDS.items():
             errors[name].append(relative(ours(y, tau, rounds).curve(speed), truth))
         x = theirs(y, tau)
-        errors["theirs"].append(relative(np.tanh(np.outer(speed, x[7:10])) @ x[4:7] + x[10] * speed, truth))
+        errors["theirs"].append(
+            relative(np.tanh(np.outer(speed, x[7:10])) @ x[4:7] + x[10] * speed, truth)
+        )
     median = {name: statistics.median(values) for name, values in errors.items()}
     print(HEADER)
     log = recorded("three_sigmoid", 0)
     y, tau = log.q[:, JOINT - 1].copy(), log.tau[:, JOINT - 1].copy()
     for name, rounds in ROUNDS.items():
-        print(row(f"20 s, {name}", race(lambda rounds=rounds: ours(y, tau, rounds), lambda: theirs(y, tau), arguments.repeats),
-                  median[name], median["theirs"]), flush=True)
+        print(
+            row(
+                f"20 s, {name}",
+                race(
+                    lambda rounds=rounds: ours(y, tau, rounds),
+                    lambda: theirs(y, tau),
+                    arguments.repeats,
+                ),
+                median[name],
+                median["theirs"],
+            ),
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -34,7 +34,18 @@ from pipelines.stage import Request, run_stage
 
 SAME = 5e-3  # rms difference over standard deviation of an equal signal (rounding)
 ASK = "FILL IN"
-SETS = ("robots", "programs", "stranger", "stranger_2", "fresh", "fresh_2", "stranger_3", "stranger_4", "stranger_5", "stranger_6")
+SETS = (
+    "robots",
+    "programs",
+    "stranger",
+    "stranger_2",
+    "fresh",
+    "fresh_2",
+    "stranger_3",
+    "stranger_4",
+    "stranger_5",
+    "stranger_6",
+)
 SETS += ("stranger_7", "stranger_8", "stranger_9")
 
 
@@ -78,9 +89,15 @@ LAYOUTS: list[Layout] = []
 
 
 def layout(
-    arm: Arm, robot: str | None = "arm.urdf", rate: float = 200.0, how: str = "series", size: float = 1.0
+    arm: Arm,
+    robot: str | None = "arm.urdf",
+    rate: float = 200.0,
+    how: str = "series",
+    size: float = 1.0,
 ) -> Callable[[Callable[[Path, Run], Answer]], Callable[[Path, Run], Answer]]:
-    """Register a function that writes one recording into a folder; its docstring names the source."""
+    """Register a function that writes one recording into a folder; its docstring names the
+    source.
+    """
 
     def register(write: Callable[[Path, Run], Answer]) -> Callable[[Path, Run], Answer]:
         source = (write.__doc__ or "").splitlines()[0]
@@ -99,7 +116,13 @@ UNITS |= {"q°": DEG, "q_ref°": DEG, "dq°": DEGS, "counts": ("counts",), "coun
 UNITS |= {"dq_ref": RADS, "dq_ref°": DEGS, "ddq": ("rad/s^2",), "tau_ref": NM, "N mm": ("N mm",)}
 UNITS |= {"rev": ("turn", "turns", "rev"), "rev/s": ("turn/s", "turns/s", "rev/s"), "?": ()}
 UNITS |= {"mrad": ("mrad",), "mNm": ("mN m", "mNm", "N mm"), "0.1 %": ("0.1 %",), "rpm": ("rpm",)}
-UNITS |= {"mA": ("mA",), "A": ("A",), "kNm": ("kN m", "kNm"), "kgf cm": ("kgf cm",), "deg/s": ("deg/s",)}
+UNITS |= {
+    "mA": ("mA",),
+    "A": ("A",),
+    "kNm": ("kN m", "kNm"),
+    "kgf cm": ("kgf cm",),
+    "deg/s": ("deg/s",),
+}
 
 
 def block(pattern: str, values: np.ndarray, start: int = 1) -> dict[str, np.ndarray]:
@@ -131,7 +154,9 @@ def current(run: Run) -> np.ndarray:
 
 
 def values(run: Run) -> dict[str, np.ndarray]:
-    """What a layout may write: the motion, its times, and a tool pose [mm, rad] that follows it."""
+    """Return what a layout may write: the motion, its times, and a tool pose [mm, rad] that follows
+    it.
+    """
     a, b = run.q[:, 0], run.q[:, 1]
     data = {"q": run.q, "dq": run.dq, "tau": run.tau, "q_ref": run.q_ref, "ext": run.tau_ext}
     data |= {"ddq": run.ddq, "dq_ref": run.dq_ref, "tau_ref": run.tau_ref, "amps": run.current}
@@ -186,7 +211,7 @@ def wide(run: Run, specs: str, joints=None, joint_wise: bool = False, **more) ->
 
 
 def stamps(run: Run, form: str) -> np.ndarray:
-    """Dates of the samples as text."""
+    """Return the dates of the samples as text."""
     times = pd.Timestamp("2024-05-03 14:02:11.25") + pd.to_timedelta(values(run)["us"], unit="us")
     return times.strftime(form).to_numpy()
 
@@ -196,7 +221,7 @@ def vector(numbers: np.ndarray) -> str:
     return ", ".join(f"{x:.6f}" for x in numbers)
 
 
-def recorded(
+def recorded(  # noqa: PLR0913 (what 146 layouts say of a text file)
     folder: Path,
     run: Run,
     file: str,
@@ -208,7 +233,9 @@ def recorded(
     data: dict | None = None,
     **how: object,
 ) -> Answer:
-    """Write the table of `wide` as a text file, and return its answer; `known` tells whether all of it can be known."""
+    """Write the table of `wide` as a text file, and return its answer; `known` tells whether all of
+    it can be known.
+    """
     columns, right = wide(run, specs, joints, joint_wise, **(data or {}))
     table(folder / file, columns, **how)
     return Answer(file, time, right=right, draftable=known)
@@ -294,7 +321,9 @@ def wrong_signals(draft: dict, answer: Answer, run: Run) -> list[str]:
 
 
 def wrong_values(recipe: str, folder: Path, answer: Answer, run: Run) -> list[str] | str:
-    """Import by a recipe, and return every signal of the log that is not the simulated motion; or why it does not run."""
+    """Import by a recipe, and return every signal of the log that is not the simulated motion; or
+    why it does not run.
+    """
     path, out = folder.parent / "recipe.toml", folder.parent / "out"
     path.write_text(recipe, encoding="utf-8")
     try:
@@ -365,7 +394,9 @@ def untrue(draft: str, lay: Layout, answer: Answer, run: Run) -> list[str]:
 
 
 def filled(draft: str, answer: Answer, run: Run) -> str | None:
-    """Return the recipe with its blanks filled in from the truth; None where the answer does not say what belongs there."""
+    """Return the recipe with its blanks filled in from the truth; None where the answer does not
+    say what belongs there.
+    """
     if not answer.draftable:
         return None
     recipe = tomllib.loads(draft)

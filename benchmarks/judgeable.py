@@ -3,8 +3,8 @@
     python -m benchmarks.judgeable FOLDER...        folders of logs, each a session
     python -m benchmarks.judgeable FOLDER... --keep facts.jsonl     add to these, and print all
 
-Each session is diagnosed once. The facts are kept; the verdict "no-fault-found" is then decided with
-half of, once and twice `JudgeableConfig.largest_share`.
+Each session is diagnosed once. The facts are kept; the verdict "no-fault-found" is then decided
+with half of, once and twice `JudgeableConfig.largest_share`.
 """
 
 from __future__ import annotations
@@ -26,14 +26,13 @@ from pipelines.model.rows.prepare import prepare
 from pipelines.model.rows.repeated import facts, nominal_estimate
 from pipelines.stage import Request
 
-__all__ = ["asked", "decided", "main"]
-
 _TIMES = (0.5, 1.0, 2.0)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folders", nargs="*", type=Path)
     parser.add_argument("--keep", type=Path, default=Path("facts.jsonl"))
     given = parser.parse_args()
@@ -59,12 +58,22 @@ def asked(folder: Path) -> dict[str, Any]:
     chosen = logs_of_roles([opened.log for opened in inputs.logs], inputs.label)
     rows = DiagnosisConfig().recipe()
     prepared = with_terms_told_apart(prepare(chosen, rows), settings.blocks)
-    known = facts(found.residual_rms.validate, found.noise_floor_origin != "blocks", prepared, nominal_estimate(prepared))
-    return {"verdict": found.verdict, "origin": found.noise_floor_origin,
-            "findings": [f"{one.cause}:{one.joint}" for one in found.findings],
-            "left": known.left.tolist(), "torque": known.torque.tolist(),
-            "std": known.std.tolist(), "unresolved": known.unresolved,
-            "floor_known": known.floor_known.tolist()}
+    known = facts(
+        found.residual_rms.validate,
+        found.noise_floor_origin != "blocks",
+        prepared,
+        nominal_estimate(prepared),
+    )
+    return {
+        "verdict": found.verdict,
+        "origin": found.noise_floor_origin,
+        "findings": [f"{one.cause}:{one.joint}" for one in found.findings],
+        "left": known.left.tolist(),
+        "torque": known.torque.tolist(),
+        "std": known.std.tolist(),
+        "unresolved": known.unresolved,
+        "floor_known": known.floor_known.tolist(),
+    }
 
 
 def decided(line: dict[str, Any], times: float) -> str:

@@ -48,7 +48,10 @@ def odrive_poll(folder: Path, run: Run) -> Answer:
     turn, amps = 2 * np.pi, run.current
     more = {"rev": run.q / turn, "rev/s": run.dq / turn, "goal": run.q_ref / turn}
     specs = "axis{}.encoder.pos_estimate=rev; axis{}.encoder.vel_estimate=rev/s; "
-    specs += "axis{}.controller.pos_setpoint=goal; *axis{}.motor.current_control.Iq_measured=amps:current; "
+    specs += (
+        "axis{}.controller.pos_setpoint=goal; "
+        "*axis{}.motor.current_control.Iq_measured=amps:current; "
+    )
     specs += "axis{}.motor.current_control.Iq_setpoint=wanted; axis{}.error=0"
     columns, right = wide(run, specs, range(2), joint_wise=True, wanted=amps * 1.01, **more)
     csv(folder / "odrive.csv", {"time": run.t} | columns)
@@ -82,7 +85,10 @@ def dynamixel_registers(folder: Path, run: Run) -> Answer:
     more = {"goal": 2048 + whole(run.q_ref * 4096 / (2 * np.pi)), "heat": whole(run.temperature)}
     more |= {"ticks": 2048 + whole(run.q * 4096 / (2 * np.pi)), "speed": whole(run.dq / 0.02398)}
     specs = "Timestamp=stamp; ID{}_Goal_Position=goal; ID{}_Present_Position=ticks; "
-    specs += "*ID{}_Present_Velocity=speed:dq:?; *ID{}_Present_Current=mA:current:?; ID{}_Present_Temperature=heat"
+    specs += (
+        "*ID{}_Present_Velocity=speed:dq:?; *ID{}_Present_Current=mA:current:?; "
+        "ID{}_Present_Temperature=heat"
+    )
     more |= {"mA": whole(run.current * 1000 / 2.69)}
     columns, right = wide(run, specs, joint_wise=True, stamp=stamp, **more)
     csv(folder / "dxl.csv", columns)
@@ -150,7 +156,9 @@ def sarcos_headerless(folder: Path, run: Run) -> Answer:
 def baxter_recorder(folder: Path, run: Run) -> Answer:
     """Baxter joint_recorder: positions of both arms, grippers (0 to 100); efforts elsewhere."""
     rng = np.random.default_rng(1)
-    table, right = wide(run, "time=stamp; *{}=q; left_gripper=100.000000", run.arm.joints, stamp=run.t + 0.0132)
+    table, right = wide(
+        run, "time=stamp; *{}=q; left_gripper=100.000000", run.arm.joints, stamp=run.t + 0.0132
+    )
     for k, joint in enumerate(run.arm.joints):
         other = joint.replace("left", "right")
         table[other] = 0.1 * k + 4e-4 * rng.normal(size=len(run.t))
@@ -164,7 +172,10 @@ def kinova_cyclic(folder: Path, run: Run) -> Answer:
     table: dict = {"timestamp_us": values(run)["us"] + 1_234_567}
     table |= {"frame_id": np.arange(len(run.t)) % 65536}
     specs = "*actuator_{}.position=turned:q°; *actuator_{}.velocity=dq°; *actuator_{}.torque=tau; "
-    specs += "actuator_{}.current_motor=amps; actuator_{}.voltage=23.900000; actuator_{}.temperature_motor=temp"
+    specs += (
+        "actuator_{}.current_motor=amps; actuator_{}.voltage=23.900000; "
+        "actuator_{}.temperature_motor=temp"
+    )
     columns, right = wide(run, specs, turned=np.degrees(run.q) % 360)
     table |= {n: columns[n] for j in "7654321" for n in columns if n.startswith(f"actuator_{j}.")}
     csv(folder / "feedback.csv", table)
@@ -174,7 +185,9 @@ def kinova_cyclic(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, robot="robot.toml")
 def merged_header(folder: Path, run: Run) -> Answer:
-    """A spreadsheet as CSV: joints over merged cells, three names below each, units, semicolons."""
+    """Write a spreadsheet as CSV: joints over merged cells, three names below each, units,
+    semicolons.
+    """
     rows = [";waist;;;shoulder;;;elbow;;", "Time" + ";Angle;Speed;Torque" * 3]
     rows += ["[s]" + ";[deg];[deg/s];[Nm]" * 3]
     triples = np.stack([np.degrees(run.q), np.degrees(run.dq), run.tau], axis=2)
@@ -186,8 +199,12 @@ def merged_header(folder: Path, run: Run) -> Answer:
 
 @layout(SIX)
 def fanuc_export(folder: Path, run: Run) -> Answer:
-    """Teach-pendant table: line numbers, actual and command, disturbance, current, commas at end."""
-    specs = "Line=line; Time(ms)=ms; *J{} Cmd(deg)=q_ref°; *J{}(deg)=q°; J{} Disturb Torque(Nm)=ext; "
+    """Teach-pendant table: line numbers, actual and command, disturbance, current, commas at
+    end.
+    """
+    specs = (
+        "Line=line; Time(ms)=ms; *J{} Cmd(deg)=q_ref°; *J{}(deg)=q°; J{} Disturb Torque(Nm)=ext; "
+    )
     specs += "*J{} Current(A)=amps:current; J{} Temp(C)=temp"
     columns, right = wide(run, specs, line=np.arange(1, len(run.t) + 1))
     lines = pd.DataFrame(columns).to_csv(index=False, float_format="%.4f").replace("\n", ",\r\n")
@@ -217,7 +234,10 @@ def isaac_many_environments(folder: Path, run: Run) -> Answer:
     """Isaac Lab log of four environments in one table: rows of env_id 0 to 3 in turn."""
     envs, length = 4, len(run.t)
     shift = [np.roll(np.arange(length), 37 * e) for e in range(envs)]
-    table: dict = {"step": np.repeat(np.arange(length), envs), "env_id": np.tile(range(envs), length)}
+    table: dict = {
+        "step": np.repeat(np.arange(length), envs),
+        "env_id": np.tile(range(envs), length),
+    }
     table["time"] = np.repeat(run.t, envs)
     data = {"joint_pos": run.q, "joint_vel": run.dq}
     for name, v in (data | {"applied_torque": run.tau, "computed_torque": run.tau_ref}).items():
@@ -243,7 +263,9 @@ def unitree_low_state(folder: Path, run: Run) -> Answer:
 
 @layout(UR)
 def ros2_echo_csv(folder: Path, run: Run) -> Answer:
-    """ROS 2 `ros2 topic echo --csv /joint_states`: no header; sec, nanosec, frame, names, values."""
+    """ROS 2 `ros2 topic echo --csv /joint_states`: no header; sec, nanosec, frame, names,
+    values.
+    """
     order = [2, 1, 0, 3, 4, 5]
     ns = (1.69e18 + run.t * 1e9).astype(np.int64)
     cells = [ns // 10**9, ns % 10**9, np.full(len(ns), "base_link")]
@@ -265,7 +287,10 @@ def controller_state(folder: Path, run: Run) -> Answer:
     table: dict = {"header.stamp.sec": ns // 10**9, "header.stamp.nanosec": ns % 10**9}
     table |= {"header.frame_id": ""}
     table |= {f"joint_names[{j}]": name for j, name in enumerate(run.arm.joints)}
-    specs = "*reference.positions[{}]=q_ref; *reference.velocities[{}]=dq_ref; *feedback.positions[{}]=q; "
+    specs = (
+        "*reference.positions[{}]=q_ref; *reference.velocities[{}]=dq_ref; "
+        "*feedback.positions[{}]=q; "
+    )
     specs += "*feedback.velocities[{}]=dq; error.positions[{}]=lag; error.velocities[{}]=slip"
     more = {"lag": run.q_ref - run.q, "slip": run.dq_ref - run.dq}
     columns, right = wide(run, specs, range(6), **more)
@@ -281,8 +306,15 @@ def arduino_bridge(folder: Path, run: Run) -> Answer:
     rng = np.random.default_rng(2)
     specs = "pc_time_s=pc; arduino_ms=board; *q{}=q; *q{}_ref=q_ref; *u{}=share:tau:?"
     more = {"pc": 1.7e9 + run.t + 0.004 * rng.random(len(run.t)), "board": values(run)["ms"] + 512}
-    return recorded(folder, run, "log.csv", {"pc_time_s": "s", "arduino_ms": "ms"}, specs,
-        known=False, data={"share": run.tau / abs(run.tau).max(axis=0), **more})
+    return recorded(
+        folder,
+        run,
+        "log.csv",
+        {"pc_time_s": "s", "arduino_ms": "ms"},
+        specs,
+        known=False,
+        data={"share": run.tau / abs(run.tau).max(axis=0), **more},
+    )
 
 
 @layout(SIX, robot=None, rate=500.0)
@@ -292,15 +324,29 @@ def abb_test_signals(folder: Path, run: Run) -> Answer:
     No name says a quantity, and no unit is given: an arm's angle in rad these numbers are not.
     """
     gear = np.array([100.0, -120.0, 110.0, 80.0, 90.0, 60.0])
-    specs = "Time=t; *1718 ROB_1 axis {}=angle:q:?; *1717 ROB_1 axis {}=speed:dq:?; *4947 ROB_1 axis {}=torque:tau:?"
-    return recorded(folder, run, "signals.log", {"Time": "s"}, specs, known=False,
-        data={"angle": run.q * gear, "speed": run.dq * gear, "torque": run.tau / gear}, sep=";")
+    specs = (
+        "Time=t; *1718 ROB_1 axis {}=angle:q:?; *1717 ROB_1 axis {}=speed:dq:?; *4947 ROB_1 axis "
+        "{}=torque:tau:?"
+    )
+    return recorded(
+        folder,
+        run,
+        "signals.log",
+        {"Time": "s"},
+        specs,
+        known=False,
+        data={"angle": run.q * gear, "speed": run.dq * gear, "torque": run.tau / gear},
+        sep=";",
+    )
 
 
 @layout(SIX, rate=100.0)
 def xarm_report(folder: Path, run: Run) -> Answer:
     """xArm SDK report saved by a script: angles in deg without a unit, currents, no torque."""
-    specs = "stamp=stamp; state=1; mode=0; cmdnum=3; *angle_j{}=q°; *speed_j{}=dq°; *current_j{}=amps:current; "
+    specs = (
+        "stamp=stamp; state=1; mode=0; cmdnum=3; *angle_j{}=q°; *speed_j{}=dq°; "
+        "*current_j{}=amps:current; "
+    )
     specs += "voltage_j{}=24.000000; temp_j{}=temp; err=OK"
     return recorded(folder, run, "report.csv", {"stamp": "s"}, specs, data={"stamp": 1.7e9 + run.t})
 
@@ -318,13 +364,22 @@ def matlab_timetable(folder: Path, run: Run) -> Answer:
 def excel_quoted(folder: Path, run: Run) -> Answer:
     """Excel-minded logger: a line "sep=;", numbers in quotes with decimal commas, German names."""
     specs = "Zeit [s]=t; *Istwinkel {} [°]=q°; *Sollwinkel {} [°]=q_ref°; *Drehmoment {} [Nm]=tau"
-    return recorded(folder, run, "messung.csv", {"Zeit [s]": "s"}, specs, head="sep=;\r\n", sep=";",
-        decimal=",", quoting=1)
+    return recorded(
+        folder,
+        run,
+        "messung.csv",
+        {"Zeit [s]": "s"},
+        specs,
+        head="sep=;\r\n",
+        sep=";",
+        decimal=",",
+        quoting=1,
+    )
 
 
 @layout(UR)
 def one_file_an_axis(folder: Path, run: Run) -> Answer:
-    """A file for each of six axes: axis1.csv holds one joint of the six-joint robot."""
+    """Write a file for each of six axes: axis1.csv holds one joint of the six-joint robot."""
     for j in range(6):
         table = {"time": run.t, "pos": run.q[:, j], "vel": run.dq[:, j], "torque": run.tau[:, j]}
         csv(folder / f"axis{j + 1}.csv", table)
@@ -346,7 +401,7 @@ def pybullet_states(folder: Path, run: Run) -> Answer:
 
 @layout(IIWA)
 def reversed_joints(folder: Path, run: Run) -> Answer:
-    """A C++ logger that writes from the flange to the base: a7 … a1, us since power-on."""
+    """Write a C++ logger that writes from the flange to the base: a7 … a1, us since power-on."""
     specs = "*a{}_pos_msr=q; *a{}_pos_cmd=q_ref; *a{}_trq_msr=tau; a{}_trq_ext=ext"
     columns, right = wide(run, specs)
     table = {"t_us": values(run)["us"] + 9_000_000}
@@ -365,8 +420,16 @@ def canopen_objects(folder: Path, run: Run) -> Answer:
     specs += "*Axis{}_0x606C=speed:dq:counts/s; *Axis{}_0x6077=load:tau:?; Axis{}_0x6041=4663"
     more = {name: np.round(v).astype(int) for name, v in data.items()}
     ns = np.round(run.t * 1e9).astype(np.int64)
-    return recorded(folder, run, "bus.csv", {"timestamp_ns": "ns"}, specs, joint_wise=True,
-        known=False, data={"ns": ns, **more})
+    return recorded(
+        folder,
+        run,
+        "bus.csv",
+        {"timestamp_ns": "ns"},
+        specs,
+        joint_wise=True,
+        known=False,
+        data={"ns": ns, **more},
+    )
 
 
 @layout(PANDA, rate=20.0)
@@ -384,7 +447,7 @@ def robomimic_hdf5(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=100.0)
 def long_table_with_holes(folder: Path, run: Run) -> Answer:
-    """A database query result: one row a joint, some rows lost, ISO stamps."""
+    """Write a database query result: one row a joint, some rows lost, ISO stamps."""
     order = [5, 3, 4, 0, 1, 2]
     stamp = pd.to_datetime(1.71e18 + np.round(np.repeat(run.t, run.n) * 1e9, -3))
     data: dict = {"ts": stamp.strftime("%Y-%m-%dT%H:%M:%S.%fZ")}
@@ -421,11 +484,22 @@ def sinamics_trace(folder: Path, run: Run) -> Answer:
     """Siemens drive trace: parameters by number (r482, r61, r80) a drive, motor side."""
     gear = np.array([121.0, 121.0, 101.0, 80.0, 80.0, 51.0])
     specs = "Time [ms]=time; *Drive_{}.r482[0] Actual encoder value=counts:q:counts; "
-    specs += "*Drive_{}.r61 Actual speed [rpm]=rpm:dq:rpm; *Drive_{}.r80 Actual torque [Nm]=torque:tau"
+    specs += (
+        "*Drive_{}.r61 Actual speed [rpm]=rpm:dq:rpm; *Drive_{}.r80 Actual torque [Nm]=torque:tau"
+    )
     more = {"counts": np.round(run.q * gear * 1e4), "rpm": run.dq * gear * 30 / np.pi}
     more |= {"torque": run.tau / gear, "time": run.t * 1000}
-    return recorded(folder, run, "trace.csv", {"Time [ms]": "ms"}, specs, joint_wise=True,
-        known=False, data=more, sep=";")
+    return recorded(
+        folder,
+        run,
+        "trace.csv",
+        {"Time [ms]": "ms"},
+        specs,
+        joint_wise=True,
+        known=False,
+        data=more,
+        sep=";",
+    )
 
 
 @layout(UR, rate=125.0)
@@ -443,13 +517,20 @@ def webots_sensors(folder: Path, run: Run) -> Answer:
 def coppelia_graph(folder: Path, run: Run) -> Answer:
     """CoppeliaSim graph export: "/m0609/joint_1: position (deg)", forces in N*m, time in s."""
     specs = "Time (s)=t; */m0609/{}: position (deg)=q°; */m0609/{}: target position (deg)=q_ref°; "
-    return recorded(folder, run, "graph.csv", {"Time (s)": "s"},
-        specs + "*/m0609/{}: force (N*m)=tau", run.arm.joints, joint_wise=True)
+    return recorded(
+        folder,
+        run,
+        "graph.csv",
+        {"Time (s)": "s"},
+        specs + "*/m0609/{}: force (N*m)=tau",
+        run.arm.joints,
+        joint_wise=True,
+    )
 
 
 @layout(SIX, rate=500.0)
 def dot_by_letter_p(folder: Path, run: Run) -> Answer:
-    """A German laboratory's notation: q, qp and qpp for the derivatives ("Punkt")."""
+    """Write a German laboratory's notation: q, qp and qpp for the derivatives ("Punkt")."""
     specs = "t=t; *q{}=q; *qp{}=dq; *qpp{}=ddq; *qsoll{}=q_ref; *tauM{}=tau; tauExt{}=ext"
     return recorded(folder, run, "versuch.dat", {"t": "s"}, specs, sep=" ", float_format="%.8e")
 
@@ -480,7 +561,7 @@ def two_arms(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, robot="robot.toml")
 def greek_names(folder: Path, run: Run) -> Answer:
-    """A notebook's data frame with Greek names, written by pandas with its index."""
+    """Write a notebook's data frame with Greek names, written by pandas with its index."""
     specs = "t [s]=t; *φ{} [°]=q°; *φ̇{} [°/s]=dq°; *τ{} [N·m]=tau; ϑ{} [°C]=temp"
     return recorded(folder, run, "greek.csv", {"t [s]": "s"}, specs, index=True)
 
@@ -489,7 +570,18 @@ def greek_names(folder: Path, run: Run) -> Answer:
 def so100_normalised(folder: Path, run: Run) -> Answer:
     """LeRobot SO-100 table: positions normalised to -100..100 of the calibrated range."""
     reach = np.array([1.9, 1.7, 1.6, 1.8, 2.8])
-    specs = "timestamp=t; frame_index=count; *observation.{}.pos=state:q:?; observation.gripper.pos=42.000000; "
+    specs = (
+        "timestamp=t; frame_index=count; *observation.{}.pos=state:q:?; "
+        "observation.gripper.pos=42.000000; "
+    )
     more = {"state": 100 * run.q / reach, "goal": 100 * run.q_ref / reach}
-    return recorded(folder, run, "episode.csv", {"timestamp": "s"},
-        specs + "*action.{}.pos=goal:q_ref:?", run.arm.joints, known=False, data=more)
+    return recorded(
+        folder,
+        run,
+        "episode.csv",
+        {"timestamp": "s"},
+        specs + "*action.{}.pos=goal:q_ref:?",
+        run.arm.joints,
+        known=False,
+        data=more,
+    )

@@ -1,4 +1,6 @@
-"""Write one simulated motion as ROS tools, controllers and common recorders export it (see import_layouts)."""
+"""Write one simulated motion as ROS tools, controllers and common recorders export it (see
+import_layouts).
+"""
 
 import json
 from pathlib import Path
@@ -51,10 +53,21 @@ def rostopic_echo(folder: Path, run: Run) -> Answer:
 def plotjuggler(folder: Path, run: Run) -> Answer:
     """PlotJuggler's CSV of all curves: __time, one column a joint and field, sorted; a gripper."""
     at = "/joint_states/"
-    specs = f"{at}header/stamp=stamp; *{at}{{}}/position=q; *{at}{{}}/velocity=dq; *{at}{{}}/effort=tau; "
-    specs += f"{at}finger_joint/position=grip; {at}finger_joint/velocity=still; {at}finger_joint/effort=force"
+    specs = (
+        f"{at}header/stamp=stamp; *{at}{{}}/position=q; *{at}{{}}/velocity=dq; "
+        f"*{at}{{}}/effort=tau; "
+    )
+    specs += (
+        f"{at}finger_joint/position=grip; {at}finger_joint/velocity=still; "
+        f"{at}finger_joint/effort=force"
+    )
     still = 0.0 * run.t
-    more = {"stamp": 1.7e9 + run.t - 0.001, "grip": still + 0.2, "still": still, "force": still + 0.4}
+    more = {
+        "stamp": 1.7e9 + run.t - 0.001,
+        "grip": still + 0.2,
+        "still": still,
+        "force": still + 0.4,
+    }
     columns, right = wide(run, specs, run.arm.joints, **more)
     csv(folder / "curves.csv", {"__time": 1.7e9 + run.t} | dict(sorted(columns.items())))
     return Answer("curves.csv", {"__time": "s", "/joint_states/header/stamp": "s"}, right=right)
@@ -62,7 +75,7 @@ def plotjuggler(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=100.0)
 def rosbag_long_table(folder: Path, run: Run) -> Answer:
-    """A rosbag flattened to one row per joint: time_s, joint, position, velocity, effort.
+    """Write a rosbag flattened to one row per joint: time_s, joint, position, velocity, effort.
 
     As gianmarco-ferrara/RL2025HW02 plot/db3TOcsv_position.py writes it with rosbags and pandas.
     """
@@ -82,18 +95,33 @@ def ur_own_logger(folder: Path, run: Run) -> Answer:
 
     Columns after MingyuTang0728/Universal-Robots-Notts CSV_READER.py.
     """
-    specs = "pc_ts=stamp; runtime_state=2; robot_mode=7; safety_mode=1; speed_scaling=1.000000; din_bits=0; "
-    specs += "dout_bits=0; ai0=0.013000; ai1=0.021000; *q_{}=q; *qd_{}=dq; *tq_{}=q_ref; *tqd_{}=dq_ref; "
+    specs = (
+        "pc_ts=stamp; runtime_state=2; robot_mode=7; safety_mode=1; speed_scaling=1.000000; "
+        "din_bits=0; "
+    )
+    specs += (
+        "dout_bits=0; ai0=0.013000; ai1=0.021000; *q_{}=q; *qd_{}=dq; *tq_{}=q_ref; *tqd_{}=dq_ref;"
+        " "
+    )
     specs += "tcp_{}=pose; tcps_{}=slow; tcpf_{}=force"
     more = {"pose": run.pose, "slow": 0.3 * run.pose, "force": 5 + run.tau_ext}
-    return recorded(folder, run, "UR5e_motion_full.csv", {"pc_ts": "s"}, specs, range(6),
-        data={"stamp": 1.71e9 + run.t, **more})
+    return recorded(
+        folder,
+        run,
+        "UR5e_motion_full.csv",
+        {"pc_ts": "s"},
+        specs,
+        range(6),
+        data={"stamp": 1.71e9 + run.t, **more},
+    )
 
 
 @layout(PANDA, rate=1000.0)
 def libfranka_log(folder: Path, run: Run) -> Answer:
     """libfranka's logToCSV (src/log.cpp): ms, state.*, cmd.*, blanks after commas; fingers."""
-    specs = "time=tick; success_rate=1.000000; *state.q[{}]=q; *state.q_d[{}]=q_ref; *state.dq[{}]=dq; "
+    specs = (
+        "time=tick; success_rate=1.000000; *state.q[{}]=q; *state.q_d[{}]=q_ref; *state.dq[{}]=dq; "
+    )
     specs += "*state.dq_d[{}]=dq_ref; *state.tau_J[{}]=tau; state.tau_ext_hat_filtered[{}]=ext; "
     specs += "cmd.q_d[{}]=zero; cmd.dq_d[{}]=zero"
     tick, zero = np.round(run.t * 1000).astype(int), 0 * run.q
@@ -113,7 +141,9 @@ def kuka_trace(folder: Path, run: Run) -> Answer:
 
     Signals after the "Robot data from the body shop" data set (NextGenDrive, 4 ms).
     """
-    specs = "Time [ms]=ms; *Programmed Axis Position A{} [°]=q_ref°; *Real Axis Position A{} [°]=q°; "
+    specs = (
+        "Time [ms]=ms; *Programmed Axis Position A{} [°]=q_ref°; *Real Axis Position A{} [°]=q°; "
+    )
     specs += "Difference Axis Position A{} [°]=lag; *Programmed Axis Velocity A{} [°/s]=dq_ref°; "
     specs += "*Real Axis Velocity A{} [°/s]=dq°; Calculated Axis Moment A{} [Nm]=model; "
     specs += "*Real Axis Moment A{} [Nm]=tau; Difference Axis Moment A{} [Nm]=rest; "
@@ -150,8 +180,12 @@ def kuka_sunrise_recorder(folder: Path, run: Run) -> Answer:
 def doosan_realtime(folder: Path, run: Run) -> Answer:
     """Doosan real-time data list (manual.doosanrobotics.com): two encoders, units in a row."""
     specs = "time_stamp=stamp; *actual_joint_position_{}=q°; actual_joint_position_abs_{}=second; "
-    specs += "*actual_joint_velocity_{}=dq°; actual_tcp_position_{}=pose; external_joint_torque_{}=ext; "
-    specs += "*actual_motor_torque_{}=tau; raw_joint_torque_{}=tau; *target_joint_position_{}=q_ref°"
+    specs += (
+        "*actual_joint_velocity_{}=dq°; actual_tcp_position_{}=pose; external_joint_torque_{}=ext; "
+    )
+    specs += (
+        "*actual_motor_torque_{}=tau; raw_joint_torque_{}=tau; *target_joint_position_{}=q_ref°"
+    )
     more = {"second": np.degrees(run.q) + 1e-3, "pose": 300 * run.pose, "stamp": run.t + 812.4}
     columns, right = wide(run, specs, range(6), **more)
     units = ["s"]
@@ -197,8 +231,16 @@ def labview_lvm(folder: Path, run: Run) -> Answer:
     head += "Samples" + f"\t{len(run.t)}" * 6 + "\t\nY_Unit_Label" + "\tdeg" * 3 + "\tN m" * 3
     head += "\t\nX_Dimension" + "\tTime" * 6 + "\t\nX0" + "\t0,0E+0" * 6
     head += "\t\nDelta_X" + "\t0,005" * 6 + f"\t\n{end}\t\t\t\t\t\t\n"
-    return recorded(folder, run, "run.lvm", {"X_Value": "s"},
-        "X_Value=t; *Pos_J{}=q°; *Torque_J{}=tau; Comment=", head=head, sep="\t", decimal=",")
+    return recorded(
+        folder,
+        run,
+        "run.lvm",
+        {"X_Value": "s"},
+        "X_Value=t; *Pos_J{}=q°; *Torque_J{}=tau; Comment=",
+        head=head,
+        sep="\t",
+        decimal=",",
+    )
 
 
 @layout(THREE, robot="robot.toml")
@@ -240,18 +282,32 @@ def numbered(roles: dict[str, int], n: int, form: str = "column_{}", step: int =
 def ur_rtde(folder: Path, run: Run) -> Answer:
     """RTDE_Python_Client_Library record.py: blanks between, target and actual of everything."""
     specs = "timestamp=now; *target_q_{}=q_ref; *target_qd_{}=dq_ref; target_current_{}=goal; "
-    specs += "target_moment_{}=model; *actual_q_{}=q; *actual_qd_{}=dq; *actual_current_{}=current; "
-    specs += "joint_control_output_{}=goal; actual_TCP_pose_{}=pose; joint_temperatures_{}=temp; robot_mode=7"
-    more = {"now": 3211.5 + run.t, "goal": 1.02 * current(run), "model": run.tau_model, "pose": run.pose}
-    return recorded(folder, run, "run.csv", {"timestamp": "s"}, specs, range(6), data=more, known=False, sep=" ")
+    specs += (
+        "target_moment_{}=model; *actual_q_{}=q; *actual_qd_{}=dq; *actual_current_{}=current; "
+    )
+    specs += (
+        "joint_control_output_{}=goal; actual_TCP_pose_{}=pose; joint_temperatures_{}=temp; "
+        "robot_mode=7"
+    )
+    more = {
+        "now": 3211.5 + run.t,
+        "goal": 1.02 * current(run),
+        "model": run.tau_model,
+        "pose": run.pose,
+    }
+    return recorded(
+        folder, run, "run.csv", {"timestamp": "s"}, specs, range(6), data=more, known=False, sep=" "
+    )
 
 
 @layout(UR, robot=None, rate=125.0)
 def ur_currents_only(folder: Path, run: Run) -> Answer:
-    """A UR log of positions and currents, without a robot in the folder."""
+    """Write a UR log of positions and currents, without a robot in the folder."""
     specs = "timestamp=now; *actual_q_{}=q; *actual_current_{}=current"
     more = {"now": 3211.5 + run.t}
-    return recorded(folder, run, "run.csv", {"timestamp": "s"}, specs, range(6), data=more, known=False)
+    return recorded(
+        folder, run, "run.csv", {"timestamp": "s"}, specs, range(6), data=more, known=False
+    )
 
 
 @layout(IIWA, rate=1000.0)
@@ -266,13 +322,18 @@ def panda_py(folder: Path, run: Run) -> Answer:
 def panda_with_fingers(folder: Path, run: Run) -> Answer:
     """Joint states of an arm and its gripper beside a URDF with both."""
     specs = "t=t; *{}_position=q; *{}_effort=tau; panda_finger_joint1_position=0.02; "
-    specs += "panda_finger_joint2_position=0.02; panda_finger_joint1_effort=0; panda_finger_joint2_effort=0"
+    specs += (
+        "panda_finger_joint2_position=0.02; panda_finger_joint1_effort=0; "
+        "panda_finger_joint2_effort=0"
+    )
     return recorded(folder, run, "run.csv", {"t": "s"}, specs, run.arm.joints)
 
 
 @layout(SIX, rate=250.0)
 def kuka_rsi(folder: Path, run: Run) -> Answer:
-    """KUKA RSI: degrees, IPOC as the clock, Cartesian beside axis positions, motor currents in A."""
+    """KUKA RSI: degrees, IPOC as the clock, Cartesian beside axis positions, motor currents in
+    A.
+    """
     specs = "IPOC=now; RIst.X=x; RIst.Y=y; RIst.Z=z; RIst.A=rx; RIst.B=ry; RIst.C=rz; "
     specs += "*AIPos.A{}=q°; *ASPos.A{}=q_ref°; *MACur.A{}=current"
     more = {"now": 4208163 + values(run)["ms"]}
@@ -289,7 +350,7 @@ def matlab_writematrix(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=500.0)
 def matlab_struct(folder: Path, run: Run) -> Answer:
-    """A MAT file with a structure of N x 6 arrays."""
+    """Write a MAT file with a structure of N x 6 arrays."""
     data = {"t": run.t[:, None], "q": run.q, "qd": run.dq, "tau": run.tau, "q_ref": run.q_ref}
     savemat(folder / "run.mat", {"data": data})
     right = numbered({"q": 1, "q_ref": 1, "tau": 1}, 6)
@@ -300,10 +361,11 @@ def matlab_struct(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=30.0)
 def json_frames(folder: Path, run: Run) -> Answer:
-    """A data set of robot learning: a list of frames with observation.state and action."""
+    """Write a data set of robot learning: a list of frames with observation.state and action."""
     parts = {"observation.state": run.q, "observation.effort": run.tau, "action": run.q_ref}
     frames = [
-        {"timestamp": float(t), "frame_index": k} | {name: v[k].tolist() for name, v in parts.items()}
+        {"timestamp": float(t), "frame_index": k}
+        | {name: v[k].tolist() for name, v in parts.items()}
         for k, t in enumerate(run.t)
     ]
     (folder / "run.json").write_text(json.dumps(frames))
@@ -335,7 +397,9 @@ def json_lines_by_name(folder: Path, run: Run) -> Answer:
         lines.append(json.dumps({"stamp": stamp, "joints": joints}))
     (folder / "run.jsonl").write_text("\n".join(lines) + "\n")
     roles = (("q", "pos"), ("dq", "vel"), ("tau", "eff"))
-    right = {r: (Signal(tuple(f"joints.{j}.{p}" for j in run.arm.joints), UNITS[r]),) for r, p in roles}
+    right = {
+        r: (Signal(tuple(f"joints.{j}.{p}" for j in run.arm.joints), UNITS[r]),) for r, p in roles
+    }
     return Answer("run.jsonl", {"stamp.sec+stamp.nanosec": "s+ns"}, right=right)
 
 
@@ -353,7 +417,9 @@ def r_write_table(folder: Path, run: Run) -> Answer:
 def savetxt_header(folder: Path, run: Run) -> Answer:
     """numpy.savetxt with header="t, q1, …": commas in a comment above blanks."""
     columns, right = wide(run, "t=t; *q{}=q; *dq{}=dq; *tau{}=tau")
-    np.savetxt(folder / "run.txt", np.column_stack(list(columns.values())), header=", ".join(columns))
+    np.savetxt(
+        folder / "run.txt", np.column_stack(list(columns.values())), header=", ".join(columns)
+    )
     return Answer("run.txt", {"t": "s"}, right=right)
 
 
@@ -379,7 +445,9 @@ def transposed_named(folder: Path, run: Run) -> Answer:
 @layout(UR, rate=100.0)
 def transposed_bare(folder: Path, run: Run) -> Answer:
     """writematrix of 19 x N."""
-    np.savetxt(folder / "run.csv", np.column_stack([run.t, run.q, run.dq, run.tau]).T, delimiter=",")
+    np.savetxt(
+        folder / "run.csv", np.column_stack([run.t, run.q, run.dq, run.tau]).T, delimiter=","
+    )
     right = numbered({"q": 2, "dq": 8, "tau": 14}, 6)
     return Answer("run.csv", {"column_1": "s"}, right=right, texts=False)
 
@@ -415,13 +483,16 @@ def time_sec_nsec(folder: Path, run: Run) -> Answer:
     """time_sec and time_nsec, torques called effort, references beside."""
     us = values(run)["us"]
     more = {"s": 100 + us // 10**6, "ns": us % 10**6 * 1000}
-    specs = "time_sec=s; time_nsec=ns; *pos_des_{}=q_ref; *pos_{}=q; *vel_{}=dq; *eff_{}=tau; eff_des_{}=tau_ref"
+    specs = (
+        "time_sec=s; time_nsec=ns; *pos_des_{}=q_ref; *pos_{}=q; *vel_{}=dq; *eff_{}=tau; "
+        "eff_des_{}=tau_ref"
+    )
     return recorded(folder, run, "run.csv", {"time_sec+time_nsec": "s+ns"}, specs, data=more)
 
 
 @layout(THREE, robot=None, rate=500.0)
 def microseconds(folder: Path, run: Run) -> Answer:
-    """A microcontroller: micros() as "us", currents in mA, a status text."""
+    """Write a microcontroller: micros() as "us", currents in mA, a status text."""
     more = {"now": 5_000_000 + values(run)["us"], "mA": 1000 * current(run)}
     specs = "us=now; state=RUN; *pos_rad_{}=q; *current_mA_{}=mA:current:mA"
     return recorded(folder, run, "run.csv", {"us": "us"}, specs, data=more, known=False)
@@ -429,13 +500,15 @@ def microseconds(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=500.0)
 def sample_index(folder: Path, run: Run) -> Answer:
-    """A counter instead of a clock."""
-    return recorded(folder, run, "run.csv", {"sample": "sample"}, STATE.replace("t=t", "sample=count", 1))
+    """Write a counter instead of a clock."""
+    return recorded(
+        folder, run, "run.csv", {"sample": "sample"}, STATE.replace("t=t", "sample=count", 1)
+    )
 
 
 @layout(UR, rate=500.0)
 def time_that_counts(folder: Path, run: Run) -> Answer:
-    """A column t that counts 0, 1, 2 at 500 Hz: ms and samples look alike."""
+    """Write a column t that counts 0, 1, 2 at 500 Hz: ms and samples look alike."""
     return recorded(folder, run, "run.csv", {"t": "sample"}, STATE.replace("t=t", "t=count", 1))
 
 
@@ -444,7 +517,14 @@ def clock_times(folder: Path, run: Run) -> Answer:
     """Date and time as text, over midnight."""
     times = pd.Timestamp("2024-05-17 23:59:56") + pd.to_timedelta(values(run)["ms"], unit="ms")
     more = {"now": times.strftime("%Y-%m-%d %H:%M:%S.%f").str[:-3].to_numpy()}
-    return recorded(folder, run, "run.csv", {"timestamp": "*"}, STATE.replace("t=t", "timestamp=now", 1), data=more)
+    return recorded(
+        folder,
+        run,
+        "run.csv",
+        {"timestamp": "*"},
+        STATE.replace("t=t", "timestamp=now", 1),
+        data=more,
+    )
 
 
 @layout(UR, rate=100.0)
@@ -458,7 +538,9 @@ def names_in_front(folder: Path, run: Run) -> Answer:
 
 @layout(UR, robot=None, rate=100.0)
 def names_without_robot(folder: Path, run: Run) -> Answer:
-    """Joints by name in alphabetical order with no robot beside: the order is a person's to know."""
+    """Joints by name in alphabetical order with no robot beside: the order is a person's to
+    know.
+    """
     columns, right = wide(run, "*{}.pos=q; *{}.torque=tau", run.arm.joints)
     csv(folder / "run.csv", {"t": run.t} | dict(sorted(columns.items())))
     return Answer("run.csv", {"t": "s"}, right=right, draftable=False)
@@ -466,7 +548,7 @@ def names_without_robot(folder: Path, run: Run) -> Answer:
 
 @layout(LIFT, rate=100.0)
 def lift_and_arm(folder: Path, run: Run) -> Answer:
-    """An arm on a lift: the first joint slides, its columns in mm and N."""
+    """Write an arm on a lift: the first joint slides, its columns in mm and N."""
     heads = ["lift_joint_pos [mm]", *(f"joint_{j}_pos [rad]" for j in (1, 2, 3))]
     loads = ["lift_joint_force [N]", *(f"joint_{j}_torque [Nm]" for j in (1, 2, 3))]
     columns = {"t [s]": run.t} | dict(zip(heads, (run.q * [1000, 1, 1, 1]).T, strict=True))
@@ -504,6 +586,10 @@ def command_only(folder: Path, run: Run) -> Answer:
 def trailing_comma(folder: Path, run: Run) -> Answer:
     """Rows end in a comma that the header lacks; joints count past 9 as texts would sort."""
     columns, right = wide(run, STATE)
-    text = ",".join(columns) + "\n" + pd.DataFrame(columns).to_csv(header=False, index=False).replace("\n", ",\n")
+    text = (
+        ",".join(columns)
+        + "\n"
+        + pd.DataFrame(columns).to_csv(header=False, index=False).replace("\n", ",\n")
+    )
     (folder / "run.csv").write_text(text)
     return Answer("run.csv", {"t": "s"}, right=right)

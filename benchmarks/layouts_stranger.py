@@ -1,4 +1,5 @@
-"""Write one simulated motion as thirty-seven recordings, by an engineer who has not seen the importer.
+"""Write one simulated motion as thirty-seven recordings, by an engineer who has not seen the
+importer.
 
 Only the form of a layout was known to him, not how files are read or how
 columns of nested files are addressed. Addresses are therefore neutral: the column's heading in a
@@ -78,8 +79,17 @@ def kuka_trace_de(folder: Path, run: Run) -> Answer:
     specs += "Motortemperatur A{} [K]=kelvin"
     head = "KRC Trace;V8.6.9\nDatei;TRACE_DEF_Übung.r64\nDatum;12.03.2024 09:41\n\n"
     how = {"sep": ";", "decimal": ",", "float_format": "%.5f"}
-    return recorded(folder, run, "Trace.csv", {"Zeit [s]": "s"}, specs,
-        data={"kelvin": run.temperature + 273}, head=head, encoding="cp1252", **how)
+    return recorded(
+        folder,
+        run,
+        "Trace.csv",
+        {"Zeit [s]": "s"},
+        specs,
+        data={"kelvin": run.temperature + 273},
+        head=head,
+        encoding="cp1252",
+        **how,
+    )
 
 
 @layout(SEVEN, rate=100.0)
@@ -89,13 +99,23 @@ def sunrise_data_recorder(folder: Path, run: Run) -> Answer:
     specs = "ZeitInSec=s; ZeitInNanoSec=ns; axisTauExtMsr_LBR_iiwa_14_R820_1_A{}=ext;"
     specs += "*axisTauMsr_LBR_iiwa_14_R820_1_A{}=tau; *axisQCmd_LBR_iiwa_14_R820_1_A{}=q_ref;"
     specs += "*axisQMsr_LBR_iiwa_14_R820_1_A{}=q; cartPosMsr_X=x; cartPosMsr_Y=y; cartPosMsr_Z=z"
-    return recorded(folder, run, "Recording_3.log", {"ZeitInSec+ZeitInNanoSec": "s+ns"}, specs,
-        data={"s": ticks // 1000, "ns": ticks % 1000 * 1_000_000}, sep=" ", float_format="%.9f")
+    return recorded(
+        folder,
+        run,
+        "Recording_3.log",
+        {"ZeitInSec+ZeitInNanoSec": "s+ns"},
+        specs,
+        data={"s": ticks // 1000, "ns": ticks % 1000 * 1_000_000},
+        sep=" ",
+        float_format="%.9f",
+    )
 
 
 @layout(SEVEN, robot=None, rate=200.0)
 def spdlog_controller(folder: Path, run: Run) -> Answer:
-    """An own controller's spdlog file: start-up lines, bracketed vectors, warnings between."""
+    """Write an own controller's spdlog file: start-up lines, bracketed vectors, warnings
+    between.
+    """
     lines = ["[2024-05-03 14:02:10.981] [main] [info] EtherCAT master: 7 slaves in OP, dc 5 ms"]
     lines.append("[2024-05-03 14:02:11.002] [main] [warning] slave 6: torque sensor offset -0.03")
     for k, when in enumerate(stamps(run, "%Y-%m-%d %H:%M:%S.%f")):
@@ -130,8 +150,19 @@ def abb_motor_signals(folder: Path, run: Run) -> Answer:
     specs = "Time=t; *ROB_1 axis {} (1) resolver_angle=angle:q; ROB_1 axis {} (4) speed_ref=set;"
     specs += "*ROB_1 axis {} (6) speed=speed:dq; *ROB_1 axis {} (9) torque_ref=torque:tau"
     head = "Test Signal Viewer 1.5\t2023-11-20 08:13\nController\tIRB4600_cell3\n"
-    return recorded(folder, run, "signals.txt", {"Time": "s"}, specs, joint_wise=True, known=False,
-        data={"torque": run.tau / gear, **more}, head=head, sep="\t", float_format="%.6g")
+    return recorded(
+        folder,
+        run,
+        "signals.txt",
+        {"Time": "s"},
+        specs,
+        joint_wise=True,
+        known=False,
+        data={"torque": run.tau / gear, **more},
+        head=head,
+        sep="\t",
+        float_format="%.6g",
+    )
 
 
 @layout(SIX, rate=125.0)
@@ -139,8 +170,16 @@ def fanuc_j519(folder: Path, run: Run) -> Answer:
     """FANUC stream motion status packets: pose before joints, nine axes of which six are used."""
     specs = "packet_type=0; version=1; seq=count; status=15; io_value=0; timestamp_ms=tick; X=x;"
     specs += "Y=y; Z=z; W=rx; P=ry; R=rz; *J{}=q°; J7=0; J8=0; J9=0; *I{}=current; I7=0; I8=0; I9=0"
-    return recorded(folder, run, "j519.csv", {"timestamp_ms": "ms"}, specs, known=False,
-        data={"tick": values(run)["ms"] + 883120}, float_format="%.4f")
+    return recorded(
+        folder,
+        run,
+        "j519.csv",
+        {"timestamp_ms": "ms"},
+        specs,
+        known=False,
+        data={"tick": values(run)["ms"] + 883120},
+        float_format="%.4f",
+    )
 
 
 @layout(SIX, robot=None, rate=125.0)
@@ -164,8 +203,17 @@ def ur_rtde_record(folder: Path, run: Run) -> Answer:
     specs += "*actual_qd_{}=dq; *actual_current_{}=current; joint_temperatures_{}=temp;"
     specs += "actual_TCP_pose_0=x; actual_TCP_pose_1=y; actual_TCP_pose_2=z; robot_mode=7"
     more = {"clock": 51234.008 + run.t, "model": 0.93 * run.tau + 0.4}
-    return recorded(folder, run, "robot_data.csv", {"timestamp": "s"}, specs, range(6), known=False,
-        data=more, sep=" ")
+    return recorded(
+        folder,
+        run,
+        "robot_data.csv",
+        {"timestamp": "s"},
+        specs,
+        range(6),
+        known=False,
+        data=more,
+        sep=" ",
+    )
 
 
 @layout(SEVEN, rate=200.0)
@@ -211,8 +259,16 @@ def xarm_sdk(folder: Path, run: Run) -> Answer:
     specs += "angles_6=0.0; *realtime_joint_speeds_{}=dq°; realtime_joint_speeds_6=0.0;"
     specs += "*joints_torque_{}=torque:tau; joints_torque_6=0.0; error_code=0; cmd_num=3"
     more = {"torque": np.where(lost[:, None], np.nan, run.tau)}
-    return recorded(folder, run, "xarm6_run.csv", {"ts": DATE}, specs, range(6),
-        data={"date": stamps(run, "%Y-%m-%dT%H:%M:%S.%f"), **more}, float_format="%.5f")
+    return recorded(
+        folder,
+        run,
+        "xarm6_run.csv",
+        {"ts": DATE},
+        specs,
+        range(6),
+        data={"date": stamps(run, "%Y-%m-%dT%H:%M:%S.%f"), **more},
+        float_format="%.5f",
+    )
 
 
 @layout(SIX, rate=125.0)
@@ -222,9 +278,18 @@ def denso_control_log(folder: Path, run: Run) -> Answer:
     specs = "Time[ms]=ms; Program=PRO1; Line=14; *J{} Command[deg]=q_ref°; *J{} Encoder[deg]=q°;"
     specs += "*J{} Current[%]=load:current:%; J{} Load[%]=heat"
     how = {"quoting": 2, "float_format": "%.4f", "encoding": "shift_jis"}
-    return recorded(folder, run, "ControlLog.csv", {"Time[ms]": "ms"}, specs, joint_wise=True,
-        known=False, data={"load": load, "heat": 0.8 * np.abs(load)},
-        head='"制御ログ","VS-060A4","RC8"\n"8ms"\n', **how)
+    return recorded(
+        folder,
+        run,
+        "ControlLog.csv",
+        {"Time[ms]": "ms"},
+        specs,
+        joint_wise=True,
+        known=False,
+        data={"load": load, "heat": 0.8 * np.abs(load)},
+        head='"制御ログ","VS-060A4","RC8"\n"8ms"\n',
+        **how,
+    )
 
 
 @layout(SIX, robot=None, rate=250.0)
@@ -236,8 +301,16 @@ def yaskawa_pulses(folder: Path, run: Run) -> Answer:
     more |= {"trq": np.round(load, 1), "clock": stamps(run, "%H:%M:%S")}
     specs = "No.=count; Date=2023/09/14; Time=clock; Elapsed(ms)=ms; JOB=TEST-01; LINE=7;"
     specs += "*PLS_{}=pls:q:counts; *SPD_{}=spd:dq:counts/s; *TRQ_{}=trq:tau:%"
-    return recorded(folder, run, "YRC1000_0914.CSV", {"Elapsed(ms)": "ms"}, specs, "SLURBT",
-        known=False, data=more)
+    return recorded(
+        folder,
+        run,
+        "YRC1000_0914.CSV",
+        {"Elapsed(ms)": "ms"},
+        specs,
+        "SLURBT",
+        known=False,
+        data=more,
+    )
 
 
 def dynamixel(run: Run) -> dict[str, np.ndarray]:
@@ -285,8 +358,17 @@ def moteus_registers(folder: Path, run: Run) -> Answer:
     specs = "timestamp=stamp; servo{}.MODE=10; *servo{}.POSITION=rev:q:rev;"
     specs += "*servo{}.VELOCITY=speed:dq:rev/s; *servo{}.TORQUE=tau; servo{}.Q_CURRENT=current;"
     specs += "servo{}.COMMAND_POSITION=nan; servo{}.TEMPERATURE=temp; servo{}.FAULT=0"
-    return recorded(folder, run, "moteus.csv", {"timestamp": "s"}, specs, (11, 12, 13),
-        joint_wise=True, known=False, data=more)
+    return recorded(
+        folder,
+        run,
+        "moteus.csv",
+        {"timestamp": "s"},
+        specs,
+        (11, 12, 13),
+        joint_wise=True,
+        known=False,
+        data=more,
+    )
 
 
 @layout(LEG, rate=500.0)
@@ -298,9 +380,17 @@ def elmo_recorder(folder: Path, run: Run) -> Answer:
     specs += "*Velocity [cnt/sec] (a0{})=vel:dq:counts/s; *Active Current [A] (a0{})=current;"
     specs += "Position Error [cnt] (a0{})=lag"
     head = "Recording Name,Rec_17\nSampling Time [usec],2000\nTrigger,Immediate\n\n"
-    return recorded(folder, run, "Rec_17.csv", {"Time [sec]": "s"}, specs, known=False,
-        data={"lag": np.round((run.q_ref - run.q) * counts), **more}, head=head,
-        float_format="%.6f")
+    return recorded(
+        folder,
+        run,
+        "Rec_17.csv",
+        {"Time [sec]": "s"},
+        specs,
+        known=False,
+        data={"lag": np.round((run.q_ref - run.q) * counts), **more},
+        head=head,
+        float_format="%.6f",
+    )
 
 
 @layout(THREE, robot="robot.toml", rate=500.0)
@@ -372,9 +462,18 @@ def excel_unicode_text(folder: Path, run: Run) -> Answer:
     """Excel's "Unicode text": UTF-16, tabs, decimal commas, German words, a title above."""
     specs = "Zeit in ms=time; *{} Soll in Grad=q_ref°; *{} Winkel in Grad=q°; *{} Moment in Nm=tau"
     how = {"sep": "\t", "decimal": ",", "float_format": "%.5f", "encoding": "utf-16"}
-    return recorded(folder, run, "Versuch 3.txt", {"Zeit in ms": "ms"}, specs, ("Hüfte", "Knie"),
-        joint_wise=True, data={"time": 1000 * run.t},
-        head="Prüfstand Bein\t\t\t\t\t\t\n\t\t\t\t\t\t\n", **how)
+    return recorded(
+        folder,
+        run,
+        "Versuch 3.txt",
+        {"Zeit in ms": "ms"},
+        specs,
+        ("Hüfte", "Knie"),
+        joint_wise=True,
+        data={"time": 1000 * run.t},
+        head="Prüfstand Bein\t\t\t\t\t\t\n\t\t\t\t\t\t\n",
+        **how,
+    )
 
 
 @layout(UR, rate=125.0)
@@ -470,7 +569,10 @@ def pandas_two_headers(folder: Path, run: Run) -> Answer:
     """pandas with two levels of columns and a timedelta index: "0 days 00:00:00.004000"."""
     specs = "*angle_deg/J{}=q°; *rate_dps/J{}=dq°; *torque_Nm/J{}=tau; temp_C/J{}=temp"
     columns, right = wide(run, specs)
-    right = {k: tuple(replace(s, columns=tuple(c.replace("/", " ") for c in s.columns)) for s in v) for k, v in right.items()}
+    right = {
+        k: tuple(replace(s, columns=tuple(c.replace("/", " ") for c in s.columns)) for s in v)
+        for k, v in right.items()
+    }
     index = pd.to_timedelta(values(run)["us"], unit="us").rename("elapsed")
     frame = pd.DataFrame({tuple(name.split("/")): v for name, v in columns.items()})
     frame = frame.set_index(index).rename_axis(columns=["signal", "joint"])
@@ -493,8 +595,16 @@ def matlab_timetable_sec(folder: Path, run: Run) -> Answer:
     """MATLAB writetimetable: times "0.004 sec", matrices split into _1 … _3, units nowhere."""
     specs = "Time=time; *Theta_{}=q°; *ThetaDes_{}=q_ref°; *Omega_{}=dq°; *Torque_{}=tau; Enabled=1"
     time = np.array([f"{t:.5g} sec" for t in run.t])
-    return recorded(folder, run, "TT.txt", {"Time": "s"}, specs + "; Phase=ident", known=False,
-        data={"time": time}, float_format="%.15g")
+    return recorded(
+        folder,
+        run,
+        "TT.txt",
+        {"Time": "s"},
+        specs + "; Phase=ident",
+        known=False,
+        data={"time": time},
+        float_format="%.15g",
+    )
 
 
 @layout(LEG, rate=500.0)
@@ -513,7 +623,9 @@ def json_channels(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=500.0)
 def hdf5_german(folder: Path, run: Run) -> Answer:
-    """A laboratory's HDF5: a group a joint, German names, units as attributes, times in us."""
+    """Write a laboratory's HDF5: a group a joint, German names, units as attributes, times in
+    us.
+    """
     data = values(run) | {"rpm": run.dq * 30 / np.pi}
     parts = (("Lage_ist", "Grad", "q°"), ("Lage_soll", "Grad", "q_ref°"))
     parts += (
@@ -540,9 +652,16 @@ def mecademic_log(folder: Path, run: Run) -> Answer:
     specs += "TargetCartPos_3=z; *JointPos_{}=q°; *JointVel_{}=dq°; *JointTorq_{}=load:tau:%;"
     load = 100 * run.tau / np.array([200.0, 200.0, 90.0, 30.0, 25.0, 12.0])
     more = {"stamp": 83_120_000 + values(run)["us"], "load": load}
-    return recorded(folder, run, "Meca500_R3_log.csv", {"Timestamp": "us"},
-        specs + "CartPos_1=x; CartPos_2=y; CartPos_3=z", known=False, data=more,
-        float_format="%.4f")
+    return recorded(
+        folder,
+        run,
+        "Meca500_R3_log.csv",
+        {"Timestamp": "us"},
+        specs + "CartPos_1=x; CartPos_2=y; CartPos_3=z",
+        known=False,
+        data=more,
+        float_format="%.4f",
+    )
 
 
 @layout(THREE, robot="robot.toml", rate=200.0)

@@ -48,7 +48,9 @@ moves = partial(layout, how="points")
 
 @turns(SIX, rate=125.0)
 def dobot_feedback(folder: Path, run: Run) -> Answer:
-    """Dobot CR port 30004: q_target, qd_target, i_target, m_target, then q_actual, i_actual; m in %."""
+    """Dobot CR port 30004: q_target, qd_target, i_target, m_target, then q_actual, i_actual; m in
+    %.
+    """
     share = 100 * run.tau / np.array([220, 220, 160, 60, 50, 40])
     specs = "time_stamp=tick; q_target_{}=q_ref°; qd_target_{}=v°; m_target_{}=share;"
     specs += "*q_actual_{}=q°; *qd_actual_{}=dq°; *i_actual_{}=current:A; tool_vector_actual_x=x;"
@@ -113,7 +115,9 @@ def robotis_raw(folder: Path, run: Run) -> Answer:
 
 @layout(LEFT, rate=100.0)
 def intera_recorder(folder: Path, run: Run) -> Answer:
-    """Baxter's joint_recorder with velocities and efforts of the left arm by name, right arm absent."""
+    """Baxter's joint_recorder with velocities and efforts of the left arm by name, right arm
+    absent.
+    """
     columns: dict = {"time": run.t}
     for part, v in (("", run.q), ("_vel", run.dq), ("_eff", run.tau)):
         columns |= {f"{name}{part}": v[:, j] for j, name in enumerate(LEFT.joints)}
@@ -128,17 +132,20 @@ def intera_recorder(folder: Path, run: Run) -> Answer:
 
 @moves(GEN3, rate=40.0)
 def slow_fieldbus(folder: Path, run: Run) -> Answer:
-    """A PLC's data log by date and time of day with milliseconds apart in a third column."""
+    """Write a PLC's data log by date and time of day with milliseconds apart in a third column."""
     specs = "Date=date; Time=time; ms=ms; *Axis{}_ActPos_deg=q°; *Axis{}_ActTorque_Nm=tau"
     more = {"date": stamps(run, "%d.%m.%Y"), "time": stamps(run, "%H:%M:%S")}
     more |= {"ms": (values(run)["ms"] + 250) % 1000}
-    return recorded(folder, run, "plc.csv", {}, specs, known=False, data=more, sep=";",
-        float_format="%.4f")
+    return recorded(
+        folder, run, "plc.csv", {}, specs, known=False, data=more, sep=";", float_format="%.4f"
+    )
 
 
 @turns(UR, rate=125.0)
 def polyscope_german(folder: Path, run: Run) -> Answer:
-    """A German UR log: Basis, Schulter, Ellbogen, Handgelenk 1 to 3 with Winkel and Strom each."""
+    """Write a German UR log: Basis, Schulter, Ellbogen, Handgelenk 1 to 3 with Winkel and Strom
+    each.
+    """
     parts = ("Basis", "Schulter", "Ellbogen", "Handgelenk 1", "Handgelenk 2", "Handgelenk 3")
     columns: dict = {"Zeit [s]": run.t}
     amps = current(run)
@@ -154,7 +161,9 @@ def polyscope_german(folder: Path, run: Run) -> Answer:
 
 @layout(TWO, rate=1000.0)
 def adwin_voltages(folder: Path, run: Run) -> Answer:
-    """An ADwin capture: tachometer and current monitor in volts, encoder in quarter increments."""
+    """Write an ADwin capture: tachometer and current monitor in volts, encoder in quarter
+    increments.
+    """
     more = {"inc": np.round(run.q * 8000 / (2 * np.pi)), "tacho": run.dq / 7, "imon": run.tau / 20}
     specs = "n=count; *Enc_{}=inc:q:counts; Tacho_{}_V=tacho; IMon_{}_V=imon"
     columns, _ = wide(run, specs, **more)
@@ -179,7 +188,9 @@ def dewesoft(folder: Path, run: Run) -> Answer:
 
 @turns(SIX, robot=None, rate=100.0)
 def candump(folder: Path, run: Run) -> Answer:
-    """candump of a bus: raw hexadecimal frames, no table of numbers; only a refusal or blanks serve."""
+    """candump of a bus: raw hexadecimal frames, no table of numbers; only a refusal or blanks
+    serve.
+    """
     lines = []
     for k, t in enumerate(run.t):
         for j in range(6):
@@ -191,7 +202,9 @@ def candump(folder: Path, run: Run) -> Answer:
 
 @moves(PANDA, rate=60.0)
 def droid_hdf5(folder: Path, run: Run) -> Answer:
-    """DROID trajectories: nested observations and actions, epoch ms as int64, joint torques computed."""
+    """DROID trajectories: nested observations and actions, epoch ms as int64, joint torques
+    computed.
+    """
     tick = 1712143331250 + np.round(run.t * 1000).astype(np.int64)
     with h5py.File(folder / "trajectory.h5", "w") as file:
         file["observation/timestamp/robot_state/read_start"] = tick
@@ -213,7 +226,9 @@ def droid_hdf5(folder: Path, run: Run) -> Answer:
 
 @turns(SIX, rate=250.0)
 def percent_speed(folder: Path, run: Run) -> Answer:
-    """An Estun monitor: pulses of the motor, speed in r/min of the motor, torque in % of rated."""
+    """Write an Estun monitor: pulses of the motor, speed in r/min of the motor, torque in % of
+    rated.
+    """
     more = {"pls": np.round(run.q * 131072 * 80 / (2 * np.pi)).astype(int)}
     more |= {"rpm": run.dq * 80 * 30 / np.pi, "share": np.round(run.tau / 1.3, 1)}
     specs = "Time(s)=t; *J{} Feedback pulse=pls:q:counts; *J{} Speed(r/min)=rpm:dq:rpm;"
@@ -227,16 +242,26 @@ def percent_speed(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=200.0)
 def torque_in_kilonewton(folder: Path, run: Run) -> Answer:
-    """A heavy robot's log in kN m, angles in mrad, time in µs: odd units, all of them named."""
+    """Write a heavy robot's log in kN m, angles in mrad, time in µs: odd units, all of them
+    named.
+    """
     more = {"mrad": 1000 * run.q, "kn": run.tau / 1000}
-    return recorded(folder, run, "heavy.csv", {"T [µs]": "us"},
-        "T [µs]=us; *phi{} [mrad]=mrad:q:mrad; *M{} [kNm]=kn:tau:kNm", data=more,
-        float_format="%.8f")
+    return recorded(
+        folder,
+        run,
+        "heavy.csv",
+        {"T [µs]": "us"},
+        "T [µs]=us; *phi{} [mrad]=mrad:q:mrad; *M{} [kNm]=kn:tau:kNm",
+        data=more,
+        float_format="%.8f",
+    )
 
 
 @moves(UR, rate=125.0)
 def shuffled_by_name(folder: Path, run: Run) -> Answer:
-    """A dictionary of joints written in random order: quantity by quantity, the order differs."""
+    """Write a dictionary of joints written in random order: quantity by quantity, the order
+    differs.
+    """
     dice = np.random.default_rng(4)
     columns: dict = {"stamp": 1.7121433e9 + run.t}
     for part, v in (("velocity", run.dq), ("effort", run.tau), ("position", run.q)):
@@ -252,7 +277,7 @@ def shuffled_by_name(folder: Path, run: Run) -> Answer:
 
 @turns(SIX, rate=250.0)
 def reversed_numbers(folder: Path, run: Run) -> Answer:
-    """A controller that counts from the tip: axis_1 is the last joint; a comment says so."""
+    """Write a controller that counts from the tip: axis_1 is the last joint; a comment says so."""
     specs = "t=t; *axis_{}_pos=flip:q; *axis_{}_tau=fliptau:tau"
     columns, _ = wide(run, specs, flip=run.q[:, ::-1], fliptau=run.tau[:, ::-1])
     right = {"q": (Signal(tuple(f"axis_{j}_pos" for j in range(6, 0, -1)), UNITS["q"]),)}
@@ -264,19 +289,37 @@ def reversed_numbers(folder: Path, run: Run) -> Answer:
 
 @moves(THREE, rate=500.0)
 def sensor_offsets(folder: Path, run: Run) -> Answer:
-    """A torque sensor's log with raw and tared values; both are measured, the tared one is right."""
+    """Write a torque sensor's log with raw and tared values; both are measured, the tared one is
+    right.
+    """
     specs = "t [s]=t; *q{} [rad]=q; tau{}_raw [Nm]=raw; *tau{}_tared [Nm]=tau"
-    return recorded(folder, run, "sensors.csv", {"t [s]": "s"}, specs,
-        data={"raw": run.tau + np.array([4.1, -7.3, 2.2])}, float_format="%.6f")
+    return recorded(
+        folder,
+        run,
+        "sensors.csv",
+        {"t [s]": "s"},
+        specs,
+        data={"raw": run.tau + np.array([4.1, -7.3, 2.2])},
+        float_format="%.6f",
+    )
 
 
 @turns(SIX, rate=200.0)
 def gravity_free_torque(folder: Path, run: Run) -> Answer:
-    """An impedance controller logs tau_J_d as libfranka wants it: without gravity and friction."""
+    """Write an impedance controller logs tau_J_d as libfranka wants it: without gravity and
+    friction.
+    """
     part = 0.15 * run.tau_ext + 3 * (run.q_ref - run.q)
-    return recorded(folder, run, "impedance.csv", {"time": "s"},
-        "time=t; *q_{}=q; *dq_{}=dq; tau_J_d_{}=part", known=False, data={"part": part},
-        float_format="%.6f")
+    return recorded(
+        folder,
+        run,
+        "impedance.csv",
+        {"time": "s"},
+        "time=t; *q_{}=q; *dq_{}=dq; tau_J_d_{}=part",
+        known=False,
+        data={"part": part},
+        float_format="%.6f",
+    )
 
 
 @layout(IIWA, rate=200.0)
@@ -292,26 +335,49 @@ def two_robots(folder: Path, run: Run) -> Answer:
 
 @moves(SIX, rate=250.0)
 def deviation_first(folder: Path, run: Run) -> Answer:
-    """A German axis log whose deviation comes before the value: Regelabweichung, Istlage, Solllage."""
+    """Write a German axis log whose deviation comes before the value: Regelabweichung, Istlage,
+    Solllage.
+    """
     specs = (
         "Zeit [ms]=ms; Regelabweichung A{} [°]=lag; *Istlage A{} [°]=q°; *Solllage A{} [°]=q_ref°;"
     )
     specs += "*Antriebsmoment A{} [Nm]=tau"
-    return recorded(folder, run, "achsen.csv", {"Zeit [ms]": "ms"}, specs,
-        data={"lag": np.degrees(run.q_ref - run.q)}, sep=";", decimal=",", float_format="%.5f")
+    return recorded(
+        folder,
+        run,
+        "achsen.csv",
+        {"Zeit [ms]": "ms"},
+        specs,
+        data={"lag": np.degrees(run.q_ref - run.q)},
+        sep=";",
+        decimal=",",
+        float_format="%.5f",
+    )
 
 
 @moves(SIX, rate=250.0)
 def deviation_alone(folder: Path, run: Run) -> Answer:
     """Only the control deviation and the torque were recorded: no position is there at all."""
     specs = "Zeit [ms]=ms; Regelabweichung A{} [°]=lag; *Moment A{} [Nm]=tau"
-    return recorded(folder, run, "nur_abweichung.csv", {"Zeit [ms]": "ms"}, specs, known=False,
-        data={"lag": np.degrees(run.q_ref - run.q)}, sep=";", decimal=",", float_format="%.5f")
+    return recorded(
+        folder,
+        run,
+        "nur_abweichung.csv",
+        {"Zeit [ms]": "ms"},
+        specs,
+        known=False,
+        data={"lag": np.degrees(run.q_ref - run.q)},
+        sep=";",
+        decimal=",",
+        float_format="%.5f",
+    )
 
 
 @turns(TWO, robot=None, rate=500.0)
 def quanser_scope(folder: Path, run: Run) -> Answer:
-    """A Quanser scope saved by QUARC: one matrix, rows time, theta, theta_dot, Vm without names."""
+    """Write a Quanser scope saved by QUARC: one matrix, rows time, theta, theta_dot, Vm without
+    names.
+    """
     matrix = np.vstack([run.t, run.q.T, run.dq.T, run.tau.T / 8])
     savemat(folder / "scope.mat", {"scope_data": matrix})
     right = {"q": (Signal((), UNITS["q"]),), "dq": (Signal((), UNITS["dq"]),)}
@@ -352,7 +418,9 @@ def influx_lines(folder: Path, run: Run) -> Answer:
 
 @moves(SIX, rate=250.0)
 def r_and_unused(folder: Path, run: Run) -> Answer:
-    """An R data frame with quoted names, row numbers and dots: pos.joint.1, effort in Nm by name."""
+    """Write an R data frame with quoted names, row numbers and dots: pos.joint.1, effort in Nm by
+    name.
+    """
     specs = "elapsed.ms=ms; *pos.joint.{}.deg=q°; *trq.joint.{}.Nm=tau; amb.temp=21.5"
     columns, right = wide(run, specs)
     frame = pd.DataFrame(columns)
@@ -365,7 +433,9 @@ def r_and_unused(folder: Path, run: Run) -> Answer:
 
 @turns(SIX, rate=200.0)
 def frame_numbers(folder: Path, run: Run) -> Answer:
-    """A motion tracker's export: frame and sub-frame, its rate in the preamble, angles in deg."""
+    """Write a motion tracker's export: frame and sub-frame, its rate in the preamble, angles in
+    deg.
+    """
     text = "Devices\n200\n"
     columns, right = wide(run, "Frame=frame; Sub Frame=0; *Joint {} Angle (deg)=q°; "
                           "*Joint {} Torque (N.mm)=nmm:tau:N mm", nmm=1000 * run.tau,
@@ -376,7 +446,9 @@ def frame_numbers(folder: Path, run: Run) -> Answer:
 
 @moves(SCARA, rate=250.0)
 def scara_named_units(folder: Path, run: Run) -> Answer:
-    """A SCARA with units in the names: J1_deg, J2_deg, Z_mm, R_deg, and forces in N or N m."""
+    """Write a SCARA with units in the names: J1_deg, J2_deg, Z_mm, R_deg, and forces in N or N
+    m.
+    """
     mixed = np.degrees(run.q)
     mixed[:, 2] = 1000 * run.q[:, 2]
     heads = ("J1_deg", "J2_deg", "J3_mm", "J4_deg")
@@ -402,7 +474,7 @@ def igus_rebel(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, rate=250.0)
 def chinese_headers(folder: Path, run: Run) -> Answer:
-    """A Chinese tool: 时间 time, 关节位置 joint position, 关节速度 speed, 关节力矩 torque, units named."""
+    """Write a Chinese tool: 关节位置 position, 关节速度 speed, 关节力矩 torque, units named."""
     specs = "时间(ms)=ms; 指令位置{}(deg)=q_ref°; *关节位置{}(deg)=q°; *关节速度{}(deg/s)=dq°;"
     specs += "*关节力矩{}(Nm)=tau; 外力矩{}(Nm)=ext"
     columns, right = wide(run, specs)
@@ -413,22 +485,40 @@ def chinese_headers(folder: Path, run: Run) -> Answer:
 
 @moves(THREE, rate=250.0)
 def chinese_external_alone(folder: Path, run: Run) -> Answer:
-    """The same tool with the external torque (外力矩) as the only one: it is no joint torque."""
-    return recorded(folder, run, "日志.csv", {"时间(ms)": "ms"},
-        "时间(ms)=ms; *关节位置{}(deg)=q°; 外力矩{}(Nm)=ext", known=False, float_format="%.5f")
+    """Write the same tool with the external torque (外力矩) alone: it is no joint torque."""
+    return recorded(
+        folder,
+        run,
+        "日志.csv",
+        {"时间(ms)": "ms"},
+        "时间(ms)=ms; *关节位置{}(deg)=q°; 外力矩{}(Nm)=ext",
+        known=False,
+        float_format="%.5f",
+    )
 
 
 @turns(SIX, rate=250.0)
 def sim_ground_truth(folder: Path, run: Run) -> Answer:
-    """A simulator with sensor noise: q_true, q_meas, tau_true, tau_meas; both sets are the motion."""
+    """Write a simulator with sensor noise: q_true, q_meas, tau_true, tau_meas; both sets are the
+    motion.
+    """
     specs = "sim_time=t; q_true_{}=q; *q_meas_{}=q; *tau_meas_{}=tau; tau_true_{}=model"
-    return recorded(folder, run, "sim.csv", {"sim_time": "s"}, specs, data={"model": run.tau_ref},
-        float_format="%.7f")
+    return recorded(
+        folder,
+        run,
+        "sim.csv",
+        {"sim_time": "s"},
+        specs,
+        data={"model": run.tau_ref},
+        float_format="%.7f",
+    )
 
 
 @moves(SIX, rate=200.0)
 def normalised(folder: Path, run: Run) -> Answer:
-    """A learning data set scaled to -1..1: qpos_norm and torque_norm; no unit can be given."""
+    """Write a learning data set scaled to -1..1: qpos_norm and torque_norm; no unit can be
+    given.
+    """
     q = run.q / abs(run.q).max()
     tau = run.tau / abs(run.tau).max(axis=0)
     columns, _ = wide(run, "t=t; qpos_norm_{}=scaled; torque_norm_{}=load", scaled=q, load=tau)
@@ -463,7 +553,7 @@ def ur_speed_scaled(folder: Path, run: Run) -> Answer:
 
 @turns(SIX, rate=200.0)
 def half_hourly_zip(folder: Path, run: Run) -> Answer:
-    """A gzip of a plain CSV under its own name: a refusal that says so is right."""
+    """Write a gzip of a plain CSV under its own name: a refusal that says so is right."""
     import gzip
 
     columns, _ = wide(run, "t=t; q{}=q; tau{}=tau")
@@ -474,7 +564,7 @@ def half_hourly_zip(folder: Path, run: Run) -> Answer:
 
 @moves(SIX, rate=250.0)
 def trailing_statistics(folder: Path, run: Run) -> Answer:
-    """A spreadsheet that ends with rows of minimum, maximum and mean below the samples."""
+    """Write a spreadsheet that ends with rows of minimum, maximum and mean below the samples."""
     columns, right = wide(run, "Time (s)=t; *Pos {} (rad)=q; *Torque {} (Nm)=tau")
     frame = pd.DataFrame(columns)
     text = frame.to_csv(index=False, float_format="%.6f")
@@ -500,7 +590,9 @@ def thousands_separators(folder: Path, run: Run) -> Answer:
 
 @moves(SIX, rate=250.0)
 def sparse_topics(folder: Path, run: Run) -> Answer:
-    """PlotJuggler's merged export: two topics of different rates, empty cells where one is absent."""
+    """PlotJuggler's merged export: two topics of different rates, empty cells where one is
+    absent.
+    """
     specs = "__time=clock; *arm/pos[{}]=q; *arm/eff[{}]=tau; temp/t[{}]=temp"
     columns, right = wide(run, specs, range(6), clock=1.7121433e9 + run.t)
     frame = pd.DataFrame(columns)
@@ -515,16 +607,26 @@ def sparse_topics(folder: Path, run: Run) -> Answer:
 
 @turns(SIX, rate=250.0)
 def restarted_counter(folder: Path, run: Run) -> Answer:
-    """A 16-bit millisecond counter that starts again during the run, beside nothing else of time."""
+    """Write a 16-bit millisecond counter that starts again during the run, beside nothing else of
+    time.
+    """
     tick = (values(run)["ms"] + 60000) % 65536
-    return recorded(folder, run, "tick.csv", {"tick_ms": "ms"},
-        "tick_ms=tick; *q{}_rad=q; *tau{}_Nm=tau", data={"tick": tick}, float_format="%.6f")
+    return recorded(
+        folder,
+        run,
+        "tick.csv",
+        {"tick_ms": "ms"},
+        "tick_ms=tick; *q{}_rad=q; *tau{}_Nm=tau",
+        data={"tick": tick},
+        float_format="%.6f",
+    )
 
 
 @moves(SIX, rate=250.0)
 def feedforward_named_torque(folder: Path, run: Run) -> Answer:
-    """A controller's inverse dynamics as "torque", the drive's answer as "load" in %: no torque is
-    measured."""
+    """Write a controller's inverse dynamics as "torque", the drive's answer as "load" in %: no
+    torque is measured.
+    """
     share = np.round(100 * run.tau / 140, 1)
     columns, right = wide(run, "t=t; *pos{}_deg=q°; invdyn_torque{}_Nm=model; load{}_pct=share",
                           model=run.tau_model, share=share)  # fmt: skip
@@ -535,11 +637,12 @@ def feedforward_named_torque(folder: Path, run: Run) -> Answer:
 
 @turns(TWO, rate=500.0)
 def json_columns_with_units(folder: Path, run: Run) -> Answer:
-    """A web tool's JSON: meta, then a list of series with name, unit and values."""
+    """Write a web tool's JSON: meta, then a list of series with name, unit and values."""
     series = [{"name": "time", "unit": "ms", "values": (1000 * run.t).tolist()}]
     for j in (1, 2):
-        series += [{"name": f"angle_{j}", "unit": "deg", "values": np.degrees(run.q[:, j - 1]).tolist()},
-                   {"name": f"torque_{j}", "unit": "Nm", "values": run.tau[:, j - 1].tolist()}]  # fmt: skip
+        angle, torque = np.degrees(run.q[:, j - 1]).tolist(), run.tau[:, j - 1].tolist()
+        series.append({"name": f"angle_{j}", "unit": "deg", "values": angle})
+        series.append({"name": f"torque_{j}", "unit": "Nm", "values": torque})
     document = {"meta": {"robot": "leg", "version": 3}, "series": series}
     (folder / "web.json").write_text(json.dumps(document))
     right = {"q": (si("angle_{}", 2, "q°"),), "tau": (si("torque_{}", 2, "tau"),)}
@@ -548,7 +651,9 @@ def json_columns_with_units(folder: Path, run: Run) -> Answer:
 
 @moves(TWO, robot=None, rate=100.0)
 def sensorless_pendulum(folder: Path, run: Run) -> Answer:
-    """A student's pendulum: angle in counts of 0..1023 from a potentiometer, PWM of -255..255."""
+    """Write a student's pendulum: angle in counts of 0..1023 from a potentiometer, PWM of
+    -255..255.
+    """
     more = {"pot": np.round(512 + run.q * 1024 / (1.5 * np.pi)), "pwm": np.round(run.tau)}
     columns, _ = wide(run, "millis=ms; *pot{}=pot:q:?; pwm{}=pwm", **more)
     table(folder / "pendulum.csv", columns, float_format="%.0f")

@@ -81,7 +81,9 @@ def actuator_net_raw(folder: Path, run: Run) -> Answer:
 
 @layout(NED, rate=500.0)
 def mujoco_angle_and_force(folder: Path, run: Run) -> Answer:
-    """A MuJoCo script with two loggers: <joint>_cmd, <joint>_act in one file, forces in another."""
+    """Write a MuJoCo script with two loggers: <joint>_cmd, <joint>_act in one file, forces in
+    another.
+    """
     specs = "time=t; *{}_cmd=q_ref; *{}_act=q"
     joints = run.arm.joints
     table(folder / "forces.csv", wide(run, "time=t; {}_force=tau", joints)[0])
@@ -90,7 +92,9 @@ def mujoco_angle_and_force(folder: Path, run: Run) -> Answer:
 
 @layout(TWO, rate=500.0)
 def browser_recorder(folder: Path, run: Run) -> Answer:
-    """A MuJoCo page's exportToCsv: time, j1_pos, …, j1_pos_desired, …, j1_torque_cmd, %.6f."""
+    """Write a MuJoCo page's exportToCsv: time, j1_pos, …, j1_pos_desired, …, j1_torque_cmd,
+    %.6f.
+    """
     specs = "time=t; *j{}_pos=q; *j{}_vel=dq; *j{}_torque=tau; *j{}_pos_desired=q_ref; "
     specs += "*j{}_vel_desired=dq_ref; j{}_torque_cmd=tau_ref"
     how = {"float_format": "%.6f"}
@@ -101,7 +105,7 @@ def browser_recorder(folder: Path, run: Run) -> Answer:
 
 @layout(UR, rate=125.0)
 def joint_states_sorted(folder: Path, run: Run) -> Answer:
-    """A UR10e's /joint_states by pandas: columns sorted by name, efforts and efforts_lp."""
+    """Write a UR10e's /joint_states by pandas: columns sorted by name, efforts and efforts_lp."""
     specs = "time=epoch; *{}_position=q; *{}_velocity=dq; {}_acceleration=ddq; *{}_effort=tau; "
     specs += "{}_effort_lp=low"
     low = pd.DataFrame(run.tau).ewm(alpha=0.3).mean().to_numpy()
@@ -113,7 +117,9 @@ def joint_states_sorted(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=50.0)
 def doosan_snapshots(folder: Path, run: Run) -> Answer:
-    """A cell's data base of a Doosan arm, robot_snapshots as CSV: degrees, the date comes last."""
+    """Write a cell's data base of a Doosan arm, robot_snapshots as CSV: degrees, the date comes
+    last.
+    """
     specs = "id=number; station_id=2; task_id=4711; *j{}_angle=q°:q°; *j{}_torque=tau; tcp_x=x; "
     specs += "tcp_y=y; tcp_z=z; tcp_a=rx; tcp_b=ry; tcp_c=rz; robot_mode=1; dart_connected=1; "
     specs += "timestamp=date"
@@ -225,7 +231,7 @@ def sarcos_of_openml(folder: Path, run: Run) -> Answer:
 
 @layout(LIFT, rate=100.0)
 def french_spreadsheet(folder: Path, run: Run) -> Answer:
-    """A spreadsheet of a French lab, saved as CSV: a sliding axis first, in mm and N."""
+    """Write a spreadsheet of a French lab, saved as CSV: a sliding axis first, in mm and N."""
     metres = np.array([1000.0, *[180 / np.pi] * 3])
     columns: dict = {"Temps (s)": run.t}
     for j in range(4):
@@ -248,7 +254,9 @@ def french_spreadsheet(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=125.0)
 def japanese_controller(folder: Path, run: Run) -> Answer:
-    """A Japanese controller's log, Shift JIS: commanded and actual position, current in % rated."""
+    """Write a Japanese controller's log, Shift JIS: commanded and actual position, current in %
+    rated.
+    """
     specs = "時刻[ms]=ms; *J{}指令位置[deg]=q_ref°; *J{}現在位置[deg]=q°; "
     specs += "J{}電流指令[%]=want; *J{}電流FB[%]=share:current:%"
     data = {"share": share(run), "want": share(run) * 1.001}
@@ -317,7 +325,7 @@ def motor_side(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, rate=1000.0)
 def encoder_counts(folder: Path, run: Run) -> Answer:
-    """A microcontroller's log: encoder counts, with the counts of a joint's turn above."""
+    """Write a microcontroller's log: encoder counts, with the counts of a joint's turn above."""
     specs = "time_us=us; *enc{}=counts:q:counts; *i{}_mA=milli:current:mA; pwm{}=pwm"
     head = "% encoder 1024 lines x4, gearbox 1:100 -> 409600 counts per joint revolution\n"
     data = {"counts": counts(run.q, 409600), "milli": 1000 * run.current}
@@ -328,7 +336,9 @@ def encoder_counts(folder: Path, run: Run) -> Answer:
 
 @layout(FOUR, rate=50.0)
 def set_point_and_process_value(folder: Path, run: Run) -> Answer:
-    """A PID's trend: set point, process value and output of each loop; Excel's serial date."""
+    """Write a PID's trend: set point, process value and output of each loop; Excel's serial
+    date.
+    """
     specs = "DateTime=serial; *J{}_SP_deg=q_ref°; *J{}_PV_deg=q°; *J{}_OUT=share:current:?"
     serial = [f"{45415.5848524306 + t / 86400:.10f}" for t in run.t]
     data = {"serial": np.array(serial), "share": share(run)}
@@ -338,7 +348,7 @@ def set_point_and_process_value(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=250.0)
 def file_for_each_joint(folder: Path, run: Run) -> Answer:
-    """A file for each joint, joint1.csv … joint6.csv, all with t, pos, vel, torque."""
+    """Write a file for each joint, joint1.csv … joint6.csv, all with t, pos, vel, torque."""
     for j in range(6):
         columns = {"t": run.t, "pos": run.q[:, j], "vel": run.dq[:, j], "torque": run.tau[:, j]}
         table(folder / f"joint{j + 1}.csv", columns)
@@ -380,7 +390,7 @@ def parquet_of_lists(folder: Path, run: Run) -> Answer:
 
 @layout(THREE, rate=250.0)
 def json_joint_by_joint(folder: Path, run: Run) -> Answer:
-    """A script's json.dump: meta with sample rate and units, then lists of each joint."""
+    """Write a script's json.dump: meta with sample rate and units, then lists of each joint."""
     meta = {"robot": "rrr", "operator": "lab", "sample_rate_hz": 250, "payload_kg": 0.0}
     meta["units"] = {"q": "rad", "dq": "rad/s", "tau": "Nm"}
     data = {
@@ -406,7 +416,9 @@ def struct_array_of_joints(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=500.0)
 def ethercat_objects(folder: Path, run: Run) -> Answer:
-    """An EtherCAT master's log of CiA 402 objects: 6064h, 606Ch, 6077h; counts of nothing told."""
+    """Write an EtherCAT master's log of CiA 402 objects: 6064h, 606Ch, 6077h; counts of nothing
+    told.
+    """
     specs = "cycle=count; time_ns=ns; J{}.6041h=4663; *J{}.6064h=counts:q:counts; "
     specs += "*J{}.606Ch=speed:dq:counts/s; *J{}.6077h=share:current:0.1 %; "
     specs += "*J{}.607Ah=want:q_ref:counts"
@@ -447,7 +459,9 @@ def mcap_dynamic_joint_states(folder: Path, run: Run) -> Answer:
 
 @layout(FOUR, rate=200.0)
 def polled_in_turn(folder: Path, run: Run) -> Answer:
-    """A long table of motors on one bus that are polled in turn: each row has a time of its own."""
+    """Write a long table of motors on one bus that are polled in turn: each row has a time of its
+    own.
+    """
     late = 0.0004 * np.arange(4)
     times = run.t[:, None] + late
 
@@ -464,7 +478,9 @@ def polled_in_turn(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=125.0)
 def arrays_as_cells(folder: Path, run: Run) -> Answer:
-    """A Dobot's feedback by pandas, numpy arrays as cells: no commas, and lines break in a cell."""
+    """Write a Dobot's feedback by pandas, numpy arrays as cells: no commas, and lines break in a
+    cell.
+    """
     arrays = {"QTarget": np.degrees(run.q_ref), "QActual": np.degrees(run.q)}
     arrays |= {"QDActual": np.degrees(run.dq), "IActual": 1000 * run.current}
     columns: dict = {"TimeStamp": 1714744931250 + np.round(1000 * run.t).astype(np.int64)}
@@ -487,7 +503,7 @@ def appended_pieces(folder: Path, run: Run) -> Answer:
 
 @layout(SIX, rate=100.0)
 def one_letter_names(folder: Path, run: Run) -> Answer:
-    """A vendor's service log, one letter a signal: p, v, c and t, which is a temperature."""
+    """Write a vendor's service log, one letter a signal: p, v, c and t, which is a temperature."""
     specs = "time_ms=ms; *p{}=q°; *v{}=dq°; *c{}=amps:current:?; t{}=temp"
     columns, right = wide(run, specs)
     also(right, "temperature", "t{}", range(1, 7), CELSIUS)

@@ -1,17 +1,21 @@
-"""Regressor and least squares of the RRR arm, 3N × 15, beside Pinocchio's loop with lstsq and beside FIGAROH.
+"""Regressor and least squares of the RRR arm, 3N × 15, beside Pinocchio's loop with lstsq and
+beside FIGAROH.
 
     python -m benchmarks.least_squares [--samples 10000 100000 1000000] [--memory 10000000]
 
-Goals (performance.md): ×10 at 1e4 and ×15 from 1e5 against Pinocchio, ×30 against FIGAROH up to 1e5; 5 MB of memory beside
-the samples at 1e7 of them; time grows with their number to the power 1.05 at most.
+Goals (performance.md): ×10 at 1e4 and ×15 from 1e5 against Pinocchio, ×30 against FIGAROH up to
+1e5; 5 MB of memory beside the samples at 1e7 of them; time grows with their number to the power
+1.05 at most.
 
     ours         equations in blocks, Gram matrices, weighted by channel residuals
     ours, QR     the same blocks into triangular factors, as an ill-conditioned log would have it
-    Pinocchio    computeJointTorqueRegressor sample by sample; the 15 columns of a base set, known beforehand, go into one
-                 preallocated matrix; np.linalg.lstsq
-    FIGAROH      build_regressor_basic, eliminate_non_dynaffect, QRDecomposer.double_decomposition, as in its examples
+    Pinocchio    computeJointTorqueRegressor sample by sample; the 15 columns of a base set, known
+                 beforehand, go into one preallocated matrix; np.linalg.lstsq
+    FIGAROH      as in its examples, where it is installed: build_regressor_basic,
+                 eliminate_non_dynaffect, QRDecomposer.double_decomposition
 
-Torques are Pinocchio's own (`rnea`). Errors are ‖p - p₀‖/‖p₀‖, each in the parameters that the program itself uses.
+Torques are Pinocchio's own (`rnea`). Errors are ‖p - p₀‖/‖p₀‖, each in the parameters that the
+program itself uses.
 """
 
 from __future__ import annotations
@@ -27,6 +31,7 @@ import time
 import tracemalloc
 import warnings
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -64,10 +69,17 @@ class Task:
     def pinocchio(self) -> np.ndarray:
         import pinocchio as pin
 
-        (q, dq, ddq), columns, model, data = self.motion, self.columns, self.model, self.model.createData()
+        (q, dq, ddq), columns, model, data = (
+            self.motion,
+            self.columns,
+            self.model,
+            self.model.createData(),
+        )
         w = np.empty((3 * len(q), len(columns)))
         for k in range(len(q)):
-            w[3 * k:3 * k + 3] = pin.computeJointTorqueRegressor(model, data, q[k], dq[k], ddq[k])[:, columns]
+            w[3 * k : 3 * k + 3] = pin.computeJointTorqueRegressor(
+                model, data, q[k], dq[k], ddq[k]
+            )[:, columns]
         return np.linalg.lstsq(w, self.tau.ravel(), rcond=None)[0]
 
     def figaroh(self) -> tuple[np.ndarray, np.ndarray]:
@@ -75,12 +87,26 @@ class Task:
         from figaroh.tools.qrdecomposition import QRDecomposer
         from figaroh.tools.regressor import build_regressor_basic, eliminate_non_dynaffect
 
-        names = dict(zip((f"{what}_{i}" for i in range(3) for what in ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz",
-                                                                       "Iyz", "Izz")), _phi(self.model), strict=True))
-        w = build_regressor_basic(_Robot(self.model, self.model.createData()), *self.motion,
-                                  {"is_joint_torques": True, "act_idxv": [0, 1, 2]})
+        names = dict(
+            zip(
+                (
+                    f"{what}_{i}"
+                    for i in range(3)
+                    for what in ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+                ),
+                _phi(self.model),
+                strict=True,
+            )
+        )
+        w = build_regressor_basic(
+            _Robot(self.model, self.model.createData()),
+            *self.motion,
+            {"is_joint_torques": True, "act_idxv": [0, 1, 2]},
+        )
         reduced, kept = eliminate_non_dynaffect(w, names)
-        _, _, _, phi, nominal = QRDecomposer().double_decomposition(self.tau.T.ravel(), reduced, kept, names)
+        _, _, _, phi, nominal = QRDecomposer().double_decomposition(
+            self.tau.T.ravel(), reduced, kept, names
+        )
         return phi, np.asarray(nominal)
 
 
@@ -107,7 +133,9 @@ def task(samples: int) -> Task:
     tau = np.empty((samples, 3))
     for k in range(samples):
         tau[k] = pin.rnea(model, data, *motion[:, k])
-    few = np.concatenate([pin.computeJointTorqueRegressor(model, data, *motion[:, k]) for k in range(60)])
+    few = np.concatenate(
+        [pin.computeJointTorqueRegressor(model, data, *motion[:, k]) for k in range(60)]
+    )
     columns: list[int] = []
     for k in range(few.shape[1]):
         if np.linalg.matrix_rank(few[:, [*columns, k]], tol=1e-9) == len(columns) + 1:
@@ -121,12 +149,32 @@ def compare(samples: int, repeats: int) -> list[str]:
     p = one.body.known_parameters()
     assert p is not None
     peer_error = _error(one.pinocchio(), one.truth)
-    lines = [row(f"{samples:.0e}, Pinocchio + lstsq", race(one.ours, one.pinocchio, repeats), _error(one.ours(), p), peer_error),
-             row(f"{samples:.0e}, Pinocchio + lstsq, ours by QR", race(one.ours_by_qr, one.pinocchio, repeats),
-                 _error(one.ours_by_qr(), p), peer_error)]
-    if samples <= _FIGAROH_UP_TO:
+    lines = [
+        row(
+            f"{samples:.0e}, Pinocchio + lstsq",
+            race(one.ours, one.pinocchio, repeats),
+            _error(one.ours(), p),
+            peer_error,
+        ),
+        row(
+            f"{samples:.0e}, Pinocchio + lstsq, ours by QR",
+            race(one.ours_by_qr, one.pinocchio, repeats),
+            _error(one.ours_by_qr(), p),
+            peer_error,
+        ),
+    ]
+    if find_spec("figaroh") is None:
+        lines.append(f"{samples:.0e}, FIGAROH is not installed here: pip install figaroh")
+    elif samples <= _FIGAROH_UP_TO:
         theirs = _error(*one.figaroh())
-        lines.append(row(f"{samples:.0e}, FIGAROH", race(one.ours, one.figaroh, min(repeats, 3)), _error(one.ours(), p), theirs))
+        lines.append(
+            row(
+                f"{samples:.0e}, FIGAROH",
+                race(one.ours, one.figaroh, min(repeats, 3)),
+                _error(one.ours(), p),
+                theirs,
+            )
+        )
     return lines
 
 
@@ -158,7 +206,9 @@ def streamed(samples: int) -> tuple[RigidEquations, np.ndarray]:
 
 
 def memory(samples: int) -> str:
-    """Peak memory of a fit beyond what the process held before: by its resident pages, and by Python's account."""
+    """Peak memory of a fit beyond what the process held before: by its resident pages, and by
+    Python's account.
+    """
     warm, _ = streamed(_TILE)
     fit(warm)
     many, p = streamed(samples)
@@ -168,7 +218,10 @@ def memory(samples: int) -> str:
     tracemalloc.start()
     fit(many)
     peak = tracemalloc.get_traced_memory()[1] / 2**20
-    return f"extra memory at {samples:.0e} samples: {peak:.2f} MB allocated, resident +{pages:.2f} MB; error {_error(beta, p):.1e}"
+    return (
+        f"extra memory at {samples:.0e} samples: {peak:.2f} MB allocated, resident +{pages:.2f} MB;"
+        f" error {_error(beta, p):.1e}"
+    )
 
 
 def growth(counts: tuple[int, ...] = (10_000, 100_000, 1_000_000)) -> str:
@@ -184,14 +237,19 @@ def growth(counts: tuple[int, ...] = (10_000, 100_000, 1_000_000)) -> str:
             times[n].append((time.perf_counter() - start) / max(1, 100_000 // n))
     slope = np.polyfit(np.log(counts), np.log([np.median(times[n]) for n in counts]), 1)[0]
     return f"time grows with samples to the power {slope:.2f}: " + ", ".join(
-        f"{n:.0e} {1e6 * np.median(times[n]) / n:.3f} µs/sample" for n in counts)
+        f"{n:.0e} {1e6 * np.median(times[n]) / n:.3f} µs/sample" for n in counts
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--samples", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
     parser.add_argument("--memory", type=int, default=10_000_000)
-    parser.add_argument("--memory-alone", action="store_true", help="this process measures memory and nothing else")
+    parser.add_argument(
+        "--memory-alone", action="store_true", help="this process measures memory and nothing else"
+    )
     given = parser.parse_args()
     if given.memory_alone:
         print(memory(given.memory))
@@ -201,8 +259,22 @@ def main() -> None:
     for samples in given.samples:
         print("\n".join(compare(samples, 7 if samples < 1_000_000 else 3)), flush=True)
     print(growth())
-    print(subprocess.run([sys.executable, "-m", "benchmarks.least_squares", "--memory-alone", "--memory", str(given.memory)],
-                         capture_output=True, text=True, check=True).stdout, end="")
+    print(
+        subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "benchmarks.least_squares",
+                "--memory-alone",
+                "--memory",
+                str(given.memory),
+            ],
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout,
+        end="",
+    )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,12 @@
-"""Damage TOML, CSV and URDF texts at random and read them: none may take long, much memory, or end in an internal error.
+"""Damage TOML, CSV and URDF texts at random and read them: none may take long, much memory, or end
+in an internal error.
 
     python -m benchmarks.mutations                10,000 of seed 0
     python -m benchmarks.mutations 500 7          500 of seed 7
 
-A mutation takes one of some healthy texts and cuts, repeats, swaps, deletes or inserts pieces of it, up
-to repeating a piece a hundred thousand times. Each is read in a process of its own, whose time and peak of memory are
-measured, the peak beyond the memory in use before.
+A mutation takes one of some healthy texts and cuts, repeats, swaps, deletes or inserts pieces of
+it, up to repeating a piece a hundred thousand times. Each is read in a process of its own, whose
+time and peak of memory are measured, the peak beyond the memory in use before.
 """
 
 from __future__ import annotations
@@ -29,14 +30,50 @@ from pipelines.importers.recipe import parse_recipe
 from pipelines.io.robot_files import load_robot
 from rrrid_cli.options import make_settings
 
-__all__ = ["Reading", "mutations", "read_apart", "warm_up"]
-
 _REPO = Path(__file__).resolve().parents[1]
 _SECONDS, _MEGABYTES = 5.0, 500.0  # the bars
 _KILLED = 60  # [s]
-_TOKENS = ("[", "]", "{", "}", '"', "'", '"""', "'''", ".", "a.", "=", ",", ";", "\n", "\r\n", "\0", "\\", "#", "%", "1e999",
-           "nan", "inf", "-", "9" * 400, "\t", " ", "é", "→", "[[a]]", "[a.b]", "true", "2020-01-01", "0x",
-           "1_", "<", ">", "&x;", "<link/>", "|")
+_TOKENS = (
+    "[",
+    "]",
+    "{",
+    "}",
+    '"',
+    "'",
+    '"""',
+    "'''",
+    ".",
+    "a.",
+    "=",
+    ",",
+    ";",
+    "\n",
+    "\r\n",
+    "\0",
+    "\\",
+    "#",
+    "%",
+    "1e999",
+    "nan",
+    "inf",
+    "-",
+    "9" * 400,
+    "\t",
+    " ",
+    "é",
+    "→",
+    "[[a]]",
+    "[a.b]",
+    "true",
+    "2020-01-01",
+    "0x",
+    "1_",
+    "<",
+    ">",
+    "&x;",
+    "<link/>",
+    "|",
+)
 
 
 @dataclass(frozen=True)
@@ -66,7 +103,7 @@ def _healthy() -> Iterator[tuple[str, str]]:
         yield "robot", path.read_text()
     for path in sorted((_REPO / "sample_logs" / "recipes").glob("*.toml")):
         yield "recipe", path.read_text()
-    yield "settings", "[convert]\nto = \"csv\"\n"
+    yield "settings", '[convert]\nto = "csv"\n'
     rng = np.random.default_rng(1)
     rows = np.round(np.cumsum(rng.normal(size=(300, 6)), axis=0), 4)
     names = ("q1 [rad]", "q2 [rad]", "q3 [rad]", "tau1 [Nm]", "tau2 [Nm]", "tau3 [Nm]")
@@ -75,29 +112,47 @@ def _healthy() -> Iterator[tuple[str, str]]:
         lines += [separator.join(map(str, (0.01 * k, *row))) for k, row in enumerate(rows)]
         yield "csv", "\n".join(lines) + "\n"
     yield "csv", "\n".join(",".join(map(str, row)) for row in rows) + "\n"
-    joints = [f"{0.01 * k},joint_{j},{row[j]},{row[3 + j]}" for k, row in enumerate(rows) for j in range(3)]
+    joints = [
+        f"{0.01 * k},joint_{j},{row[j]},{row[3 + j]}"
+        for k, row in enumerate(rows)
+        for j in range(3)
+    ]
     yield "csv", "\n".join(["t,joint,position,effort", *joints]) + "\n"
     spans = ["\ufeff;hip;;knee;", "Time;Angle;Torque;Angle;Torque", "[s];[deg];[Nm];[deg];[Nm]"]
-    yield "csv", "\n".join([*spans, *(";".join(map(str, (0.01 * k, *row[:4]))) for k, row in enumerate(rows))]) + "\n"
-    yield "urdf", ('<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/><origin xyz="0 0 0.1"/>'
-                   '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
-                   '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
-                   '<limit lower="-1" upper="1" effort="9" velocity="2"/></joint></robot>')
+    yield (
+        "csv",
+        "\n".join(
+            [*spans, *(";".join(map(str, (0.01 * k, *row[:4]))) for k, row in enumerate(rows))]
+        )
+        + "\n",
+    )
+    yield (
+        "urdf",
+        (
+            '<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>'
+            '<origin xyz="0 0 0.1"/>'
+            '<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>'
+            '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>'
+            '<limit lower="-1" upper="1" effort="9" velocity="2"/></joint></robot>'
+        ),
+    )
 
 
 def _mutated(text: str, rng: np.random.Generator) -> str:
-    """Return the text with one random change; the logarithm of a repetition's count is uniform up to 1e5."""
+    """Return the text with one random change; the logarithm of a repetition's count is uniform up
+    to 1e5.
+    """
     a, b = sorted(int(k) for k in rng.integers(0, len(text) + 1, 2))
-    piece = text[a:min(b, a + int(2.0 ** rng.uniform(0, 9)))]
+    piece = text[a : min(b, a + int(2.0 ** rng.uniform(0, 9)))]
     token = _TOKENS[rng.integers(len(_TOKENS))]
     many = int(10.0 ** rng.uniform(0, 5))
     repeated = (piece or token) * min(many, 400_000 // max(len(piece or token), 1))
     choices: tuple[Callable[[], str], ...] = (
-        lambda: text[:a] + text[a + len(piece):],
+        lambda: text[:a] + text[a + len(piece) :],
         lambda: text[:a] + repeated + text[a:],
         lambda: text[:a] + token * min(many, 400_000 // len(token)) + text[a:],
         lambda: text[:a],
-        lambda: text[:a] + token + text[a + 1:],
+        lambda: text[:a] + token + text[a + 1 :],
         lambda: text[:a] + text[b:] + piece,
         lambda: text[:a] + "".join(map(chr, rng.integers(1, 0x3000, 8))) + text[a:],
     )
@@ -143,7 +198,10 @@ def _read(kind: str, path: Path) -> str:
     except BaseException as problem:  # what a user would see as exit 70
         outcome = f"internal: {type(problem).__name__}: {str(problem)[:200]}"
     spent = time.process_time() - began
-    return f"{outcome}\n{spent} {(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0}"
+    return (
+        f"{outcome}\n{spent} "
+        f"{(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024.0}"
+    )
 
 
 def warm_up() -> None:
@@ -168,17 +226,33 @@ def main(count: int, seed: int) -> int:
         found[f"{kind}: {reading.outcome.split(':')[0]}"] += 1
         slowest = max(slowest, reading, key=lambda one: one.seconds)
         largest = max(largest, reading, key=lambda one: one.megabytes)
-        if reading.outcome.startswith("internal") or reading.seconds > _SECONDS or reading.megabytes > _MEGABYTES:
+        if (
+            reading.outcome.startswith("internal")
+            or reading.seconds > _SECONDS
+            or reading.megabytes > _MEGABYTES
+        ):
             wrong.append(reading)
             kept = Path(tempfile.gettempdir()) / f"rrrid-mutation-{seed}-{k}.{kind}"
             kept.write_bytes(text)
-            print(f"{kept}: {reading.outcome}, {reading.seconds:.1f} s, {reading.megabytes:.0f} MB", flush=True)
+            print(
+                f"{kept}: {reading.outcome}, {reading.seconds:.1f} s, {reading.megabytes:.0f} MB",
+                flush=True,
+            )
     for name, times in sorted(found.items()):
         print(f"  {name:24} {times}")
-    print(f"{count} mutations of seed {seed}: slowest {slowest.seconds:.2f} s ({slowest.kind}), largest {largest.megabytes:.0f} MB "
-          f"({largest.kind}), {len(wrong)} beyond {_SECONDS:.0f} s or {_MEGABYTES:.0f} MB or internal errors")
+    print(
+        f"{count} mutations of seed {seed}: slowest {slowest.seconds:.2f} s ({slowest.kind}), "
+        f"largest {largest.megabytes:.0f} MB "
+        f"({largest.kind}), {len(wrong)} beyond {_SECONDS:.0f} s or {_MEGABYTES:.0f} MB or "
+        "internal errors"
+    )
     return 1 if wrong else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]) if len(sys.argv) > 1 else 10_000, int(sys.argv[2]) if len(sys.argv) > 2 else 0))
+    sys.exit(
+        main(
+            int(sys.argv[1]) if len(sys.argv) > 1 else 10_000,
+            int(sys.argv[2]) if len(sys.argv) > 2 else 0,
+        )
+    )

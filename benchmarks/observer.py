@@ -1,18 +1,22 @@
-"""The Kalman observer and smoother beside filterpy loops. Goals: ×1000 and ×500 at 1e4 samples, 3 joints (performance.md).
+"""The Kalman observer and smoother beside filterpy loops. Goals: ×1000 and ×500 at 1e4 samples, 3
+joints (performance.md).
 
     python -m benchmarks.observer [--samples 10000] [--grow 1000000] [--statsmodels]
 
-Theirs is the loop one writes with filterpy, one joint after another: update, keep the state, predict; for the smoother
-filterpy's own batch_filter and rts_smoother. They start from a known covariance. Ours is shown in four ways:
+Theirs is the loop one writes with filterpy, one joint after another: update, keep the state,
+predict; for the smoother filterpy's own batch_filter and rts_smoother. They start from a known
+covariance. Ours is shown in four ways:
 
-    kept    with the matrices of the observer, and of its start, kept from the log before, as for the logs of a folder; the goals
-            are for these
-    new     the gain, the matrices and the start designed from σ and R in the timed run: what a first short log costs
+    kept             with the matrices of the observer, and of its start, kept from the log before,
+                     as for the logs of a folder; the goals are for these
+    new              the gain, the matrices and the start designed from σ and R in the timed run:
+                     what a first short log costs
     known start      the same start as theirs: every sample is compared
-    unknown start    what a recording has: compared where the start is forgotten (`Observer.settled`)
+    unknown start    of a recording: compared where the start is forgotten (`Observer.settled`)
 
-Errors are the worst of q, dq, ddq relative to the largest, ours against theirs, so theirs are zero by definition; each is that of
-the very case. --statsmodels compares with that compiled one, if installed.
+Errors are the worst of q, dq, ddq relative to the largest, ours against theirs, so theirs are zero
+by definition; each is that of the very case. --statsmodels compares with that compiled one, if
+installed.
 """
 
 from __future__ import annotations
@@ -42,7 +46,9 @@ def measured(samples: int) -> np.ndarray:
     """Three joints that swing, as encoders count it."""
     t = np.arange(samples)[:, None] * T
     hz = np.array([1.0, 2.3, 4.1])
-    return np.asarray(np.round((np.sin(2 * np.pi * hz * t) + 0.1 * np.sin(2 * np.pi * 9.7 * t)) / STEP) * STEP)
+    return np.asarray(
+        np.round((np.sin(2 * np.pi * hz * t) + 0.1 * np.sin(2 * np.pi * 9.7 * t)) / STEP) * STEP
+    )
 
 
 def textbook(sigma: float) -> KalmanFilter:
@@ -81,7 +87,10 @@ def statsmodels_smoother(y: np.ndarray) -> np.ndarray:
         model = KalmanSmoother(k_endog=1, k_states=3, k_posdef=1)
         model.bind(y[:, j].copy())
         model["design"], model["transition"] = np.eye(3)[:1], transition(3, np.array(T))
-        model["selection"], model["state_cov"] = (held_input(3, np.array(T)) * sigma)[:, None], np.eye(1)
+        model["selection"], model["state_cov"] = (
+            (held_input(3, np.array(T)) * sigma)[:, None],
+            np.eye(1),
+        )
         model["obs_cov"] = np.array([[R]])
         model.initialize_known(MEAN, COVARIANCE)
         model.set_smoother_output(SMOOTHER_STATE)
@@ -90,7 +99,9 @@ def statsmodels_smoother(y: np.ndarray) -> np.ndarray:
 
 
 def error(states: np.ndarray, reference: np.ndarray) -> float:
-    """`states` (order, samples, joints) against (samples, joints, order): the worst, relative to the largest of its kind."""
+    """`states` (order, samples, joints) against (samples, joints, order): the worst, relative to
+    the largest of its kind.
+    """
     apart = np.abs(states.transpose(1, 2, 0) - reference).max(axis=(0, 1))
     return float((apart / np.abs(reference).max(axis=(0, 1))).max())
 
@@ -103,44 +114,95 @@ def compare(samples: int, with_statsmodels: bool) -> None:
     seen, smoothed = their_observer(y), their_smoother(y)
     fresh = design(T, SIGMA, R)  # what "designed anew" gives, in a run of its own
     contests: list[tuple[str, Callable[[], object], Callable[[], object], float]] = [
-        ("observer, kept, known start", lambda: observe(y, observer, START), lambda: their_observer(y),
-         error(observe(y, observer, START).states, seen)),
-        ("observer, kept, unknown start", lambda: observe(y, observer), lambda: their_observer(y),
-         error(observe(y, observer).states[:, observer.settled:], seen[observer.settled:])),
-        ("observer, new, known start", lambda: observe(y, design(T, SIGMA, R), START), lambda: their_observer(y),
-         error(observe(y, fresh, START).states, seen)),
-        ("observer, new, unknown start", lambda: observe(y, design(T, SIGMA, R)), lambda: their_observer(y),
-         error(observe(y, design(T, SIGMA, R)).states[:, observer.settled:], seen[observer.settled:])),
-        ("smoother, kept, known start", lambda: smooth(y, smoother, START), lambda: their_smoother(y),
-         error(smooth(y, smoother, START).states, smoothed)),
-        ("smoother, kept, unknown start", lambda: smooth(y, smoother), lambda: their_smoother(y),
-         error(smooth(y, smoother).states[:, observer.settled:], smoothed[observer.settled:])),
-        ("smoother, new, known start", lambda: smooth(y, design(T, SIGMA, R), START), lambda: their_smoother(y),
-         error(smooth(y, fresh, START).states, smoothed)),
-        ("smoother, new, unknown start", lambda: smooth(y, design(T, SIGMA, R)), lambda: their_smoother(y),
-         error(smooth(y, design(T, SIGMA, R)).states[:, observer.settled:], smoothed[observer.settled:])),
+        (
+            "observer, kept, known start",
+            lambda: observe(y, observer, START),
+            lambda: their_observer(y),
+            error(observe(y, observer, START).states, seen),
+        ),
+        (
+            "observer, kept, unknown start",
+            lambda: observe(y, observer),
+            lambda: their_observer(y),
+            error(observe(y, observer).states[:, observer.settled :], seen[observer.settled :]),
+        ),
+        (
+            "observer, new, known start",
+            lambda: observe(y, design(T, SIGMA, R), START),
+            lambda: their_observer(y),
+            error(observe(y, fresh, START).states, seen),
+        ),
+        (
+            "observer, new, unknown start",
+            lambda: observe(y, design(T, SIGMA, R)),
+            lambda: their_observer(y),
+            error(
+                observe(y, design(T, SIGMA, R)).states[:, observer.settled :],
+                seen[observer.settled :],
+            ),
+        ),
+        (
+            "smoother, kept, known start",
+            lambda: smooth(y, smoother, START),
+            lambda: their_smoother(y),
+            error(smooth(y, smoother, START).states, smoothed),
+        ),
+        (
+            "smoother, kept, unknown start",
+            lambda: smooth(y, smoother),
+            lambda: their_smoother(y),
+            error(smooth(y, smoother).states[:, observer.settled :], smoothed[observer.settled :]),
+        ),
+        (
+            "smoother, new, known start",
+            lambda: smooth(y, design(T, SIGMA, R), START),
+            lambda: their_smoother(y),
+            error(smooth(y, fresh, START).states, smoothed),
+        ),
+        (
+            "smoother, new, unknown start",
+            lambda: smooth(y, design(T, SIGMA, R)),
+            lambda: their_smoother(y),
+            error(
+                smooth(y, design(T, SIGMA, R)).states[:, observer.settled :],
+                smoothed[observer.settled :],
+            ),
+        ),
     ]
     if with_statsmodels:
         reference = statsmodels_smoother(y)
-        contests.append(("smoother, against statsmodels", lambda: smooth(y, smoother, START), lambda: statsmodels_smoother(y),
-                         error(smooth(y, smoother, START).states, reference)))
+        contests.append(
+            (
+                "smoother, against statsmodels",
+                lambda: smooth(y, smoother, START),
+                lambda: statsmodels_smoother(y),
+                error(smooth(y, smoother, START).states, reference),
+            )
+        )
     for name, ours, theirs, apart in contests:
         print(row(f"{size}, {name}", race(ours, theirs, repeats=5), apart, 0.0), flush=True)
 
 
 def grow(largest: int) -> None:
-    """Time and memory of ours from 1e4 samples upwards, and the exponent of the time, in new memory and in memory kept."""
+    """Time and memory of ours from 1e4 samples upwards, and the exponent of the time, in new memory
+    and in memory kept.
+    """
     observer = design(T, SIGMA, R)
     smoother = Smoother(observer)
     sizes = [n for n in (10_000, 30_000, 100_000, 300_000, 1_000_000, 3_000_000) if n <= largest]
-    for name, run in (("observer", partial(observe, observer=observer)), ("smoother", partial(smooth, observer=smoother))):
+    for name, run in (
+        ("observer", partial(observe, observer=observer)),
+        ("smoother", partial(smooth, observer=smoother)),
+    ):
         for memory in ("memory kept", "new memory"):
             seconds = []
             for n in sizes:
                 y, out = measured(n), np.zeros((3, 3, n)) if memory == "memory kept" else None
                 seconds.append(best(partial(run, y, out=out)))
             slope = np.polyfit(np.log(sizes), np.log(seconds), 1)[0]
-            times = ", ".join(f"{n:.0e} in {s * 1e3:.1f} ms" for n, s in zip(sizes, seconds, strict=True))
+            times = ", ".join(
+                f"{n:.0e} in {s * 1e3:.1f} ms" for n, s in zip(sizes, seconds, strict=True)
+            )
             print(f"{name}, {memory}: {times}; exponent {slope:.3f}", flush=True)
         tracemalloc.start()
         run(y)
@@ -160,9 +222,13 @@ def best(run: Callable[[], object], repeats: int = 15) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--samples", type=int, nargs="+", default=[10_000])
-    parser.add_argument("--grow", type=int, default=1_000_000, help="largest number of samples; 0 leaves it out")
+    parser.add_argument(
+        "--grow", type=int, default=1_000_000, help="largest number of samples; 0 leaves it out"
+    )
     parser.add_argument("--statsmodels", action="store_true")
     arguments = parser.parse_args()
     print(HEADER)

@@ -1,4 +1,6 @@
-"""Simulate motions of serial arms, with torques by Pinocchio, to be written as recordings (see import_layouts)."""
+"""Simulate motions of serial arms, with torques by Pinocchio, to be written as recordings (see
+import_layouts).
+"""
 
 from __future__ import annotations
 
@@ -203,9 +205,19 @@ def simulate(
     )
 
 
-UR = Arm("ur5", (
-    "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
-), "zyyyzy", (150, 150, 150, 28, 28, 28))
+UR = Arm(
+    "ur5",
+    (
+        "shoulder_pan_joint",
+        "shoulder_lift_joint",
+        "elbow_joint",
+        "wrist_1_joint",
+        "wrist_2_joint",
+        "wrist_3_joint",
+    ),
+    "zyyyzy",
+    (150, 150, 150, 28, 28, 28),
+)
 SIX = Arm("m0609", tuple(f"joint_{j}" for j in range(1, 7)), "zyyxyx", (194, 163, 163, 50, 50, 50))
 PANDA = Arm(
     "panda",

@@ -2,11 +2,14 @@
 
     python -m benchmarks.recorded_diagnosis                       both, as a table
     python -m benchmarks.recorded_diagnosis --only tx40 --folds 5
-    python -m benchmarks.recorded_diagnosis --data FOLDER         where tx40/ and odrive/ lie; $RRRID_RECORDED, or ../shared/real
+    python -m benchmarks.recorded_diagnosis --data FOLDER         of tx40/ and odrive/
 
-TX40: Butterworth 4 at 100 Hz, 50 Hz, slow samples left out, as published. Time is cut into blocks; each is held out once, and the
-whole search, and the choice of what is kept of it, is done without it: the error over all of them is nobody's choice.
-ODrive: two runs at 0.1 rev/s are fitted, blocks of them choose; a third one, and one at 0.03 rev/s, only judge.
+The folder is else $RRRID_RECORDED, or ../shared/real.
+
+TX40: Butterworth 4 at 100 Hz, 50 Hz, slow samples left out, as published. Time is cut into blocks;
+each is held out once, and the whole search, and the choice of what is kept of it, is done without
+it: the error over all of them is nobody's choice. ODrive: two runs at 0.1 rev/s are fitted, blocks
+of them choose; a third one, and one at 0.03 rev/s, only judge.
 """
 
 from __future__ import annotations
@@ -32,8 +35,6 @@ from pipelines.model.rows.data import Data
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from pipelines.stage import Request, run_stage
 
-__all__ = ["TX40", "Judged", "Step", "fold", "imported", "judged_odrive", "judged_tx40", "main", "searched"]
-
 TX40 = Recipe(cutoff_hz=100.0, decimation=100, min_speed=(0.05, 0.05, 0.05, 0.12, 0.12, 0.12))
 _TX40_CAUSES = 8  # at most
 _ODRIVE = Recipe(cutoff_hz=40.0)
@@ -44,7 +45,9 @@ _GUARD = 1  # rows to either side of a held-out block: the low-pass reaches half
 
 @dataclass(frozen=True)
 class Step:
-    """One cause that was accepted, and what the model with it leaves of time that it was not chosen by."""
+    """One cause that was accepted, and what the model with it leaves of time that it was not chosen
+    by.
+    """
 
     name: str  # "cogging:4"; "nominal" before any
     left: float  # squared residual [N^2 m^2]
@@ -67,20 +70,26 @@ class Judged:
 
 
 def imported(name: str, data: Path) -> dict[str, ExperimentLog]:
-    """The logs of a recorded set, by name."""
+    """Return the logs of a recorded set, by name."""
     with tempfile.TemporaryDirectory() as folder:
-        done = run_stage(STAGE, Request((), Path(folder) / "out", no_report=True), Settings(recipe=name, source=data / name))
+        done = run_stage(
+            STAGE,
+            Request((), Path(folder) / "out", no_report=True),
+            Settings(recipe=name, source=data / name),
+        )
         logs = [open_log(path).log for path in sorted((done.folder / "logs").glob("*.h5"))]
     return {log.name: log for log in logs}
 
 
 def fold(data: Data, number: int, count: int) -> tuple[Data, Data]:
-    """The rows of one log without block `number` of `count`, and that block alone."""
+    """Return the rows of one log without block `number` of `count`, and that block alone."""
     one = data.logs[0]
     inside = np.arange(one.rows) * count // one.rows == number
     near = np.convolve(inside, np.ones(2 * _GUARD + 1), "same") > 0.0
-    return (replace(data, logs=(replace(one, weighed=one.weighed & ~near),)),
-            replace(data, logs=(replace(one, weighed=one.weighed & inside),)))
+    return (
+        replace(data, logs=(replace(one, weighed=one.weighed & ~near),)),
+        replace(data, logs=(replace(one, weighed=one.weighed & inside),)),
+    )
 
 
 def searched(prepared: Prepared, most: int, exclude: Sequence[str] = ()) -> Look:
@@ -106,7 +115,9 @@ def place(cause: str, joint: int | None) -> str:
     return cause if joint is None else f"{cause}:{joint}"
 
 
-def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: Recipe = TX40) -> list[Judged]:
+def judged_tx40(
+    data: Path, numbers: Sequence[int], count: int, settings: Recipe = TX40
+) -> list[Judged]:
     """Blocks `numbers` of `count`, each judged by a search that never saw it."""
     prepared = prepare(Logs.by_role(tuple(imported("tx40", data).values())), settings)
     out = []
@@ -117,13 +128,19 @@ def judged_tx40(data: Path, numbers: Sequence[int], count: int, settings: Recipe
         found = searched(own, _TX40_CAUSES)
         seconds = time.process_time() - begin
         out.append(judged(f"block {number + 1} of {count}", own, found, judge, seconds))
-        print(f"  {out[-1].what}: " + ", ".join(f"{step.name} {100 * error:.2f} %"
-                                              for step, error in zip(out[-1].steps, out[-1].errors, strict=True)), flush=True)
+        print(
+            f"  {out[-1].what}: "
+            + ", ".join(
+                f"{step.name} {100 * error:.2f} %"
+                for step, error in zip(out[-1].steps, out[-1].errors, strict=True)
+            ),
+            flush=True,
+        )
     return out
 
 
 def judged_odrive(data: Path, settings: Recipe = _ODRIVE) -> tuple[Look, list[Judged]]:
-    """The search on two runs, judged on the others, none of which it saw."""
+    """Search on two runs, judged on the others, none of which it saw."""
     logs = imported("odrive", data)
     begin = time.process_time()
     prepared = prepare(Logs((logs["nocomp_0"], logs["nocomp_1"])), settings)
@@ -138,14 +155,20 @@ def judged_odrive(data: Path, settings: Recipe = _ODRIVE) -> tuple[Look, list[Ju
 
 
 def nested_error(folds: Sequence[Judged]) -> tuple[float, float, Array]:
-    """Relative error of the nominal model and of the last of each search over all blocks; and of the joints (joints,)."""
+    """Relative error of the nominal model and of the last of each search over all blocks; and of
+    the joints (joints,).
+    """
     power = sum(one.power for one in folds)
-    before, after = (float(np.sqrt(sum(one.steps[k].left for one in folds) / power)) for k in (0, -1))
+    before, after = (
+        float(np.sqrt(sum(one.steps[k].left for one in folds) / power)) for k in (0, -1)
+    )
     return before, after, np.sqrt(np.sum([one.steps[-1].joints for one in folds], axis=0) / power)
 
 
 def payoff(folds: Sequence[Judged]) -> dict[str, tuple[int, float]]:
-    """Of each cause: in how many searches it was found, and what it took off the squared error of the blocks held out there."""
+    """Of each cause: in how many searches it was found, and what it took off the squared error of
+    the blocks held out there.
+    """
     out: dict[str, tuple[int, float]] = {}
     for one in folds:
         for before, after in zip(one.steps, one.steps[1:], strict=False):
@@ -155,8 +178,12 @@ def payoff(folds: Sequence[Judged]) -> dict[str, tuple[int, float]]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    here = os.environ.get("RRRID_RECORDED") or Path(__file__).resolve().parents[2] / "shared" / "real"
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    here = (
+        os.environ.get("RRRID_RECORDED") or Path(__file__).resolve().parents[2] / "shared" / "real"
+    )
     parser.add_argument("--data", type=Path, default=Path(here))
     parser.add_argument("--only", choices=("tx40", "odrive"))
     parser.add_argument("--folds", type=int, default=5)
@@ -171,10 +198,16 @@ def _print_tx40(data: Path, count: int) -> None:
     print(f"TX40, {count} blocks, each held out once")
     folds = judged_tx40(data, range(count), count)
     before, after, joints = nested_error(folds)
-    print(f"  relative torque error held out: nominal {100 * before:.2f} %, extended {100 * after:.2f} % (bar 5.0, aim 4.5)")
+    print(
+        f"  relative torque error held out: nominal {100 * before:.2f} %, extended "
+        f"{100 * after:.2f} % (bar 5.0, aim 4.5)"
+    )
     print("  share of each joint:", ", ".join(f"{100 * x:.2f} %" for x in joints))
     for name, (times, taken) in sorted(payoff(folds).items(), key=lambda item: -item[1][1]):
-        print(f"  {name:28s} found in {times} of {count}, takes {100 * taken:6.2f} % off the squared error held out")
+        print(
+            f"  {name:28s} found in {times} of {count}, takes {100 * taken:6.2f} % off the squared "
+            "error held out"
+        )
     print(f"  {sum(one.seconds for one in folds):.0f} s of CPU")
 
 
@@ -182,11 +215,18 @@ def _print_odrive(data: Path) -> None:
     print("ODrive")
     found, runs = judged_odrive(data)
     for one in found.selection.end.model.effects:
-        print(f"  {one.effect.name:22s}", ", ".join(f"{name} {value:.4g}" for name, value in one.values.items()))
+        print(
+            f"  {one.effect.name:22s}",
+            ", ".join(f"{name} {value:.4g}" for name, value in one.values.items()),
+        )
     inertia = float(found.selection.end.model.beta[0])
     print(f"  inertia {inertia:.3g} kg m^2 (2.5e-4 within 30 %: 1.75e-4 to 3.25e-4)")
     for run in runs:
-        print(f"  {run.what:18s} held-out error " + " -> ".join(f"{100 * error:.1f}" for error in run.errors) + " %")
+        print(
+            f"  {run.what:18s} held-out error "
+            + " -> ".join(f"{100 * error:.1f}" for error in run.errors)
+            + " %"
+        )
     print(f"  {runs[0].seconds:.0f} s of CPU")
 
 

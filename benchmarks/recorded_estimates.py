@@ -21,8 +21,6 @@ from pipelines.io.files import open_log
 from pipelines.model.estimation.result import Result
 from pipelines.stage import Inputs
 
-__all__ = ["fixed_row_error", "kr300", "panda"]
-
 _CUTOFF_HZ = 10.0
 _CUT = {"panda": 0.0, "kr300": 1.5}  # [s] at both ends, as the READMEs say
 
@@ -65,14 +63,18 @@ def _estimated(paths: list[Path], settings: Settings | None, held_out: str) -> R
 
 def main(real: Path) -> None:
     """Print a line for each set and setting."""
-    for label, settings in (("defaults", Settings(compare=False)),
-                            ("--cutoff-hz 10", Settings(compare=False, cutoff_hz=_CUTOFF_HZ))):
+    for label, settings in (
+        ("defaults", Settings(compare=False)),
+        ("--cutoff-hz 10", Settings(compare=False, cutoff_hz=_CUTOFF_HZ)),
+    ):
         for name, results in (("panda", [panda(real, settings)]), ("kr300", kr300(real, settings))):
             own = [100 * one.relative_error["validate"] for one in results]
             fixed = [100 * fixed_row_error(one, _CUT[name]) for one in results]
-            print(f"{name:6} {label:12} own rows {np.mean(own):.2f} % {np.round(own, 2)}, "
-                  f"fixed rows {np.mean(fixed):.2f} % {np.round(fixed, 2)}, "
-                  f"low-pass {results[0].filter_hz} Hz")
+            print(
+                f"{name:6} {label:12} own rows {np.mean(own):.2f} % {np.round(own, 2)}, "
+                f"fixed rows {np.mean(fixed):.2f} % {np.round(fixed, 2)}, "
+                f"low-pass {results[0].filter_hz} Hz"
+            )
 
 
 if __name__ == "__main__":

@@ -3,8 +3,8 @@
     python -m benchmarks.sensitivity --count 12 --seed 21              all numbers, a table
     python -m benchmarks.sensitivity --numbers misfit share            some of them
 
-Cases are drawn machines of `benchmarks.other_plants`. A verdict is the kind and the causes named; it
-is right where the causes named are those of the case, or none where it has none.
+Cases are drawn machines of `benchmarks.other_plants`. A verdict is the kind and the causes named;
+it is right where the causes named are those of the case, or none where it has none.
 """
 
 from __future__ import annotations
@@ -17,8 +17,6 @@ from benchmarks.other_plants.cases import Case
 from benchmarks.other_plants.drawn import drawn
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose
-
-__all__ = ["Row", "main", "rows", "varied"]
 
 _FACTORS = (0.5, 2.0)
 

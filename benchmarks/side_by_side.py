@@ -1,4 +1,5 @@
-"""Time two ways of doing one thing, in turn, in one process: on a shared machine only their ratio means anything.
+"""Time two ways of doing one thing, in turn, in one process: on a shared machine only their ratio
+means anything.
 
     from benchmarks import side_by_side        # first of all imports: it keeps BLAS to one thread
     race = side_by_side.race(ours, peer)
@@ -15,7 +16,9 @@ import sys
 # NumPy's BLAS reads these once, when it is loaded; set afterwards they do nothing, silently.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 if "numpy" in sys.modules and any(os.environ.get(name) != "1" for name in _THREADS):
-    raise ImportError("import benchmarks.side_by_side before numpy: it sets the number of BLAS threads")
+    raise ImportError(
+        "import benchmarks.side_by_side before numpy: it sets the number of BLAS threads"
+    )
 os.environ.update(dict.fromkeys(_THREADS, "1"))
 
 import gc  # noqa: E402
@@ -23,8 +26,6 @@ import statistics  # noqa: E402
 import time  # noqa: E402
 from collections.abc import Callable  # noqa: E402
 from dataclasses import dataclass  # noqa: E402
-
-__all__ = ["HEADER", "Race", "race", "row"]
 
 HEADER = f"{'':44s}{'ours':>11s}{'peer':>11s}{'ratio':>16s}{'error ours':>13s}{'error peer':>13s}"
 
@@ -43,8 +44,8 @@ class Race:
 def race(ours: Callable[[], object], peer: Callable[[], object], repeats: int = 7) -> Race:
     """Run `ours` and `peer` alternately, `repeats` times each after one run to warm up.
 
-    Each ratio is of two runs that follow one another, so that a load that comes and goes touches both; who goes first
-    changes every time. Garbage is collected between the runs, not in them.
+    Each ratio is of two runs that follow one another, so that a load that comes and goes touches
+    both; who goes first changes every time. Garbage is collected between the runs, not in them.
     """
     ours()
     peer()
@@ -58,8 +59,13 @@ def race(ours: Callable[[], object], peer: Callable[[], object], repeats: int = 
             theirs = _seconds(peer)
         times.append((mine, theirs))
     ratios = [theirs / mine for mine, theirs in times]
-    return Race(statistics.median(mine for mine, _ in times), statistics.median(theirs for _, theirs in times),
-                statistics.median(ratios), min(ratios), max(ratios))
+    return Race(
+        statistics.median(mine for mine, _ in times),
+        statistics.median(theirs for _, theirs in times),
+        statistics.median(ratios),
+        min(ratios),
+        max(ratios),
+    )
 
 
 def _seconds(work: Callable[[], object]) -> float:
@@ -74,9 +80,10 @@ def _seconds(work: Callable[[], object]) -> float:
 
 
 def row(name: str, race: Race, ours_error: float, peer_error: float) -> str:
-    """One line of a table under `HEADER`. Errors are relative, against one common judge."""
+    """Return one line of a table under `HEADER`. Errors are relative, against one common judge."""
     spread = f"×{race.ratio:.1f} ({race.low:.1f}-{race.high:.1f})"
-    return f"{name:44s}{_time(race.ours_s):>11s}{_time(race.peer_s):>11s}{spread:>16s}{ours_error:13.1e}{peer_error:13.1e}"
+    times = f"{_time(race.ours_s):>11s}{_time(race.peer_s):>11s}"
+    return f"{name:44s}{times}{spread:>16s}{ours_error:13.1e}{peer_error:13.1e}"
 
 
 def _time(seconds: float) -> str:

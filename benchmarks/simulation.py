@@ -1,10 +1,13 @@
-"""The closed-loop simulation beside the usual Pinocchio loop. Goals: ×2.5 for one robot, 25 robot-seconds a second for 32 at once.
+"""The closed-loop simulation beside the usual Pinocchio loop. Goals: ×2.5 for one robot, 25
+robot-seconds a second for 32 at once.
 
     python -m benchmarks.simulation [--seconds 2]
 
-Both sides do the same: the RRR arm with friction of three sigmoids under PD at 1 kHz, the torque held, RK4 at 4 kHz, positions and
-torques kept. The peer is `pin.aba` in NumPy, its PD on the backward difference. Errors are those of the position against Pinocchio
-in 16 steps a sample, relative to the largest position. Many robots at once have encoders, command steps and noise of their own.
+Both sides do the same: the RRR arm with friction of three sigmoids under PD at 1 kHz, the torque
+held, RK4 at 4 kHz, positions and torques kept. The peer is `pin.aba` in NumPy, its PD on the
+backward difference. Errors are those of the position against Pinocchio in 16 steps a sample,
+relative to the largest position. Many robots at once have encoders, command steps and noise of
+their own.
 """
 
 from __future__ import annotations
@@ -35,14 +38,31 @@ def reference(samples: int) -> tuple[Array, Array, Array]:
     """q, dq, ddq (samples, 3) from rest, with reversals."""
     t = TS * np.arange(samples)[:, None]
     size, w = np.array([0.5, 0.4, 0.7]), 2 * np.pi * np.array([0.6, 0.9, 1.3])
-    return np.array([0.2, -1.2, 0.8]) + size * (1 - np.cos(w * t)), size * w * np.sin(w * t), size * w**2 * np.cos(w * t)
+    return (
+        np.array([0.2, -1.2, 0.8]) + size * (1 - np.cos(w * t)),
+        size * w * np.sin(w * t),
+        size * w**2 * np.cos(w * t),
+    )
 
 
 def experiment(samples: int, steps: bool) -> Experiment:
     """PD on the backward difference; with `steps` encoders and command count."""
     q, dq, ddq = reference(samples)
-    controller = Controller("pd", KP, KD, velocity="backward-difference", torque_resolution=BITS if steps else None)
-    return Experiment(TS, 0.0, controller, q, dq, ddq, q[0], dq[0], np.zeros(3), np.full(3, 1e-5 if steps else 0.0))
+    controller = Controller(
+        "pd", KP, KD, velocity="backward-difference", torque_resolution=BITS if steps else None
+    )
+    return Experiment(
+        TS,
+        0.0,
+        controller,
+        q,
+        dq,
+        ddq,
+        q[0],
+        dq[0],
+        np.zeros(3),
+        np.full(3, 1e-5 if steps else 0.0),
+    )
 
 
 class Peer:
@@ -80,7 +100,9 @@ class Peer:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--seconds", type=float, default=2.0)
     samples = round(parser.parse_args().seconds / TS)
     seconds = samples * TS
@@ -98,8 +120,11 @@ def main() -> None:
     print(f"\n{'robots at once':44s}{'CPU':>11s}{'robot-seconds a second':>27s}")
     own = replace(plant, p=np.tile(plant.p, (32, 1)))
     for name, moved, count, steps in (
-            ("32, 4 kHz", plant, 32, 4), (f"32, {enough} kHz, which suffices", plant, 32, enough),
-            (f"10, {enough} kHz", plant, 10, enough), ("32, 4 kHz, each with its own parameters", own, 32, 4)):
+        ("32, 4 kHz", plant, 32, 4),
+        (f"32, {enough} kHz, which suffices", plant, 32, enough),
+        (f"10, {enough} kHz", plant, 10, enough),
+        ("32, 4 kHz, each with its own parameters", own, 32, 4),
+    ):
         taken = _median(partial(run, moved, counted, steps, NOISE, range(count)))
         print(f"{name:44s}{taken:9.2f} s{count * seconds / taken:27.0f}")
 

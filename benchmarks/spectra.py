@@ -1,15 +1,18 @@
-"""Frequency responses: averaged segments beside scipy and pyFRF, local polynomials beside Welch, modes of plants in a loop.
+"""Frequency responses: averaged segments beside scipy and pyFRF, local polynomials beside Welch,
+modes of plants in a loop.
 
     python -m benchmarks.spectra [--samples 60000 600000] [--modes 24]
 
-Goals (performance.md): ≥ ×5 four scipy calls, ≥ ×1.5 pyFRF, linear in N; equal to scipy to 1e-12. At the peak of a light mode
-the local method has at most half the error of Welch's best segment. Modes: frequency within 1 %, damping within 15 %, inside the
-95 % bands in 90 %.
+Goals (performance.md): ≥ ×5 four scipy calls, ≥ ×1.5 pyFRF, linear in N; equal to scipy to 1e-12.
+At the peak of a light mode the local method has at most half the error of Welch's best segment.
+Modes: frequency within 1 %, damping within 15 %, inside the 95 % bands in 90 %.
 
-Ours gives all six spectra of v, r, q and from them both responses, their coherence and their covariance. The four scipy calls are
-csd of v with r and with q, welch of v, and coherence of v with q. pyFRF gives both responses and both coherences; its segments
-are transformed once too, on every core there is; its window is symmetric, hence the small difference. Errors are relative to
-scipy's. "CPU" is the smallest processor time of many runs: on a machine that others use as well it spreads less than the clock.
+Ours gives all six spectra of v, r, q and from them both responses, their coherence and their
+covariance. The four scipy calls are csd of v with r and with q, welch of v, and coherence of v with
+q. pyFRF gives both responses and both coherences; its segments are transformed once too, on every
+core there is; its window is symmetric, hence the small difference. Errors are relative to scipy's.
+"CPU" is the smallest processor time of many runs: on a machine that others use as well it spreads
+less than the clock.
 """
 
 from __future__ import annotations
@@ -44,37 +47,66 @@ def record(samples: int) -> np.ndarray:
 def scipys(x: np.ndarray) -> tuple[np.ndarray, ...]:
     v, r, q = x.T
     options = {"fs": float(RATE), "nperseg": SEGMENT}
-    return (signal.csd(v, r, **options)[1], signal.csd(v, q, **options)[1], signal.welch(v, **options)[1],
-            signal.coherence(v, q, **options)[1])
+    return (
+        signal.csd(v, r, **options)[1],
+        signal.csd(v, q, **options)[1],
+        signal.welch(v, **options)[1],
+        signal.coherence(v, q, **options)[1],
+    )
 
 
 def compare(samples: int) -> list[str]:
     x = record(samples)
     found, (vr, vq, vv, coherence) = cross_spectra((x,), RATE, SEGMENT), scipys(x)
-    pairs = ((found.density[:, 0, 1], vr), (found.density[:, 0, 2], vq), (found.density[:, 0, 0], vv),
-             (found.coherence(0, 2), coherence))
+    pairs = (
+        (found.density[:, 0, 1], vr),
+        (found.density[:, 0, 2], vq),
+        (found.density[:, 0, 0], vv),
+        (found.coherence(0, 2), coherence),
+    )
     error_ours = max(np.abs(a - b).max() / np.abs(b).max() for a, b in pairs)
 
     def ours() -> object:
         return welch_responses((x,), RATE, SEGMENT)
 
     repeats = 25 if samples <= 100_000 else 9
-    lines = [row(f"four scipy calls, {samples:.0e} samples", race(ours, lambda: scipys(x), repeats), error_ours, 0.0)]
+    lines = [
+        row(
+            f"four scipy calls, {samples:.0e} samples",
+            race(ours, lambda: scipys(x), repeats),
+            error_ours,
+            0.0,
+        )
+    ]
     try:
         import pyFRF
     except ImportError:
         return [*lines, "pyFRF is not installed"]
 
     def theirs() -> tuple[np.ndarray, np.ndarray]:
-        made = pyFRF.FRF(RATE, exc=x.T[None, :1].copy(), resp=x.T[None, 1:].copy(), exc_type="f", resp_type="d", window="hann",
-                         fft_len=SEGMENT, nperseg=SEGMENT, noverlap=SEGMENT // 2, copy=False)
+        made = pyFRF.FRF(
+            RATE,
+            exc=x.T[None, :1].copy(),
+            resp=x.T[None, 1:].copy(),
+            exc_type="f",
+            resp_type="d",
+            window="hann",
+            fft_len=SEGMENT,
+            nperseg=SEGMENT,
+            noverlap=SEGMENT // 2,
+            copy=False,
+        )
         return made.get_H1(), made.get_coherence()
 
     response = vr[1:] / vv[1:]
     error = np.abs(theirs()[0][0, 0, 1:] - response).max() / np.abs(response).max()
     mine, scipy_cpu, pyfrf_cpu = _cpu(ours), _cpu(lambda: scipys(x)), _cpu(theirs)
-    return [*lines, row(f"pyFRF, {samples:.0e} samples", race(ours, theirs, repeats), error_ours, error),
-            f"  CPU: ours {1e3 * mine:.2f} ms, scipy ×{scipy_cpu / mine:.1f}, pyFRF ×{pyfrf_cpu / mine:.1f}"]
+    return [
+        *lines,
+        row(f"pyFRF, {samples:.0e} samples", race(ours, theirs, repeats), error_ours, error),
+        f"  CPU: ours {1e3 * mine:.2f} ms, scipy ×{scipy_cpu / mine:.1f}, pyFRF "
+        f"×{pyfrf_cpu / mine:.1f}",
+    ]
 
 
 def _cpu(work: Callable[[], object], repeats: int = 25) -> float:
@@ -100,11 +132,14 @@ def growth(counts: tuple[int, ...] = (40_000, 200_000, 1_000_000)) -> str:
             times[n].append((time.process_time() - start) / max(1, 400_000 // n))
     slope = np.polyfit(np.log(counts), np.log([np.median(times[n]) for n in counts]), 1)[0]
     return f"CPU grows with samples to the power {slope:.2f}: " + ", ".join(
-        f"{n:.0e} {1e9 * np.median(times[n]) / n:.0f} ns/sample" for n in counts)
+        f"{n:.0e} {1e9 * np.median(times[n]) / n:.0f} ns/sample" for n in counts
+    )
 
 
 def light_mode(seeds: int = 10) -> str:
-    """Error within the half-power band of a mode of 1 % damping, 60 s, 2 % noise; for Welch the best of five segments."""
+    """Error within the half-power band of a mode of 1 % damping, 60 s, 2 % noise; for Welch the
+    best of five segments.
+    """
     w = 2.0 * np.pi * 28.0
     up, down, _ = signal.cont2discrete(([w * w], [1.0, 0.02 * w, w * w]), T)
     shares, local, best = [], [], []
@@ -120,55 +155,108 @@ def light_mode(seeds: int = 10) -> str:
             return float(np.sqrt(np.mean(np.abs(response[near] / truth - 1.0) ** 2)))
 
         ours = local_polynomial((x,), RATE, np.arange(27.0, 29.0, 0.05), 0, (1,)).of(0)
-        theirs = [welch_responses((x,), RATE, size, 0, (1,)).of(0) for size in (2048, 4096, 8192, 16384, 28672)]
+        theirs = [
+            welch_responses((x,), RATE, size, 0, (1,)).of(0)
+            for size in (2048, 4096, 8192, 16384, 28672)
+        ]
         local.append(error(ours.frequency, ours.response))
         best.append(min(error(one.frequency, one.response) for one in theirs))
         shares.append(local[-1] / best[-1])
-    return (f"light mode, {seeds} seeds: error at the peak {100 * np.median(local):.1f} %, Welch's best segment "
-            f"{100 * np.median(best):.1f} %; ratio median {np.median(shares):.2f}, largest {max(shares):.2f}")
+    return (
+        f"light mode, {seeds} seeds: error at the peak {100 * np.median(local):.1f} %, Welch's "
+        "best segment "
+        f"{100 * np.median(best):.1f} %; ratio median {np.median(shares):.2f}, largest "
+        f"{max(shares):.2f}"
+    )
 
 
 def modes(plants: int) -> str:
-    """Base at 24-32 Hz, joint at 40-120 Hz, in a loop with disturbances and two stretches of 28 s; four modes each."""
-    found: dict[str, list[tuple[float, float, bool, bool]]] = {"random, local polynomial": [], "multisine": []}
+    """Fit base at 24-32 Hz and joint at 40-120 Hz in a loop with disturbances; four modes each."""
+    found: dict[str, list[tuple[float, float, bool, bool]]] = {
+        "random, local polynomial": [],
+        "multisine": [],
+    }
     extra, seconds = 0, 0.0
     for seed in range(plants):
         for way, rows in found.items():
             rng = np.random.default_rng(seed)
-            plant = Plant(((rng.uniform(24, 32), rng.uniform(0.02, 0.08), rng.uniform(0.05, 0.3)),
-                           (rng.uniform(40, 120), rng.uniform(0.01, 0.04), rng.uniform(0.3, 1.5))))
+            plant = Plant(
+                (
+                    (rng.uniform(24, 32), rng.uniform(0.02, 0.08), rng.uniform(0.05, 0.3)),
+                    (rng.uniform(40, 120), rng.uniform(0.01, 0.04), rng.uniform(0.3, 1.5)),
+                )
+            )
             spectrum = np.zeros(2001, dtype=complex)
             spectrum[4:1000] = np.exp(2j * np.pi * rng.random(996))
-            v = np.resize(np.fft.irfft(spectrum, 4000), 56_000) if way == "multisine" else rng.standard_normal(56_000)
+            v = (
+                np.resize(np.fft.irfft(spectrum, 4000), 56_000)
+                if way == "multisine"
+                else rng.standard_normal(56_000)
+            )
             drift = np.cumsum(rng.standard_normal(len(v)))
-            x = closed_loop_record(plant, 10.0 * v / v.std(), 3.0 * drift / drift.std() + 2.0 * rng.standard_normal(len(v)),
-                                   2e-6 * rng.standard_normal(len(v)), 400.0, 28.0)
+            x = closed_loop_record(
+                plant,
+                10.0 * v / v.std(),
+                3.0 * drift / drift.std() + 2.0 * rng.standard_normal(len(v)),
+                2e-6 * rng.standard_normal(len(v)),
+                400.0,
+                28.0,
+            )
             start = time.process_time()
             stretches = (x[:28_000], x[28_000:])
-            several = multisine_responses(stretches, RATE, 4000).noise if way == "multisine" else local_polynomial(
-                stretches, RATE, np.arange(2.0, 200.0, 0.25))
+            several = (
+                multisine_responses(stretches, RATE, 4000).noise
+                if way == "multisine"
+                else local_polynomial(stretches, RATE, np.arange(2.0, 200.0, 0.25))
+            )
             p = closed_loop(several).within(2.0, 200.0)
-            fitted = fit_rational(p.frequency, p.response, p.variance, integrators=2, hold=T, correlated=p.correlated,
-                                  freedom=p.freedom)
+            fitted = fit_rational(
+                p.frequency,
+                p.response,
+                p.variance,
+                integrators=2,
+                hold=T,
+                correlated=p.correlated,
+                freedom=p.freedom,
+            )
             seconds += time.process_time() - start
             extra += max(len(fitted.modes()) - 4, 0)
-            truth = [("antiresonance", *z) for z in plant.antiresonances()] + [("resonance", f, z) for f, z, _ in plant.modes]
+            truth = [("antiresonance", *z) for z in plant.antiresonances()] + [
+                ("resonance", f, z) for f, z, _ in plant.modes
+            ]
             for kind, hertz, damping in truth:
-                one = min((m for m in fitted.modes() if m.kind == kind), key=lambda m, f=hertz: abs(m.frequency.value - f))
+                one = min(
+                    (m for m in fitted.modes() if m.kind == kind),
+                    key=lambda m, f=hertz: abs(m.frequency.value - f),
+                )
                 f, z = one.frequency, one.damping
-                rows.append((abs(f.value / hertz - 1.0), abs(z.value / damping - 1.0), abs(f.value - hertz) < 1.96 * f.std,
-                             abs(z.value - damping) < 1.96 * z.std))
-    lines = [f"modes, {plants} plants, two excitations: {extra} that are not there, {seconds / plants / 2:.2f} s of CPU each"]
+                rows.append(
+                    (
+                        abs(f.value / hertz - 1.0),
+                        abs(z.value / damping - 1.0),
+                        abs(f.value - hertz) < 1.96 * f.std,
+                        abs(z.value - damping) < 1.96 * z.std,
+                    )
+                )
+    lines = [
+        f"modes, {plants} plants, two excitations: {extra} that are not there, "
+        f"{seconds / plants / 2:.2f} s of CPU each"
+    ]
     for way, rows in found.items():
         table = np.array(rows, dtype=np.float64)
         worst, inside = 100.0 * table[:, :2].max(axis=0), 100.0 * table[:, 2:].mean(axis=0)
-        lines.append(f"  {way}: frequency, largest error {worst[0]:.2f} %, inside 95 % bands {inside[0]:.0f} %; "
-                     f"damping, largest {worst[1]:.1f} %, inside {inside[1]:.0f} %")
+        lines.append(
+            f"  {way}: frequency, largest error {worst[0]:.2f} %, inside 95 % bands "
+            f"{inside[0]:.0f} %; "
+            f"damping, largest {worst[1]:.1f} %, inside {inside[1]:.0f} %"
+        )
     return "\n".join(lines)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--samples", type=int, nargs="+", default=[60_000, 600_000])
     parser.add_argument("--modes", type=int, default=24)
     given = parser.parse_args()

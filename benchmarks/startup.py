@@ -1,6 +1,7 @@
-"""Start `rrrid --help`, against the smallest program that typer can make: CPU seconds of a fresh process.
+"""Start `rrrid --help`, against the smallest program that typer can make: CPU seconds of a fresh
+process.
 
-    python -m benchmarks.startup
+python -m benchmarks.startup
 """
 
 from __future__ import annotations
@@ -34,15 +35,23 @@ def cpu_seconds(command: list[str]) -> float:
 
 
 def main(repeats: int = 15) -> None:
-    rrrid = shutil.which("rrrid", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
+    rrrid = shutil.which(
+        "rrrid", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    )
     if rrrid is None:
         sys.exit("rrrid is not installed in this environment: pip install -e .")
     with tempfile.TemporaryDirectory() as folder:
         script = Path(folder) / "peer.py"
         script.write_text(PEER)
-        runs = [(cpu_seconds([rrrid, "--help"]), cpu_seconds([sys.executable, str(script), "--help"])) for _ in range(repeats)]
+        runs = [
+            (cpu_seconds([rrrid, "--help"]), cpu_seconds([sys.executable, str(script), "--help"]))
+            for _ in range(repeats)
+        ]
     ours, peer = (statistics.median(side) for side in zip(*runs, strict=True))
-    print(f"rrrid --help {1e3 * ours:.0f} ms CPU, typer alone {1e3 * peer:.0f} ms, ratio {ours / peer:.2f}; goal ≤ 200 ms")
+    print(
+        f"rrrid --help {1e3 * ours:.0f} ms CPU, typer alone {1e3 * peer:.0f} ms, ratio "
+        f"{ours / peer:.2f}; goal ≤ 200 ms"
+    )
 
 
 if __name__ == "__main__":

@@ -32,8 +32,6 @@ from pipelines.io.robot import Joint, LinkParameters, RobotDescription, format_r
 from pipelines.model.row_fit import sample_motion
 from pipelines.quality.subject import Subject
 
-__all__ = ["KINDS", "Machine", "case", "draw", "main"]
-
 Array = npt.NDArray[np.float64]
 ODDS = 2.0 * BoundaryConfig().decisive  # power over noise, below which the odds do not decide
 DOWN = np.array([0.0, 0.0, -9.81])
@@ -88,7 +86,7 @@ class Machine:
 def _dh(
     family: str, rng: np.random.Generator
 ) -> tuple[list[tuple[float, float, float, str]], list[float]]:
-    """(a, alpha, d, type) of each joint, and the mean posture."""
+    """Draw (a, alpha, d, type) of each joint, and the mean posture."""
     h, u = np.pi / 2, rng.uniform
     if family == "rrr":
         return [
@@ -209,7 +207,7 @@ def draw(seed: int) -> Machine:
 
 
 def _link(a: float, d: float, mass: float, rng: np.random.Generator) -> LinkParameters:
-    """A body around the straight line between the link's joints, with its own eccentricity."""
+    """Draw a body around the straight line between the link's joints, with its own eccentricity."""
     length = float(np.hypot(a, d)) + 0.08
     com = np.array([-a * rng.uniform(0.2, 0.8), 0, 0]) + rng.normal(size=3) * 0.12 * length
     radii = length * rng.uniform(0.15, 0.45, 3)
@@ -302,7 +300,7 @@ def _pinocchio(robot: RobotDescription) -> Any:
 def inverse_dynamics(
     robot: RobotDescription, q: Array, dq: Array, ddq: Array, gravity: Array
 ) -> Array:
-    """(samples, n) torque by Pinocchio."""
+    """Return the torque (samples, n) [N m] by Pinocchio."""
     import pinocchio as pin
 
     model = _pinocchio(robot)
@@ -392,7 +390,7 @@ def _turned(kind: str, rng: np.random.Generator) -> Array:
 def _faulty(
     tau: Array, q: Array, machine: Machine, fault: str, rng: np.random.Generator
 ) -> tuple[Array, Array]:
-    """What a fault of the bench does to torque and encoder."""
+    """Return torque and position with a fault of the bench in them."""
     n = tau.shape[1]
     j = int(rng.integers(n))
     size = np.std(tau, axis=0)
@@ -492,8 +490,8 @@ class Identifiable:
         return np.asarray(self.free[0] + np.tensordot(gravity, self.free[1:], 1))
 
     def explained(self, true: Array, other: Array) -> bool:
-        """Return whether other links under `other` explain the torque under `true` so well that its noise
-        leaves odds below those that decide.
+        """Return whether other links under `other` explain the torque under `true` so well that its
+        noise leaves odds below those that decide.
         """
         return self.leaves(other, self.columns(true) @ self.links) < ODDS
 
@@ -505,8 +503,8 @@ class Identifiable:
         return float(left @ left)
 
     def direction(self, true: Array) -> bool:
-        """Return whether the direction is determined: rank of the torque's change with it, and no other
-        direction of gravity explains the torque.
+        """Return whether the direction is determined: rank of the torque's change with it, and no
+        other direction of gravity explains the torque.
         """
         along = true / np.linalg.norm(true)
         across = np.linalg.svd(along[None])[2][1:]
@@ -555,7 +553,9 @@ def _exchangeable(machine: Machine, gravity: Array) -> bool:
 
 
 def _dissipated(machine: Machine, log: ExperimentLog, rigid: Array, friction: Array) -> list[float]:
-    """<friction · speed> / (rms torque · rms speed) of each joint, at the moments that are fitted."""
+    """<friction · speed> / (rms torque · rms speed) of each joint, at the moments that are
+    fitted.
+    """
     motion = sample_motion(Subject(log).good)
     if motion is None:
         return [float("nan")] * rigid.shape[1]

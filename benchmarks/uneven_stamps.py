@@ -28,8 +28,6 @@ from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Inputs
 from tests.model.rigid.serial_arms import Arm, by_hand, physical_links, pin, table
 
-__all__ = ["CASES", "Drawn", "draw", "estimated", "main", "scores"]
-
 Array = npt.NDArray[np.float64]
 
 CASES = ("even", "a", "b", "c")
@@ -73,16 +71,33 @@ def draw(seed: int) -> Drawn:
     """Draw an arm and its log."""
     rng = np.random.default_rng([seed, 51])
     n = int(rng.integers(2, 7))
-    rows = [("revolute", float(rng.choice(_ANGLES)), float(rng.uniform(0.0, 0.4)),
-             float(rng.uniform(0.0, 0.3)), float(rng.uniform(-0.5, 0.5))) for _ in range(n)]
+    rows = [
+        (
+            "revolute",
+            float(rng.choice(_ANGLES)),
+            float(rng.uniform(0.0, 0.4)),
+            float(rng.uniform(0.0, 0.3)),
+            float(rng.uniform(-0.5, 0.5)),
+        )
+        for _ in range(n)
+    ]
     arm = by_hand(table(f"drawn{seed}", "dh", rows))
     links = physical_links(n, rng)
     arm.load(links)
     k = 2.0 * np.pi * rng.uniform(0.15, 0.3) * np.arange(1, 8)
     a, b = rng.standard_normal((2, len(k), n)) / k[:, None]
-    one = Drawn(arm, links, rng.uniform(0.3, 2.0, n), rng.uniform(0.1, 1.0, n), (k, a, b),
-                1.0 / float(rng.choice([200, 400, 1000])), float(rng.choice([1e-5, 5e-5, 2e-4])),
-                np.ones(n), float(rng.uniform(0.05, 0.18)), bool(rng.random() < 0.5))
+    one = Drawn(
+        arm,
+        links,
+        rng.uniform(0.3, 2.0, n),
+        rng.uniform(0.1, 1.0, n),
+        (k, a, b),
+        1.0 / float(rng.choice([200, 400, 1000])),
+        float(rng.choice([1e-5, 5e-5, 2e-4])),
+        np.ones(n),
+        float(rng.uniform(0.05, 0.18)),
+        bool(rng.random() < 0.5),
+    )
     t = np.arange(0.0, _DURATION, 5e-3)
     scale = rng.uniform(1.0, 2.5) / np.abs(one.motion(t)[1]).max(axis=0)
     one = replace(one, sines=(k, a * scale, b * scale))
@@ -105,12 +120,22 @@ def recorded(one: Drawn, case: str, seed: int) -> ExperimentLog:
         tau = one.torque(taken)
     q = one.encoder * np.rint(one.motion(taken)[0] / one.encoder)
     tau = tau + one.noise * rng.standard_normal(tau.shape)
-    signals = {"t": Signal(stamps, "s", "time"), "q": Signal(q, "rad", "measured joint position"),
-               "tau": Signal(tau, "N m", "joint torque")}
+    signals = {
+        "t": Signal(stamps, "s", "time"),
+        "q": Signal(q, "rad", "measured joint position"),
+        "tau": Signal(tau, "N m", "joint torque"),
+    }
     return ExperimentLog(
-        name=f"{case}-{seed}", experiment="excitation", role="identify", origin="measured",
-        torque="commanded" if one.held else "measured", robot_name=one.arm.robot.name,
-        sample_time=one.step, robot_text=format_robot(one.arm.robot), signals=signals)
+        name=f"{case}-{seed}",
+        experiment="excitation",
+        role="identify",
+        origin="measured",
+        torque="commanded" if one.held else "measured",
+        robot_name=one.arm.robot.name,
+        sample_time=one.step,
+        robot_text=format_robot(one.arm.robot),
+        signals=signals,
+    )
 
 
 def estimated(one: Drawn, case: str, seed: int) -> Result:
@@ -130,8 +155,10 @@ def scores(one: Drawn, found: Result) -> tuple[Array, Array]:
         known[f"viscous:{j + 1}:coefficient"] = float(one.viscous[j])
         known[f"torque_offset:{j + 1}:offset"] = 0.0
     seen = [p for p in found.parameters if p.value is not None and p.std is not None]
-    value, std, truth = (np.array(x, dtype=np.float64) for x in
-                         ([p.value for p in seen], [p.std for p in seen], [known[p.name] for p in seen]))
+    value, std, truth = (
+        np.array(x, dtype=np.float64)
+        for x in ([p.value for p in seen], [p.std for p in seen], [known[p.name] for p in seen])
+    )
     every = [np.nan if p.std is None else p.std for p in found.parameters]
     return (value - truth) / std, np.array(every, dtype=np.float64)
 
@@ -147,15 +174,21 @@ def main(seed: int, count: int) -> None:
             own, std[case] = scores(one, found)
             z[case] += own.tolist()
             ratio[case].append(float(np.nanmedian(std[case] / std["even"])))
-        print(f"arm {k}: {one.arm.n} joints, {1 / one.step:.0f} Hz, jitter {one.jitter:.2f},",
-              "std over even", {case: round(ratio[case][-1], 3) for case in CASES[1:]}, flush=True)
+        print(
+            f"arm {k}: {one.arm.n} joints, {1 / one.step:.0f} Hz, jitter {one.jitter:.2f},",
+            "std over even",
+            {case: round(ratio[case][-1], 3) for case in CASES[1:]},
+            flush=True,
+        )
     for case in CASES:
         inside, total = int(np.sum(np.abs(z[case]) <= 2.0)), len(z[case])
         low, high = wilson(inside, total)
         rms = np.sqrt(np.mean(np.square(z[case])))
-        print(f"{case:5} std over even: mean {np.mean(ratio[case]):.3f}, "
-              f"largest {np.max(ratio[case]):.3f}; within 2 std {100 * inside / total:.1f} % of "
-              f"{total} [{100 * low:.1f}, {100 * high:.1f}], rms z {rms:.2f}")
+        print(
+            f"{case:5} std over even: mean {np.mean(ratio[case]):.3f}, "
+            f"largest {np.max(ratio[case]):.3f}; within 2 std {100 * inside / total:.1f} % of "
+            f"{total} [{100 * low:.1f}, {100 * high:.1f}], rms z {rms:.2f}"
+        )
 
 
 if __name__ == "__main__":

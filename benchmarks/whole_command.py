@@ -1,15 +1,19 @@
-"""`rrrid estimate-bps` on one log of 10 s, beside the script one would write: CPU seconds of fresh processes, in turn.
+"""`rrrid estimate-bps` on one log of 10 s, beside the script one would write: CPU seconds of fresh
+processes, in turn.
 
     python -m benchmarks.whole_command [--repeats 7]
 
-Goals (performance.md): a ratio of 3.5 at least, 750 ms at most; the report is left out. The script reads the log with h5py,
-reconstructs each joint with a filterpy loop, builds Pinocchio's regressor sample by sample, low-passes torque and columns
-alike with scipy and solves with np.linalg.lstsq. It prints base parameters, while the command also holds blocks out, gives
-standard deviations, checks links and the balance of power, and writes a model and a derived log.
+Goals (performance.md): a ratio of 3.5 at least, 750 ms at most; the report is left out. The script
+reads the log with h5py, reconstructs each joint with a filterpy loop, builds Pinocchio's regressor
+sample by sample, low-passes torque and columns alike with scipy and solves with np.linalg.lstsq. It
+prints base parameters, while the command also holds blocks out, gives standard deviations, checks
+links and the balance of power, and writes a model and a derived log.
 
-Two scripts run: with filterpy's observer, and with its RTS smoother, which is what the command does by default.
+Two scripts run: with filterpy's observer, and with its RTS smoother, which is what the command does
+by default.
 
-The answers are compared by the torque they predict for the validation log: the errors are of it, relative.
+The answers are compared by the torque they predict for the validation log: the errors are of it,
+relative.
 """
 
 from __future__ import annotations
@@ -27,13 +31,14 @@ from pathlib import Path
 
 SAMPLES = Path(__file__).resolve().parents[1] / "sample_logs/rrr-closed-form"
 
-PEER = '''
+PEER = """
 import json, sys
 import h5py, numpy as np, pinocchio as pin
 from filterpy.kalman import KalmanFilter
 from scipy.signal import butter, sosfiltfilt
 
-log, cutoff, every, out, method = sys.argv[1], float(sys.argv[2]), int(sys.argv[3]), sys.argv[4], sys.argv[5]
+log, cutoff, every, out, method = sys.argv[1:]
+cutoff, every = float(cutoff), int(every)
 with h5py.File(log) as file:
     q, tau = file["signals/q"][:], file["signals/tau"][:]
 T, n, t = 1e-3, q.shape[1], np.arange(len(q))
@@ -60,7 +65,8 @@ for j, (a, alpha, d) in enumerate([(0.0, np.pi / 2, 0.56), (0.2, 0.0, 0.169), (0
     model.appendBodyToJoint(parent, pin.Inertia.Zero(), pin.SE3.Identity())
     place = pin.SE3(pin.utils.rotate("x", alpha), np.array([a, 0.0, d]))
 data = model.createData()
-Y = np.array([pin.computeJointTorqueRegressor(model, data, q[k], dq[k], ddq[k]) for k in range(len(t))])
+regressor = pin.computeJointTorqueRegressor
+Y = np.array([regressor(model, data, q[k], dq[k], ddq[k]) for k in range(len(t))])
 zero = np.zeros((len(t), n, n))
 diagonal = np.arange(n)
 coulomb, viscous, offset = zero.copy(), zero.copy(), zero.copy()
@@ -74,14 +80,16 @@ sos = butter(4, cutoff, fs=1 / T, output="sos")
 A = sosfiltfilt(sos, Y, axis=0)[200:-200:every].reshape(-1, Y.shape[2])
 y = sosfiltfilt(sos, centred, axis=0)[200:-200:every].reshape(-1)
 json.dump(np.linalg.lstsq(A, y, rcond=1e-8)[0].tolist(), open(out, "w"))
-'''
+"""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=7)
     repeats = parser.parse_args().repeats
-    rrrid = shutil.which("rrrid", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}")
+    rrrid = shutil.which(
+        "rrrid", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ.get('PATH', '')}"
+    )
     if rrrid is None:
         sys.exit("rrrid is not installed in this environment: pip install -e .")
     with tempfile.TemporaryDirectory() as folder:
@@ -94,28 +102,47 @@ def main() -> None:
         script.write_text(PEER)
         ours = [rrrid, "estimate-bps", log, "--no-report", "--quiet", "--out", str(here / "out")]
         cpu_seconds(ours)
-        peers = {method: [sys.executable, str(script), log, *_conditioning(here / "out"), str(here / f"{method}.json"), method]
-                 for method in ("observer", "smoother")}
+        peers = {
+            method: [
+                sys.executable,
+                str(script),
+                log,
+                *_conditioning(here / "out"),
+                str(here / f"{method}.json"),
+                method,
+            ]
+            for method in ("observer", "smoother")
+        }
         for peer in peers.values():
             cpu_seconds(peer)
-        runs = [(cpu_seconds(ours), *(cpu_seconds(peer) for peer in peers.values())) for _ in range(repeats)]
+        runs = [
+            (cpu_seconds(ours), *(cpu_seconds(peer) for peer in peers.values()))
+            for _ in range(repeats)
+        ]
         mine, *theirs = (1e3 * statistics.median(side) for side in zip(*runs, strict=True))
         errors = _errors(here, list(peers))
-    print(f"rrrid estimate-bps: {mine:.0f} ms CPU, error {errors[0]:.1e}; goals: 750 ms at most, 3.5 times less than a script")
+    print(
+        f"rrrid estimate-bps: {mine:.0f} ms CPU, error {errors[0]:.1e}; goals: 750 ms at most, 3.5 "
+        "times less than a script"
+    )
     for k, method in enumerate(peers):
         ratios = sorted(run[k + 1] / run[0] for run in runs)
-        print(f"script with filterpy's {method}: {theirs[k]:.0f} ms, error {errors[k + 1]:.1e}, "
-              f"ratio {statistics.median(ratios):.1f} ({ratios[0]:.1f}-{ratios[-1]:.1f})")
+        print(
+            f"script with filterpy's {method}: {theirs[k]:.0f} ms, error {errors[k + 1]:.1e}, "
+            f"ratio {statistics.median(ratios):.1f} ({ratios[0]:.1f}-{ratios[-1]:.1f})"
+        )
 
 
 def _conditioning(out: Path) -> tuple[str, str]:
-    """The cut-off that the command chose [Hz], and every how many samples it kept."""
+    """Return the cut-off that the command chose [Hz], and every how many samples it kept."""
     result = json.loads((out / "result.json").read_text())
     return str(result["filter_hz"]), str(int(1e3 / (4 * result["filter_hz"])))
 
 
 def _errors(folder: Path, methods: list[str]) -> list[float]:
-    """‖Y β - τ‖ / ‖τ‖ of the rigid torque along another motion, known exactly: ours, then the scripts'."""
+    """‖Y β - τ‖ / ‖τ‖ of the rigid torque along another motion, known exactly: ours, then the
+    scripts'.
+    """
     import numpy as np
     import pinocchio as pin
 
@@ -126,17 +153,25 @@ def _errors(folder: Path, methods: list[str]) -> list[float]:
 
     truth = synthetic_arm()
     rng = np.random.default_rng([22, 2])
-    motion = within_limits(from_rest(rng, np.array([0.0, -np.pi / 2, 1.0]), 0.1, np.ones(3)), truth)(np.arange(0.0, 10.0, 0.02))
+    motion = within_limits(
+        from_rest(rng, np.array([0.0, -np.pi / 2, 1.0]), 0.1, np.ones(3)), truth
+    )(np.arange(0.0, 10.0, 0.02))
     tau = truth.body.torque(motion.q, motion.dq, motion.ddq, truth.p)
     ours = Arm.from_model(read_model(folder / "out/model.json"))
     scope: dict[str, object] = {"np": np, "pin": pin}
-    building = PEER[PEER.index("model, parent"):PEER.index("Y = np.array")]
+    building = PEER[PEER.index("model, parent") : PEER.index("Y = np.array")]
     exec(building, scope)
     found = [ours.body.torque(motion.q, motion.dq, motion.ddq, ours.p)]
     for method in methods:
         beta = np.array(json.loads((folder / f"{method}.json").read_text()))[:30]
-        found.append(np.array([pin.computeJointTorqueRegressor(scope["model"], scope["data"], *state) @ beta
-                               for state in zip(motion.q, motion.dq, motion.ddq, strict=True)]))
+        found.append(
+            np.array(
+                [
+                    pin.computeJointTorqueRegressor(scope["model"], scope["data"], *state) @ beta
+                    for state in zip(motion.q, motion.dq, motion.ddq, strict=True)
+                ]
+            )
+        )
     return [float(np.linalg.norm(torque - tau) / np.linalg.norm(tau)) for torque in found]
 
 

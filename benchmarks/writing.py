@@ -1,14 +1,17 @@
-"""The closed-form inverse kinematics along the writing task beside iterative ones. Goal: ×20 at ≤ 1e-10 rad (issue of the task).
+"""The closed-form inverse kinematics along the writing task beside iterative ones. Goal: ×20 at ≤
+1e-10 rad (issue of the task).
 
     python -m benchmarks.writing [--text "RRRID 2004"] [--toolbox]
 
-Ours is all four branches of eq. (A3) for all samples of the task at 1 kHz at once, and the branch that is followed; then the same
-with exact joint speeds and accelerations. Theirs is Newton's method on Pinocchio's Jacobian, each sample started from the one
-before, down to 1e-12 m, the best case of an iterative method; --toolbox adds the Robotics Toolbox (Levenberg-Marquardt in C++),
-which the paper compared with, if installed. The last row is the general numerical inverse, used where an arm has no closed form.
+Ours is all four branches of eq. (A3) for all samples of the task at 1 kHz at once, and the branch
+that is followed; then the same with exact joint speeds and accelerations. Theirs is Newton's method
+on Pinocchio's Jacobian, each sample started from the one before, down to 1e-12 m, the best case of
+an iterative method; --toolbox adds the Robotics Toolbox (Levenberg-Marquardt in C++), which the
+paper compared with, if installed. The last row is the general numerical inverse, used where an arm
+has no closed form.
 
-Errors are distances from the wanted tip [m], by forward kinematics (A2) in extended precision; `apart` is the largest difference
-of a joint's angle between the two ways.
+Errors are distances from the wanted tip [m], by forward kinematics (A2) in extended precision;
+`apart` is the largest difference of a joint's angle between the two ways.
 """
 
 from __future__ import annotations
@@ -32,9 +35,11 @@ _TOOLBOX_SAMPLES = 1000  # it takes about as long for one sample as the closed f
 
 
 def newton(model: Any, tips: np.ndarray, start: np.ndarray, behind: Any) -> np.ndarray:
-    """The loop one writes with Pinocchio."""
+    """Solve by the loop one writes with Pinocchio."""
     model = model.copy()
-    frame = model.addFrame(pin.Frame("the tip", model.njoints - 1, 0, behind, pin.FrameType.OP_FRAME))
+    frame = model.addFrame(
+        pin.Frame("the tip", model.njoints - 1, 0, behind, pin.FrameType.OP_FRAME)
+    )
     data, q = model.createData(), start.copy()
     found = np.empty((len(tips), model.nq))
     for k, wanted in enumerate(tips):
@@ -43,7 +48,9 @@ def newton(model: Any, tips: np.ndarray, start: np.ndarray, behind: Any) -> np.n
             missed = wanted - data.oMf[frame].translation
             if missed @ missed < 1e-24:
                 break
-            q = q + np.linalg.solve(pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)[:3], missed)
+            q = q + np.linalg.solve(
+                pin.computeFrameJacobian(model, data, q, frame, pin.LOCAL_WORLD_ALIGNED)[:3], missed
+            )
         found[k] = q
     return found
 
@@ -53,16 +60,24 @@ def missed(geometry: Geometry, q: np.ndarray, tips: np.ndarray) -> float:
 
 
 def toolbox(tips: np.ndarray, q: np.ndarray) -> Callable[[], np.ndarray]:
-    """The Robotics Toolbox on the same arm, each sample from the one before."""
+    """Return the Robotics Toolbox on the same arm, each sample from the one before."""
     import roboticstoolbox as rtb
     from spatialmath import SE3
 
-    arm = rtb.DHRobot([rtb.RevoluteDH(d=0.56, alpha=np.pi / 2), rtb.RevoluteDH(d=0.169, a=0.2), rtb.RevoluteDH(d=0.09, a=0.415)])
+    arm = rtb.DHRobot(
+        [
+            rtb.RevoluteDH(d=0.56, alpha=np.pi / 2),
+            rtb.RevoluteDH(d=0.169, a=0.2),
+            rtb.RevoluteDH(d=0.09, a=0.415),
+        ]
+    )
 
     def run() -> np.ndarray:
         found, at = np.empty_like(q), q[0]
         for k, wanted in enumerate(tips):
-            answer = arm.ikine_LM(SE3(wanted), q0=at, mask=[1, 1, 1, 0, 0, 0], tol=1e-24)  # half the squared distance
+            answer = arm.ikine_LM(
+                SE3(wanted), q0=at, mask=[1, 1, 1, 0, 0, 0], tol=1e-24
+            )  # half the squared distance
             found[k] = at = answer.q
         return found
 
@@ -70,7 +85,9 @@ def toolbox(tips: np.ndarray, q: np.ndarray) -> Callable[[], np.ndarray]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--text", default="RRRID 2004")
     parser.add_argument("--toolbox", action="store_true")
     arguments = parser.parse_args()
@@ -98,10 +115,22 @@ def main() -> None:
     def theirs() -> np.ndarray:
         return newton(model, tips, q[0], behind)
 
-    def line(name: str, ours: Callable[[], object], mine: np.ndarray, peer: Callable[[], np.ndarray], other: np.ndarray) -> str:
-        errors = missed(geometry, mine, tips[:len(mine)]), missed(geometry, other, tips[:len(other)])
+    def line(
+        name: str,
+        ours: Callable[[], object],
+        mine: np.ndarray,
+        peer: Callable[[], np.ndarray],
+        other: np.ndarray,
+    ) -> str:
+        errors = (
+            missed(geometry, mine, tips[: len(mine)]),
+            missed(geometry, other, tips[: len(other)]),
+        )
         few = min(len(mine), len(other))
-        return f"{row(name, race(ours, peer, 5), *errors)}   apart {np.abs(mine[:few] - other[:few]).max():.1e} rad"
+        return (
+            f"{row(name, race(ours, peer, 5), *errors)}   apart "
+            f"{np.abs(mine[:few] - other[:few]).max():.1e} rad"
+        )
 
     print(f"'{arguments.text}', {len(t)} samples, {task.duration:.1f} s\n{HEADER}")
     iterated = theirs()
@@ -114,7 +143,15 @@ def main() -> None:
         few = tips[:_TOOLBOX_SAMPLES]
         run = toolbox(few, q[:_TOOLBOX_SAMPLES])
         few_q = q[:_TOOLBOX_SAMPLES]
-        print(line(f"{len(few)} samples, Robotics Toolbox", lambda: inverse(geometry, few), few_q, run, run()))
+        print(
+            line(
+                f"{len(few)} samples, Robotics Toolbox",
+                lambda: inverse(geometry, few),
+                few_q,
+                run,
+                run(),
+            )
+        )
 
 
 if __name__ == "__main__":

@@ -1,11 +1,14 @@
-"""The writing task on the virtual test bench: does a model of excitation logs hold there, and how much does it help?
+"""The writing task on the virtual test bench: does a model of excitation logs hold there, and how
+much does it help?
 
     python -m benchmarks.writing_cases [--machines 3] [--text RRRID] [--stiffness 1.1]
 
-Machines with friction of three sigmoids and the nuisances of healthy arms (MuJoCo). The model is fitted to excitation logs alone.
-Goals (issue of the task): the torque of the writing log is missed by at most 1.3 times what the true parameters miss; PD alone
-errs about as the paper's arm (1.1, 1.7, 4.6 mm, within a factor 2); with the whole model ahead the tip errs least of the six cases
-in x, y and z, by at most 1.5 times what the true parameters leave, and at least 3.2, 6.9, 4.3 times less than under PD alone.
+Machines with friction of three sigmoids and the nuisances of healthy arms (MuJoCo). The model is
+fitted to excitation logs alone. Goals (issue of the task): the torque of the writing log is missed
+by at most 1.3 times what the true parameters miss; PD alone errs about as the paper's arm (1.1,
+1.7, 4.6 mm, within a factor 2); with the whole model ahead the tip errs least of the six cases in
+x, y and z, by at most 1.5 times what the true parameters leave, and at least 3.2, 6.9, 4.3 times
+less than under PD alone.
 """
 
 from __future__ import annotations
@@ -42,7 +45,9 @@ class Outcome:
 
     torque_error: Array  # relative, of the fitted model, on the PD log
     torque_error_true: Array  # of the true parameters
-    cases: Array  # [m] (6, 3) standard deviation of the tip's error, controllers on the fitted model
+    cases: (
+        Array  # [m] (6, 3) standard deviation of the tip's error, controllers on the fitted model
+    )
     true_case: Array  # [m] (3,) case 6 on the true parameters
 
     @property
@@ -51,13 +56,20 @@ class Outcome:
 
 
 def true_arm(machine: Machine) -> Arm:
-    """The arm with the machine's own links and friction."""
-    robot = replace(machine.described, joints=tuple(replace(told, link=joint.link) for told, joint in
-                                                    zip(machine.described.joints, machine.robot.joints, strict=True)))
+    """Return the arm with the machine's own links and friction."""
+    robot = replace(
+        machine.described,
+        joints=tuple(
+            replace(told, link=joint.link)
+            for told, joint in zip(machine.described.joints, machine.robot.joints, strict=True)
+        ),
+    )
     return arm_of(robot, machine.friction, "true")  # type: ignore[arg-type]
 
 
-def identify(machine: Machine, seed: int, seconds: float = 10.0, periods: int = 2, count: int = 2) -> list[ExperimentLog]:
+def identify(
+    machine: Machine, seed: int, seconds: float = 10.0, periods: int = 2, count: int = 2
+) -> list[ExperimentLog]:
     """Excitation logs of a machine."""
     plans = [experiments.excitation(machine, 10 * seed + k, seconds, periods) for k in range(count)]
     return record(machine, (), plans, seed)
@@ -69,8 +81,13 @@ def missed(log: ExperimentLog, arm: Arm) -> Array:
     return first_validation(log, motion, arm, torques(arm, log, motion), None, False).relative_error
 
 
-def campaign(seed: int, text: str = "RRRID", stiffness: float = 1.1, logs: Sequence[ExperimentLog] | None = None,
-             cases: Sequence[int] = range(1, 7)) -> Outcome:
+def campaign(
+    seed: int,
+    text: str = "RRRID",
+    stiffness: float = 1.1,
+    logs: Sequence[ExperimentLog] | None = None,
+    cases: Sequence[int] = range(1, 7),
+) -> Outcome:
     """One machine: fitted, then writing in `cases`."""
     machine = draw_machine(seed)
     fitted = fitted_in_folder(identify(machine, seed) if logs is None else logs)
@@ -79,8 +96,17 @@ def campaign(seed: int, text: str = "RRRID", stiffness: float = 1.1, logs: Seque
     reference = Reference(motion.t, motion.q, motion.dq, motion.ddq)
     true = true_arm(machine)
     plans = experiments.writing(reference, controller_model(fitted), stiffness)
-    written = dict(zip(cases, record(machine, (), [plans[case - 1] for case in cases], 100 + seed), strict=True))
-    (best,) = record(machine, (), experiments.writing(reference, controller_model(true), stiffness)[5:], 100 + seed)
+    written = dict(
+        zip(
+            cases, record(machine, (), [plans[case - 1] for case in cases], 100 + seed), strict=True
+        )
+    )
+    (best,) = record(
+        machine,
+        (),
+        experiments.writing(reference, controller_model(true), stiffness)[5:],
+        100 + seed,
+    )
     errors = np.full((6, 3), np.nan)
     for case, log in written.items():
         errors[case - 1] = strayed(log)
@@ -93,7 +119,9 @@ def strayed(log: ExperimentLog) -> Array:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--machines", type=int, default=3)
     parser.add_argument("--text", default="RRRID")
     parser.add_argument("--stiffness", type=float, default=1.1)
@@ -104,13 +132,22 @@ def main() -> None:
 
     for seed in range(1, arguments.machines + 1):
         found = campaign(seed, arguments.text, arguments.stiffness)
-        print(f"machine {seed}: torque missed [%]  fitted {row(100 * found.torque_error)}   true "
-              f"{row(100 * found.torque_error_true)}   ratio {row(found.torque_error / found.torque_error_true)}  (goal 1.3)")
+        print(
+            f"machine {seed}: torque missed [%]  fitted {row(100 * found.torque_error)}   true "
+            f"{row(100 * found.torque_error_true)}   ratio "
+            f"{row(found.torque_error / found.torque_error_true)}  (goal 1.3)"
+        )
         for case, errors in enumerate(found.cases, start=1):
             print(f"   case {case} [mm]  {row(1e3 * errors, 3)}")
-        print(f"   case 6 true  {row(1e3 * found.true_case, 3)}   fitted/true {row(found.cases[5] / found.true_case)}  (goal 1.5)")
-        print(f"   case 1/paper {row(1e3 * found.cases[0] / np.array(PAPER_MM))}  (goal 0.5 to 2)   "
-              f"case 1/case 6 {row(found.ratios)}  (goal {row(np.array(PAPER_RATIOS), 1)})", flush=True)
+        print(
+            f"   case 6 true  {row(1e3 * found.true_case, 3)}   fitted/true "
+            f"{row(found.cases[5] / found.true_case)}  (goal 1.5)"
+        )
+        print(
+            f"   case 1/paper {row(1e3 * found.cases[0] / np.array(PAPER_MM))}  (goal 0.5 to 2)   "
+            f"case 1/case 6 {row(found.ratios)}  (goal {row(np.array(PAPER_RATIOS), 1)})",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

@@ -1,9 +1,11 @@
-"""What is hidden in each case of the campaign, before anything is recorded: plain data, the same for the same seed.
+"""What is hidden in each case of the campaign, before anything is recorded: plain data, the same
+for the same seed.
 
-    campaign(seed)                     every family, shuffled, so that any part of it is a fair sample
-    campaign(seed, ("single",))        one family
+    campaign(seed)                every family, shuffled, so that any part is a fair sample
+    campaign(seed, ("single",))   one family
 
-A case is known by `SealedCase.key`, a digest of all that is in it: no name of a folder tells a cause.
+A case is known by `SealedCase.key`, a digest of all that is in it: no name of a folder tells a
+cause.
 """
 
 from __future__ import annotations
@@ -19,15 +21,22 @@ import numpy as np
 from bench.faults import fault_names, find_fault
 from benchmarks.hidden_effects.robots import ROBOTS
 
-__all__ = ["COMPLIANT", "EASY", "FAMILIES", "OUTSIDE", "STRENGTHS", "Hidden", "SealedCase", "campaign", "in_part"]
-
 STRENGTHS = (1.0, 0.3, 0.1)  # times the figures of causes.md
 MACHINES = 6
 JOINTS = (1, 2, 3)
-COMPLIANT = ("joint_elasticity", "base_resonance", "backlash", "torque_saturation")  # a row of their own in the table
+COMPLIANT = (
+    "joint_elasticity",
+    "base_resonance",
+    "backlash",
+    "torque_saturation",
+)  # a row of their own in the table
 OUTSIDE = tuple(name for name in fault_names() if not find_fault(name).known)
-EASY = tuple(name for name in fault_names() if find_fault(name).known and name not in (*COMPLIANT, "payload"))
-_ABSORBED = {"rotor_inertia": (1, 2)}  # joints of the RRR arm at which a base parameter takes it in (causes.md)
+EASY = tuple(
+    name for name in fault_names() if find_fault(name).known and name not in (*COMPLIANT, "payload")
+)
+_ABSORBED = {
+    "rotor_inertia": (1, 2)
+}  # joints of the RRR arm at which a base parameter takes it in (causes.md)
 _SESSIONS = ("mixed", "periodic", "friction", "long")
 
 
@@ -58,16 +67,24 @@ class SealedCase:
     held: bool = True  # the log says that torque was held over each sample, as it was
     robot: str = "rrr"  # see robots.py
     before: str = ""  # which experiments the reference logs are of, where they are other ones
-    loop: str = ""  # "backward-difference": of the speed; "delayed": torque; else on the observer, a quarter with feed-forward
+    loop: str = ""
+    """"backward-difference" of the speed, "delayed" torque; else on the observer, a quarter with
+    feed-forward."""
 
     @property
     def key(self) -> str:
         """Ten hexadecimal digits: a digest of all that is not as usual."""
-        unusual = [(field.name, getattr(self, field.name)) for field in fields(self) if getattr(self, field.name) != field.default]
+        unusual = [
+            (field.name, getattr(self, field.name))
+            for field in fields(self)
+            if getattr(self, field.name) != field.default
+        ]
         return hashlib.blake2b(repr(unusual).encode(), digest_size=5).hexdigest()
 
 
-def campaign(seed: int = 0, families: Iterable[str] = (), short: bool = False) -> tuple[SealedCase, ...]:
+def campaign(
+    seed: int = 0, families: Iterable[str] = (), short: bool = False
+) -> tuple[SealedCase, ...]:
     """All cases of these families (none: all), shuffled.
 
     Args:
@@ -83,13 +100,17 @@ def campaign(seed: int = 0, families: Iterable[str] = (), short: bool = False) -
 
 
 def in_part(key: str, part: str) -> bool:
-    """Whether the case of this key belongs to part "i/N": the same one in making and in judging, whatever there is already."""
+    """Whether the case of this key belongs to part "i/N": the same one in making and in judging,
+    whatever there is already.
+    """
     which, parts = (int(number) for number in part.split("/"))
     return int(key, 16) % parts == which - 1
 
 
 def single(seed: int) -> Iterator[SealedCase]:
-    """Every cause that torque and position tell, once at every joint where they do, at every strength."""
+    """Every cause that torque and position tell, once at every joint where they do, at every
+    strength.
+    """
     seen: set[tuple[float, str, int]] = set()
     for place, (strength, (cause, joint)) in enumerate(product(STRENGTHS, _places(EASY))):
         if joint is not None:
@@ -100,7 +121,7 @@ def single(seed: int) -> Iterator[SealedCase]:
 
 
 def compliance(seed: int) -> Iterator[SealedCase]:
-    """The four that torque and position alone do not tell apart."""
+    """Yield the four that torque and position alone do not distinguish."""
     for place, (strength, (cause, joint)) in enumerate(product(STRENGTHS, _places(COMPLIANT))):
         yield _case("compliance", seed, place, [(cause, joint, strength)], frf=True)
 
@@ -119,16 +140,20 @@ def outside(seed: int) -> Iterator[SealedCase]:
 
 
 def invisible(seed: int) -> Iterator[SealedCase]:
-    """What base parameters absorb within one session: a payload, a rotor, one scale of all torques."""
+    """Yield what base parameters absorb within one session: payload, rotor, a scale of all
+    torques.
+    """
     for place, strength in enumerate((*STRENGTHS, *STRENGTHS)):
         yield _case("invisible", seed, 4 * place, [("payload", None, strength)])
         for joint in _ABSORBED["rotor_inertia"]:
             yield _case("invisible", seed, 4 * place + joint, [("rotor_inertia", joint, strength)])
-        yield _case("invisible", seed, 4 * place + 3, [("torque_gain", joint, strength) for joint in JOINTS])
+        yield _case(
+            "invisible", seed, 4 * place + 3, [("torque_gain", joint, strength) for joint in JOINTS]
+        )
 
 
 def payload(seed: int) -> Iterator[SealedCase]:
-    """A payload since the reference logs."""
+    """Yield a payload since the reference logs."""
     for place, strength in enumerate(STRENGTHS * 4):
         yield _case("payload", seed, place, [("payload", None, strength)], reference=True)
 
@@ -142,7 +167,10 @@ def pairs(seed: int, count: int = 60) -> Iterator[SealedCase]:
         while places[first][0] == places[second][0]:
             second = rng.integers(len(places))
         strengths = rng.choice(STRENGTHS[:2], 2)
-        hidden = [(*places[which], float(strength)) for which, strength in zip((first, second), strengths, strict=True)]
+        hidden = [
+            (*places[which], float(strength))
+            for which, strength in zip((first, second), strengths, strict=True)
+        ]
         yield _case("pairs", seed, place, hidden)
 
 
@@ -150,11 +178,13 @@ def noise(seed: int) -> Iterator[SealedCase]:
     """Every cause at one joint, at full and 0.3 strength, with ten times the amplifier's noise."""
     for place, (strength, cause) in enumerate(product(STRENGTHS[:2], EASY)):
         joints = [joint for name, joint in _places(EASY) if name == cause]
-        yield _case("noise", seed, place, [(cause, joints[place % len(joints)], strength)], amplifier=10.0)
+        yield _case(
+            "noise", seed, place, [(cause, joints[place % len(joints)], strength)], amplifier=10.0
+        )
 
 
 def standing(seed: int) -> Iterator[SealedCase]:
-    """A cause that was there from the first day, with reference logs: nothing has changed."""
+    """Yield a cause that was there from the first day, with reference logs: nothing has changed."""
     for place, cause in enumerate(name for name in EASY if name != "contact"):
         joints = [joint for name, joint in _places(EASY) if name == cause]
         there = [(cause, joints[place % len(joints)], STRENGTHS[place % 2])]
@@ -170,52 +200,120 @@ def zero(seed: int) -> Iterator[SealedCase]:
 
 
 def uncentred(seed: int, count: int = 12) -> Iterator[SealedCase]:
-    """Healthy arms whose logs claim that torque was sampled: it then is not centred, and shows as a delay."""
+    """Healthy arms whose logs claim that torque was sampled: it then is not centred, and shows as a
+    delay.
+    """
     for place in range(count):
         yield _case("uncentred", seed, place, [], held=False)
 
 
 def paper(seed: int) -> Iterator[SealedCase]:
-    """Arms with friction of three sigmoids, as the paper has it, and reference logs: in order, or with one cause more."""
+    """Arms with friction of three sigmoids, as the paper has it, and reference logs: in order, or
+    with one cause more.
+    """
     for place in range(8):
         yield _case("paper", seed, place, [], reference=True, robot="paper")
     for place, (strength, cause) in enumerate(product(STRENGTHS[:2], EASY), start=8):
         joints = [joint for name, joint in _places(EASY) if name == cause]
-        yield _case("paper", seed, place, [(cause, joints[place % len(joints)], strength)], reference=True, robot="paper")
+        yield _case(
+            "paper",
+            seed,
+            place,
+            [(cause, joints[place % len(joints)], strength)],
+            reference=True,
+            robot="paper",
+        )
 
 
 def elsewhere(seed: int) -> Iterator[SealedCase]:
     """Other arms under other loops, at full strength: in order, or with one cause."""
     robots, loops = tuple(ROBOTS), ("", "backward-difference", "delayed")
     for place in range(2 * len(robots)):
-        yield _case("elsewhere", seed, place, [], robot=robots[place % len(robots)], loop=loops[place % len(loops)])
-    causes = [cause for cause in EASY if cause not in ("rotor_inertia", "link_length")]  # where they show depends on the arm
+        yield _case(
+            "elsewhere",
+            seed,
+            place,
+            [],
+            robot=robots[place % len(robots)],
+            loop=loops[place % len(loops)],
+        )
+    causes = [
+        cause for cause in EASY if cause not in ("rotor_inertia", "link_length")
+    ]  # where they show depends on the arm
     for place, (cause, turn) in enumerate(product(causes, range(2)), start=2 * len(robots)):
         robot = robots[place % len(robots)]
-        joint = None if find_fault(cause).scope == "arm" else 1 + (place + turn) % ROBOTS[robot].n_joints
-        yield _case("elsewhere", seed, place, [(cause, joint, 1.0)], robot=robot, loop=loops[place // 2 % len(loops)])
+        joint = (
+            None
+            if find_fault(cause).scope == "arm"
+            else 1 + (place + turn) % ROBOTS[robot].n_joints
+        )
+        yield _case(
+            "elsewhere",
+            seed,
+            place,
+            [(cause, joint, 1.0)],
+            robot=robot,
+            loop=loops[place // 2 % len(loops)],
+        )
 
 
 def unlike(seed: int) -> Iterator[SealedCase]:
-    """Reference logs of another motion than all later logs: in order, or with one cause at full strength."""
+    """Yield reference logs of another motion than all later logs: in order, or with one cause at
+    full strength.
+    """
     ways = (("slow", "fast"), ("fast", "slow"))
     for place in range(16):
         now, before = ways[place // 2 % 2]
-        yield _case("unlike", seed, place, [], reference=True, robot=("rrr", "paper")[place % 2], session=now, before=before)
+        yield _case(
+            "unlike",
+            seed,
+            place,
+            [],
+            reference=True,
+            robot=("rrr", "paper")[place % 2],
+            session=now,
+            before=before,
+        )
     for place, cause in enumerate(EASY, start=16):
         joints = [joint for name, joint in _places(EASY) if name == cause]
         now, before = ways[place // 2 % 2]
-        yield _case("unlike", seed, place, [(cause, joints[place % len(joints)], 1.0)], reference=True,
-                    robot=("rrr", "paper")[place % 2], session=now, before=before)
+        yield _case(
+            "unlike",
+            seed,
+            place,
+            [(cause, joints[place % len(joints)], 1.0)],
+            reference=True,
+            robot=("rrr", "paper")[place % 2],
+            session=now,
+            before=before,
+        )
 
 
 FAMILIES: dict[str, Callable[[int], Iterable[SealedCase]]] = {
-    each.__name__: each for each in (single, compliance, healthy, outside, invisible, payload, pairs, noise, standing, zero,
-                                     uncentred, paper, elsewhere, unlike)}
+    each.__name__: each
+    for each in (
+        single,
+        compliance,
+        healthy,
+        outside,
+        invisible,
+        payload,
+        pairs,
+        noise,
+        standing,
+        zero,
+        uncentred,
+        paper,
+        elsewhere,
+        unlike,
+    )
+}
 
 
 def _places(causes: Iterable[str]) -> list[tuple[str, int | None]]:
-    """Each cause at each joint where it can be seen; three times where it belongs to the whole arm."""
+    """Each cause at each joint where it can be seen; three times where it belongs to the whole
+    arm.
+    """
     found: list[tuple[str, int | None]] = []
     for cause in causes:
         whole = find_fault(cause).scope == "arm"
@@ -224,11 +322,26 @@ def _places(causes: Iterable[str]) -> list[tuple[str, int | None]]:
     return found
 
 
-def _case(family: str, seed: int, place: int, hidden: Iterable[tuple[str, int | None, float]], **others: Any) -> SealedCase:
+def _case(
+    family: str,
+    seed: int,
+    place: int,
+    hidden: Iterable[tuple[str, int | None, float]],
+    **others: Any,
+) -> SealedCase:
     rng = np.random.default_rng([92, seed, place, *family.encode()])
-    own = 100_000 * seed + 1000 * list(FAMILIES).index(family) + place  # no two cases share motions or noise
-    causes = tuple(Hidden(cause, joint, strength, own, once=cause == "contact" and place % 2 == 0)
-                   for cause, joint, strength in hidden)
-    case = SealedCase(family, causes, 100 * seed + (place + place // MACHINES) % MACHINES, own,
-                      _SESSIONS[int(rng.integers(len(_SESSIONS)))])
+    own = (
+        100_000 * seed + 1000 * list(FAMILIES).index(family) + place
+    )  # no two cases share motions or noise
+    causes = tuple(
+        Hidden(cause, joint, strength, own, once=cause == "contact" and place % 2 == 0)
+        for cause, joint, strength in hidden
+    )
+    case = SealedCase(
+        family,
+        causes,
+        100 * seed + (place + place // MACHINES) % MACHINES,
+        own,
+        _SESSIONS[int(rng.integers(len(_SESSIONS)))],
+    )
     return replace(case, **others)

@@ -1,7 +1,8 @@
-"""Record cases: their logs in one folder, their answers in another. What is there already is not made again.
+"""Record cases: their logs in one folder, their answers in another. What is there already is not
+made again.
 
-    OUT/logs/<key>/<log>.h5       a folder of logs of one robot
-    OUT/answers/<key>.json        what is hidden in them; no log names it
+OUT/logs/<key>/<log>.h5       a folder of logs of one robot
+OUT/answers/<key>.json        what is hidden in them; no log names it
 """
 
 from __future__ import annotations
@@ -22,9 +23,12 @@ from pipelines.errors import UsageError
 from pipelines.io.atomic import write_file
 from pipelines.io.files import write_log
 
-__all__ = ["Sealed", "answers_in", "make_case", "make_cases", "seal"]
-
-_VERDICTS = {"zero": "no-fault-found", "outside": "unknown", "invisible": "not-testable", "uncentred": "flagged"}
+_VERDICTS = {
+    "zero": "no-fault-found",
+    "outside": "unknown",
+    "invisible": "not-testable",
+    "uncentred": "flagged",
+}
 
 
 @dataclass(frozen=True)
@@ -33,8 +37,12 @@ class Sealed:
 
     key: str
     family: str
-    verdict: str  # what a diagnosis should say: "cause", "no-fault-found", "unknown"; "not-testable", "flagged" (anything)
-    findings: tuple[dict[str, Any], ...]  # cause, joint, parameters of each true cause; of "not-testable" what it must name
+    verdict: str
+    """What a diagnosis should say: "cause", "no-fault-found", "unknown", "not-testable"; "flagged":
+    anything."""
+    findings: tuple[
+        dict[str, Any], ...
+    ]  # cause, joint, parameters of each true cause; of "not-testable" what it must name
     standing: tuple[dict[str, Any], ...]
     case: dict[str, Any]  # the SealedCase, whose strength, session and so on the table is split by
 
@@ -45,7 +53,8 @@ class Sealed:
 
 
 def make_cases(cases: Iterable[SealedCase], out: Path) -> Iterator[tuple[SealedCase, float]]:
-    """Record each case into `out`; yields it with the CPU seconds it took, nothing for one that was there.
+    """Record each case into `out`; yields it with the CPU seconds it took, nothing for one that was
+    there.
 
     Of a case whose loop runs away with what is hidden there are no logs: it comes with NaN seconds.
     """
@@ -79,10 +88,17 @@ def make_case(case: SealedCase, out: Path) -> bool:
 
 
 def seal(case: SealedCase, session: Session) -> Sealed:
-    """The answer of a case."""
+    """Return the answer of a case."""
     verdict = _VERDICTS.get(case.family, "cause" if case.hidden else "no-fault-found")
     findings = answer(session.hidden) if verdict != "no-fault-found" else []
-    return Sealed(case.key, case.family, verdict, tuple(findings), tuple(answer(session.standing)), asdict(case))
+    return Sealed(
+        case.key,
+        case.family,
+        verdict,
+        tuple(findings),
+        tuple(answer(session.standing)),
+        asdict(case),
+    )
 
 
 def _write(path: Path, text: str) -> None:
@@ -94,5 +110,7 @@ def answers_in(out: Path) -> list[Sealed]:
     found = []
     for sheet in sorted((out / "answers").glob("*.json")):
         values = json.loads(sheet.read_text(encoding="utf-8"))
-        found.append(Sealed(**values | {name: tuple(values[name]) for name in ("findings", "standing")}))
+        found.append(
+            Sealed(**values | {name: tuple(values[name]) for name in ("findings", "standing")})
+        )
     return found

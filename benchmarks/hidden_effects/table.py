@@ -1,26 +1,27 @@
-"""The table of issue 9 out of many scores, and the confusion matrix; shares with Wilson's (1927) interval of 95 %.
+"""The table of issue 9 out of many scores, and the confusion matrix; shares with Wilson's (1927)
+interval of 95 %.
 
-    print(table(scores))
+print(table(scores))
 """
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from benchmarks.hidden_effects.score import Score
 
-__all__ = ["Row", "by_cause", "confusion", "rows", "table", "wilson"]
-
 # Where wrong names have a row of their own, or are the point.
 _APART = ("pairs", "noise", "taken out", "uncentred", "paper", "elsewhere", "unlike")
 _FLOOR = 1.3
 _QUICK, _SLOW = 10.0, 90.0  # [s] with reference logs, without
 _SHUFFLES = 200
+_STRONG = 0.3  # and above: strengths of the first row
+_SPURIOUS = 0.3  # wrong names a pair
 
 
 @dataclass(frozen=True)
@@ -35,9 +36,10 @@ class Row:
 
 
 def wilson(count: int, of: int, z: float = 1.96) -> tuple[float, float]:
-    """Interval in which a share lies of which `count` in `of` were seen: Wilson 1927, solved for the share.
+    """Interval in which a share lies of which `count` in `of` were seen: Wilson 1927, solved for
+    the share.
 
-        (p + z²/2n ± z √(p(1 - p)/n + z²/4n²))/(1 + z²/n)
+    (p + z²/2n ± z √(p(1 - p)/n + z²/4n²))/(1 + z²/n)
     """
     if of == 0:
         return 0.0, 1.0
@@ -57,81 +59,91 @@ def table(scores: Sequence[Score]) -> str:
 
 def rows(scores: Sequence[Score]) -> list[Row]:
     """One row of the issue's table after the other."""
-    of = {name: [one for one in scores if one.family == name] for name in {one.family for one in scores}}
+    of = {
+        name: [one for one in scores if one.family == name]
+        for name in {one.family for one in scores}
+    }
 
     def family(*names: str) -> list[Score]:
         return [one for name in names for one in of.get(name, [])]
 
-    strong = [one for one in family("single") if (one.strength or 0.0) >= 0.3]
-    weak = [one for one in family("single") if (one.strength or 0.0) < 0.3]
+    def right(title: str, bar: float | None, *names: str) -> Row:
+        return _counted(title, [one.right for one in family(*names)], bar)
+
+    def wrong(title: str, bar: float | None, *names: str) -> Row:
+        return _most(title, family(*names), bar)
+
+    strong = [one.right for one in family("single") if (one.strength or 0.0) >= _STRONG]
+    weak = [one.right for one in family("single") if (one.strength or 0.0) < _STRONG]
     named = [one for one in family("single", "compliance", "payload") if one.true]
     everything = [one for one in scores if one.family not in _APART]
     placed = [one for one in family("single", "compliance", "noise") if one.joint is not None]
     numbers = [ok for one in scores if not _taken(one) for _, ok in one.parameters]
     angles = [ok for one in scores if not _taken(one) for _, ok in one.angles]
-    spurious = sum(one.wrong for one in family("pairs"))
+    residuals = [(one.residual or math.inf) <= _FLOOR for one in named]
+    simulated = [one.simulated is True for one in named]
+    compliance = "right class: elasticity, base, backlash, saturation, with FRF logs"
+    with_reference = [one for one in scores if one.case.get("reference")]
+    without = [one for one in scores if not one.case.get("reference")]
+    everywhere = "wrong name, over everything (but the rows with a bar of their own)"
+    uncentred = "able to fail, torque not centred: a healthy arm is flagged"
     return [
-        _least("right cause, at full and 0.3 strength", strong, _right, 0.95),
-        _least("right cause, at 0.1", weak, _right, 0.90),
-        _least("right class: elasticity, base, backlash, saturation, with FRF logs", family("compliance"), _right, 0.85),
-        _least("joint right among the named", placed, lambda one: bool(one.joint), 0.98),
-        _most("wrong name, over everything (but the rows with a bar of their own)", everything, _wrong, 0.02),
+        _counted("right cause, at full and 0.3 strength", strong, 0.95),
+        _counted("right cause, at 0.1", weak, 0.90),
+        right(compliance, 0.85, "compliance"),
+        _counted("joint right among the named", [bool(one.joint) for one in placed], 0.98),
+        _most(everywhere, everything, 0.02),
         _alarms(family("healthy")),
-        _least("outside the library: \"unknown\"", family("outside"), _right, 0.95),
-        _least("taken out of the library: \"unknown\" or a declared twin", family("taken out"), _right, 0.95),
-        _least("invisible: \"not testable\" with the reason", family("invisible"), _right, 1.0),
-        _least("payload with reference logs: named, mass within 3 %", family("payload"), _right, 1.0),
-        _least("pairs: both found", family("pairs"), _right, 0.85),
-        _row("pairs: spurious names a case", "≤ 0.3", spurious / max(len(of.get("pairs", [])), 1), len(of.get("pairs", [])),
-             lambda x: x <= 0.3),
+        right('outside the library: "unknown"', 0.95, "outside"),
+        right('taken out of the library: "unknown"', 0.95, "taken out"),
+        right('invisible: "not testable" with the reason', 1.0, "invisible"),
+        right("payload with reference logs: named, mass within 3 %", 1.0, "payload"),
+        right("pairs: both found", 0.85, "pairs"),
+        _spurious(family("pairs")),
         _counted("named parameter within 5 % or 3 std", numbers, 0.90),
         _counted("phase or direction within 0.05 rad or 3 std", angles, None),
-        _least("held-out residual ≤ 1.3 of the noise floor after extension", named,
-               lambda one: (one.residual or math.inf) <= _FLOOR, 0.90),
-        _least("simulated position error smaller", named, lambda one: one.simulated is True, 1.0),
-        _least("ten times the amplifier's noise: right", family("noise"), _right, 0.75),
-        _most("ten times the amplifier's noise: wrong name", family("noise"), _wrong, 0.04),
-        _least("standing since the reference logs: \"nothing wrong\"", family("standing"), _right, None),
-        _least("friction of three sigmoids, with reference logs: right", family("paper"), _right, None),
-        _most("friction of three sigmoids: wrong name", family("paper"), _wrong, None),
-        _least("reference logs of another motion: right", family("unlike"), _right, None),
-        _most("reference logs of another motion: wrong name", family("unlike"), _wrong, None),
-        _least("other arms and loops: right", family("elsewhere"), _right, None),
-        _most("other arms and loops: wrong name", family("elsewhere"), _wrong, None),
+        _counted("held-out residual ≤ 1.3 of the noise floor after extension", residuals, 0.90),
+        _counted("simulated position error smaller", simulated, 1.0),
+        right("ten times the amplifier's noise: right", 0.75, "noise"),
+        wrong("ten times the amplifier's noise: wrong name", 0.04, "noise"),
+        right('standing since the reference logs: "nothing wrong"', None, "standing"),
+        right("friction of three sigmoids, with reference logs: right", None, "paper"),
+        wrong("friction of three sigmoids: wrong name", None, "paper"),
+        right("reference logs of another motion: right", None, "unlike"),
+        wrong("reference logs of another motion: wrong name", None, "unlike"),
+        right("other arms and loops: right", None, "elsewhere"),
+        wrong("other arms and loops: wrong name", None, "elsewhere"),
         _shuffled(family("single")),
-        _least("able to fail, strength zero: \"nothing wrong\"", family("zero"), _right, 1.0),
-        _least("able to fail, torque not centred: a healthy arm is flagged", family("uncentred"), _right, 1.0),
-        _time("seconds, with reference logs", [one for one in scores if one.case.get("reference")], _QUICK),
-        _time("seconds, without reference logs", [one for one in scores if not one.case.get("reference")], _SLOW),
-        Row("refused or crashed", "", str(_without_answer(scores)), len(scores), None)]
-
-
-def _right(one: Score) -> bool:
-    return one.right
-
-
-def _wrong(one: Score) -> bool:
-    return one.wrong > 0
+        right('able to fail, strength zero: "nothing wrong"', 1.0, "zero"),
+        right(uncentred, 1.0, "uncentred"),
+        _time("seconds, with reference logs", with_reference, _QUICK),
+        _time("seconds, without reference logs", without, _SLOW),
+        Row("refused or crashed", "", str(_without_answer(scores)), len(scores), None),
+    ]
 
 
 def _taken(one: Score) -> bool:
     return one.family == "taken out"
 
 
-def _least(title: str, cases: Sequence[Score], good: Callable[[Score], bool], bar: float | None) -> Row:
-    return _counted(title, [good(one) for one in cases], bar)
-
-
 def _counted(title: str, outcomes: Sequence[bool], bar: float | None) -> Row:
     count, of = sum(outcomes), len(outcomes)
     met = count >= bar * of - 1e-9 if of and bar is not None else None
-    return Row(title, "" if bar is None else "all" if bar == 1.0 else f"≥ {bar:.2f}", _share(count, of), of, met)
+    return Row(
+        title,
+        "" if bar is None else "all" if bar == 1.0 else f"≥ {bar:.2f}",
+        _share(count, of),
+        of,
+        met,
+    )
 
 
-def _most(title: str, cases: Sequence[Score], bad: Callable[[Score], bool], bar: float | None) -> Row:
-    count, of = sum(map(bad, cases)), len(cases)
+def _most(title: str, cases: Sequence[Score], bar: float | None) -> Row:
+    """Count the cases with a wrong name."""
+    count, of = sum(one.wrong > 0 for one in cases), len(cases)
     met = count <= bar * of + 1e-9 if of and bar is not None else None
-    return Row(title, "" if bar is None else f"≤ {100.0 * bar:.0f} %", _share(count, of), of, met)
+    limit = "" if bar is None else f"≤ {100.0 * bar:.0f} %"
+    return Row(title, limit, _share(count, of), of, met)
 
 
 def _share(count: int, of: int) -> str:
@@ -141,32 +153,58 @@ def _share(count: int, of: int) -> str:
     return f"{count / of:.3f} ({count} of {of}; {low:.2f} to {high:.2f})"
 
 
-def _row(title: str, bar: str, figure: float, cases: int, met: Callable[[float], bool]) -> Row:
-    return Row(title, bar, f"{figure:.2f}" if cases else "–", cases, met(figure) if cases else None)
+def _spurious(pairs: Sequence[Score]) -> Row:
+    """Count the wrong names of each pair."""
+    title, bar = "pairs: spurious names a case", "≤ 0.3"
+    if not pairs:
+        return Row(title, bar, "–", 0, None)
+    share = sum(one.wrong for one in pairs) / len(pairs)
+    return Row(title, bar, f"{share:.2f}", len(pairs), share <= _SPURIOUS)
 
 
 def _alarms(cases: Sequence[Score]) -> Row:
     alarms = sum(not one.right for one in cases)
-    return Row("healthy arms: alarms", "≤ 2 of 100", _share(alarms, len(cases)), len(cases),
-               alarms <= 0.02 * len(cases) if cases else None)
+    return Row(
+        "healthy arms: alarms",
+        "≤ 2 of 100",
+        _share(alarms, len(cases)),
+        len(cases),
+        alarms <= 0.02 * len(cases) if cases else None,
+    )
 
 
 def _shuffled(cases: Sequence[Score]) -> Row:
-    """Right answers where each case gets the label of another: about one in the number of causes, whatever is said."""
+    """Right answers where each case gets the label of another: about one in the number of causes,
+    whatever is said.
+    """
     named = [one for one in cases if one.right]
     if len(named) < 2:
-        return Row("able to fail, labels shuffled: right", "about one in the causes", "–", len(named), None)
+        return Row(
+            "able to fail, labels shuffled: right", "about one in the causes", "–", len(named), None
+        )
     rng, said = np.random.default_rng(9), np.array([one.truth[0] for one in named])
     share = float(np.mean([np.mean(said == rng.permutation(said)) for _ in range(_SHUFFLES)]))
     chance = float(np.sum((np.unique(said, return_counts=True)[1] / len(said)) ** 2))
-    return Row("able to fail, labels shuffled: right", f"about {chance:.3f}", f"{share:.3f}", len(named), share <= 2.0 * chance)
+    return Row(
+        "able to fail, labels shuffled: right",
+        f"about {chance:.3f}",
+        f"{share:.3f}",
+        len(named),
+        share <= 2.0 * chance,
+    )
 
 
 def _time(title: str, cases: Sequence[Score], limit: float) -> Row:
     taken = [one.seconds for one in cases if math.isfinite(one.seconds)]
     if not taken:
         return Row(title, f"≤ {limit:.0f}", "–", 0, None)
-    return Row(title, f"≤ {limit:.0f}", f"{np.median(taken):.1f}, at most {max(taken):.1f}", len(taken), max(taken) <= limit)
+    return Row(
+        title,
+        f"≤ {limit:.0f}",
+        f"{np.median(taken):.1f}, at most {max(taken):.1f}",
+        len(taken),
+        max(taken) <= limit,
+    )
 
 
 def _without_answer(scores: Iterable[Score]) -> int:
@@ -181,26 +219,44 @@ def by_cause(scores: Iterable[Score]) -> str:
             outcome = "right" if one.right and not one.wrong else "wrong" if one.wrong else "open"
             counts.setdefault(one.truth[0], {}).setdefault(one.strength, Counter())[outcome] += 1
     strengths = sorted({strength for row in counts.values() for strength in row}, reverse=True)
-    lines = ["| cause: right / wrong / neither | " + " | ".join(f"× {strength:g}" for strength in strengths) + " |",
-             "|---|" + "---|" * len(strengths)]
+    lines = [
+        "| cause: right / wrong / neither | "
+        + " | ".join(f"× {strength:g}" for strength in strengths)
+        + " |",
+        "|---|" + "---|" * len(strengths),
+    ]
     for cause, row in sorted(counts.items()):
-        cells = [" / ".join(str(row.get(s, Counter())[outcome]) for outcome in ("right", "wrong", "open")) for s in strengths]
+        cells = [
+            " / ".join(
+                str(row.get(s, Counter())[outcome]) for outcome in ("right", "wrong", "open")
+            )
+            for s in strengths
+        ]
         lines.append(f"| {cause} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 
 
 def confusion(scores: Iterable[Score]) -> str:
-    """Truth down, first answer across; a column is known by the number of its row, or of the list below the rows."""
-    pairs = Counter((_truth(one), one.named[0] if one.named else one.verdict) for one in scores
-                    if one.family in ("single", "compliance", "outside", "healthy", "payload"))
+    """Truth down, first answer across; a column is known by the number of its row, or of the list
+    below the rows.
+    """
+    pairs = Counter(
+        (_truth(one), one.named[0] if one.named else one.verdict)
+        for one in scores
+        if one.family in ("single", "compliance", "outside", "healthy", "payload")
+    )
     truths = sorted({truth for truth, _ in pairs})
     answers = [*truths, *sorted({answer for _, answer in pairs} - set(truths))]
     seen = [answer for answer in answers if any(said == answer for _, said in pairs)]
     number = {answer: place for place, answer in enumerate(answers, start=1)}
     head = [f"{number[answer]}" if answer in truths else answer for answer in seen]
     lines = ["| truth | " + " | ".join(head) + " |", "|---|" + "---|" * len(seen)]
-    lines += [f"| {number[truth]} {truth} | " + " | ".join(str(pairs[truth, answer] or "") for answer in seen) + " |"
-              for truth in truths]
+    lines += [
+        f"| {number[truth]} {truth} | "
+        + " | ".join(str(pairs[truth, answer] or "") for answer in seen)
+        + " |"
+        for truth in truths
+    ]
     return "\n".join(lines)
 
 

@@ -1,1 +1,3 @@
-"""Arms that the bench did not draw: other bodies, frictions, loops and faults, for a diagnosis to survive."""
+"""Arms that the bench did not draw: other bodies, frictions, loops and faults, for a diagnosis to
+survive.
+"""

@@ -1,7 +1,7 @@
 """The cases: plain data, and what is drawn of it.
 
-    case = next(one for one in CASES if one.name == "gantry-cogging")
-    logs = case.logs()
+case = next(one for one in CASES if one.name == "gantry-cogging")
+logs = case.logs()
 """
 
 from __future__ import annotations
@@ -21,15 +21,23 @@ from pipelines.io import schema
 from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 
-__all__ = ["BEFORE", "CASES", "DELAY", "FIVE", "FOUR", "SLOW", "THREE", "Case"]
-
 Motions = tuple[tuple[str, str], ...]  # kind of motion, role of its log
-FOUR: Motions = (("fourier", "identify"), ("moves", "identify"), ("fourier", "validate"), ("moves", "validate"))
+FOUR: Motions = (
+    ("fourier", "identify"),
+    ("moves", "identify"),
+    ("fourier", "validate"),
+    ("moves", "validate"),
+)
 FIVE: Motions = (*FOUR[:2], ("ramps", "identify"), *FOUR[2:])
 THREE: Motions = (("fourier", "identify"), ("fourier", "validate"), ("moves", "validate"))
 BEFORE: Motions = (("fourier", "reference"), ("moves", "reference"))
 _TOUCHED = 0  # number of the log in which something is touched
-_SIZE = {"torque_offset": 0.1, "cogging": 0.1, "spring": 0.12, "hopping torque": 0.1}  # of the joint's typical torque
+_SIZE = {
+    "torque_offset": 0.1,
+    "cogging": 0.1,
+    "spring": 0.12,
+    "hopping torque": 0.1,
+}  # of the joint's typical torque
 
 
 @dataclass(frozen=True)
@@ -62,7 +70,8 @@ class Case:
     @property
     def name(self) -> str:
         rest = f"-{self.number_in_name}" if self.number_in_name else ""
-        return f"{self.arm}-{'+'.join(one.fault or one.law for one in self.faults).replace(' ', '-')}{rest}"
+        faults = "+".join(one.fault or one.law for one in self.faults)
+        return f"{self.arm}-{faults.replace(' ', '-')}{rest}"
 
     def logs(self) -> list[ExperimentLog]:
         """Everything that was recorded, the reference logs without the fault."""
@@ -82,16 +91,52 @@ class Case:
             own = np.random.default_rng([seed, place])
             t: Array = np.arange(round(self.duration / self.sample_time)) * self.sample_time
             path = motion(kind, arm, t, own)
-            loop = Loop(self.loop, arm, self.sample_time, inertia, min(5.0, 0.02 / self.sample_time), counts, limit)
-            now = () if role == "reference" else tuple(one for one in sick if one.kind != "contact" or place == _TOUCHED)
-            plant = Plant(self._bent(arm) if now else arm, law, now, self.noise * typical, self.coloured, resolution)
+            loop = Loop(
+                self.loop,
+                arm,
+                self.sample_time,
+                inertia,
+                min(5.0, 0.02 / self.sample_time),
+                counts,
+                limit,
+            )
+            now = (
+                ()
+                if role == "reference"
+                else tuple(one for one in sick if one.kind != "contact" or place == _TOUCHED)
+            )
+            plant = Plant(
+                self._bent(arm) if now else arm,
+                law,
+                now,
+                self.noise * typical,
+                self.coloured,
+                resolution,
+            )
             q, tau = plant.run(loop, path, self.sample_time, own)
-            values = {"t": t + 3.0 * place, "q": q, "tau": tau, **dict(zip(("q_ref", "dq_ref", "ddq_ref"), path, strict=True))}
-            signals = {name: Signal(array, schema.unit_of(name, "pd"), schema.SIGNALS[name][1]) for name, array in values.items()}
-            logs.append(ExperimentLog(
-                name=f"{role}-{kind}-{place}", experiment="excitation" if kind == "fourier" else "free", role=role,
-                origin="simulated", robot_name=robot.name, sample_time=self.sample_time, robot_text=format_robot(robot),
-                signals=signals, controller=loop.told()))
+            values = {
+                "t": t + 3.0 * place,
+                "q": q,
+                "tau": tau,
+                **dict(zip(("q_ref", "dq_ref", "ddq_ref"), path, strict=True)),
+            }
+            signals = {
+                name: Signal(array, schema.unit_of(name, "pd"), schema.SIGNALS[name][1])
+                for name, array in values.items()
+            }
+            logs.append(
+                ExperimentLog(
+                    name=f"{role}-{kind}-{place}",
+                    experiment="excitation" if kind == "fourier" else "free",
+                    role=role,
+                    origin="simulated",
+                    robot_name=robot.name,
+                    sample_time=self.sample_time,
+                    robot_text=format_robot(robot),
+                    signals=signals,
+                    controller=loop.told(),
+                )
+            )
         return logs
 
     def _fault(self, typical: Array, law: Friction, speed: Array) -> Fault | None:
@@ -112,15 +157,21 @@ class Case:
         return Fault(self.fault, j, size, number)
 
     def _bent(self, arm: Arm) -> Arm:
-        """With the link before a joint as long as it truly is; its description and its loop know no better."""
+        """With the link before a joint as long as it truly is; its description and its loop know no
+        better.
+        """
         axes = list(arm.axes)
-        for j, size in ((one.joint - 1, one.size) for one in self.faults if one.fault == "link_length"):
+        for j, size in (
+            (one.joint - 1, one.size) for one in self.faults if one.fault == "link_length"
+        ):
             axes[j] = replace(axes[j], a=axes[j].a + size)
         return replace(arm, axes=tuple(axes))
 
 
 def _scales(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array, Array]:
-    """Typical torque and speed of each joint over a motion without friction, and the inertia that its drive feels at home."""
+    """Typical torque and speed of each joint over a motion without friction, and the inertia that
+    its drive feels at home.
+    """
     t: Array = np.arange(0.0, 10.0, 0.02)
     model = arm.model(1e-3)
     data = mujoco.MjData(model)
@@ -138,11 +189,17 @@ def _scales(arm: Arm, rng: np.random.Generator) -> tuple[Array, Array, Array]:
 
 
 def _friction(kind: str, typical: Array, speed: Array, rng: np.random.Generator) -> Friction:
-    """Dry friction of 20 to 40 % of the typical torque, viscous of 15 to 35 % at the typical speed."""
+    """Dry friction of 20 to 40 % of the typical torque, viscous of 15 to 35 % at the typical
+    speed.
+    """
     n = len(typical)
     coulomb = rng.uniform(0.2, 0.4, n) * typical
     viscous = rng.uniform(0.15, 0.35, n) * typical / speed
-    width = rng.uniform(0.01, 0.04, n) * speed if kind != "lugre" else rng.uniform(5e-4, 2e-3, n) * speed
+    width = (
+        rng.uniform(0.01, 0.04, n) * speed
+        if kind != "lugre"
+        else rng.uniform(5e-4, 2e-3, n) * speed
+    )
     return Friction(kind, coulomb, viscous, width, rng.uniform(0.08, 0.15, n) * speed)
 
 
@@ -172,30 +229,184 @@ HEALTHY = (
     Case("upright", "stribeck", "pid", 1e-3, motions=FIVE, answers=SLOW),
     Case("upright", "lugre", "cascade", 1e-3, motions=FIVE, answers=SLOW),
     Case("planar", "lugre", "pd", 1e-3, answers=SLOW),
-    Case("planar", "tanh", "pid", 1e-3, motions=(*BEFORE, *FOUR), number_in_name=2))
+    Case("planar", "tanh", "pid", 1e-3, motions=(*BEFORE, *FOUR), number_in_name=2),
+)
 FAULTY = (
     Case("planar", "root", "pid", 1e-3, fault="torque_offset", joint=2, answers=("torque_offset",)),
-    Case("gantry", "tanh", "cascade", 1e-3, fault="torque_offset", joint=1, answers=("torque_offset",)),
-    Case("upright", "tanh", "pid", 1e-3, fault="cogging", joint=2, number=14.3, answers=("cogging",)),
-    Case("gantry", "root", "pd", 1e-3, motions=FIVE, fault="cogging", joint=2, number=2.0 * np.pi / 0.03, answers=("cogging",)),
+    Case(
+        "gantry",
+        "tanh",
+        "cascade",
+        1e-3,
+        fault="torque_offset",
+        joint=1,
+        answers=("torque_offset",),
+    ),
+    Case(
+        "upright", "tanh", "pid", 1e-3, fault="cogging", joint=2, number=14.3, answers=("cogging",)
+    ),
+    Case(
+        "gantry",
+        "root",
+        "pd",
+        1e-3,
+        motions=FIVE,
+        fault="cogging",
+        joint=2,
+        number=2.0 * np.pi / 0.03,
+        answers=("cogging",),
+    ),
     Case("six", "tanh", "pid", 1e-3, fault="cogging", joint=3, number=22.0, answers=("cogging",)),
     Case("scara", "tanh", "pid", 2e-3, fault="spring", joint=1, answers=("spring",)),
-    Case("gantry", "arctan", "cascade", 1e-3, fault="spring", joint=3, number=0.05, answers=("spring",)),
-    Case("upright", "root", "pid", 1e-3, fault="torque_gain", joint=2, size=0.1, answers=("torque_gain",)),
-    Case("scara", "tanh", "pd+gravity", 1e-3, fault="torque_gain", joint=2, size=0.15, answers=("torque_gain",)),
-    Case("upright", "tanh", "pid", 1e-3, duration=15.0, fault="viscous_drift", joint=1, size=-0.6, answers=("viscous_drift",)),
-    Case("table", "arctan", "cascade", 1e-3, duration=15.0, fault="viscous_drift", joint=1, size=0.8, answers=("viscous_drift",)),
-    Case("upright", "arctan", "pd", 1e-3, fault="asymmetric_friction", joint=3, size=0.3, answers=("asymmetric_friction",)),
-    Case("lift", "tanh", "cascade", 1e-3, motions=FIVE, fault="load_friction", joint=1, size=0.08, answers=("load_friction",)),
-    Case("planar", "tanh", "pid", 1e-3, motions=FIVE, fault="load_friction", joint=1, size=0.12, answers=("load_friction",)),
-    Case("upright", "root", "cascade", 1e-3, fault="gravity_tilt", size=0.09, number=0.8, answers=("gravity_tilt",)),
-    Case("scara", "arctan", "pd", 1e-3, fault="gravity_tilt", size=0.09, number=2.0, answers=("gravity_tilt",)),
+    Case(
+        "gantry",
+        "arctan",
+        "cascade",
+        1e-3,
+        fault="spring",
+        joint=3,
+        number=0.05,
+        answers=("spring",),
+    ),
+    Case(
+        "upright",
+        "root",
+        "pid",
+        1e-3,
+        fault="torque_gain",
+        joint=2,
+        size=0.1,
+        answers=("torque_gain",),
+    ),
+    Case(
+        "scara",
+        "tanh",
+        "pd+gravity",
+        1e-3,
+        fault="torque_gain",
+        joint=2,
+        size=0.15,
+        answers=("torque_gain",),
+    ),
+    Case(
+        "upright",
+        "tanh",
+        "pid",
+        1e-3,
+        duration=15.0,
+        fault="viscous_drift",
+        joint=1,
+        size=-0.6,
+        answers=("viscous_drift",),
+    ),
+    Case(
+        "table",
+        "arctan",
+        "cascade",
+        1e-3,
+        duration=15.0,
+        fault="viscous_drift",
+        joint=1,
+        size=0.8,
+        answers=("viscous_drift",),
+    ),
+    Case(
+        "upright",
+        "arctan",
+        "pd",
+        1e-3,
+        fault="asymmetric_friction",
+        joint=3,
+        size=0.3,
+        answers=("asymmetric_friction",),
+    ),
+    Case(
+        "lift",
+        "tanh",
+        "cascade",
+        1e-3,
+        motions=FIVE,
+        fault="load_friction",
+        joint=1,
+        size=0.08,
+        answers=("load_friction",),
+    ),
+    Case(
+        "planar",
+        "tanh",
+        "pid",
+        1e-3,
+        motions=FIVE,
+        fault="load_friction",
+        joint=1,
+        size=0.12,
+        answers=("load_friction",),
+    ),
+    Case(
+        "upright",
+        "root",
+        "cascade",
+        1e-3,
+        fault="gravity_tilt",
+        size=0.09,
+        number=0.8,
+        answers=("gravity_tilt",),
+    ),
+    Case(
+        "scara",
+        "arctan",
+        "pd",
+        1e-3,
+        fault="gravity_tilt",
+        size=0.09,
+        number=2.0,
+        answers=("gravity_tilt",),
+    ),
     Case("upright", "tanh", "pid", 1e-3, fault="torque_delay", size=4e-3, answers=DELAY),
-    Case("wrist", "tanh", "pd", 1e-3, fault="torque_crosstalk", joint=2, size=0.15, number=0, answers=("torque_crosstalk",)),
-    Case("upright", "root", "pid", 1e-3, motions=(*BEFORE, *FOUR), fault="payload", size=0.6, answers=("payload",)),
-    Case("six", "tanh", "pid", 2e-3, motions=(*BEFORE, *FOUR), fault="payload", size=0.6, answers=("payload",)),
-    Case("scara", "root", "pd", 1e-3, motions=(*BEFORE, *FOUR), fault="cogging", joint=2, number=18.0, answers=("cogging",)),
+    Case(
+        "wrist",
+        "tanh",
+        "pd",
+        1e-3,
+        fault="torque_crosstalk",
+        joint=2,
+        size=0.15,
+        number=0,
+        answers=("torque_crosstalk",),
+    ),
+    Case(
+        "upright",
+        "root",
+        "pid",
+        1e-3,
+        motions=(*BEFORE, *FOUR),
+        fault="payload",
+        size=0.6,
+        answers=("payload",),
+    ),
+    Case(
+        "six",
+        "tanh",
+        "pid",
+        2e-3,
+        motions=(*BEFORE, *FOUR),
+        fault="payload",
+        size=0.6,
+        answers=("payload",),
+    ),
+    Case(
+        "scara",
+        "root",
+        "pd",
+        1e-3,
+        motions=(*BEFORE, *FOUR),
+        fault="cogging",
+        joint=2,
+        number=18.0,
+        answers=("cogging",),
+    ),
     Case("upright", "tanh", "pid", 1e-3, fault="heat from another joint", joint=3, number=1),
     Case("planar", "root", "cascade", 1e-3, fault="hopping torque", joint=1),
-    Case("scara", "tanh", "pid", 1e-3, fault="hopping torque", joint=2))
+    Case("scara", "tanh", "pid", 1e-3, fault="hopping torque", joint=2),
+)
 CASES = (*HEALTHY, *FAULTY)

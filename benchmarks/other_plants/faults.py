@@ -20,8 +20,6 @@ import numpy as np
 from benchmarks.other_plants.friction import Friction
 from pipelines.io.experiment import Array
 
-__all__ = ["Acting", "Fault", "Now", "Several"]
-
 _HEATING, _HOPS = 5.0, 0.7  # [s] time constant of a gear that warms, mean time between two hops
 _DRIFTING = 6.0  # [s] time constant of viscous friction that drifts
 _TOUCH = (3.0, 3.25)  # [s] from and to when something is touched
@@ -35,8 +33,9 @@ class Fault:
     kind: str
     joint: int = 0
     size: float = 0.0
-    # Order [1/rad or 1/m] of what goes with the angle, phase [rad] of an encoder's; of what comes from another joint: which; where
-    # a spring rests [rad or m]; speed of concave friction [rad/s or m/s]; where a tilt or a push points [rad].
+    # Order [1/rad or 1/m] of what goes with the angle, phase [rad] of an encoder's; of what comes
+    # from another joint: which; where a spring rests [rad or m]; speed of concave friction [rad/s
+    # or m/s]; where a tilt or a push points [rad].
     number: float = 0.0
 
 
@@ -55,8 +54,15 @@ class Now:
 class Acting:
     """A fault during one run, with its state."""
 
-    def __init__(self, fault: Fault, law: Friction, sample_time: float, rng: np.random.Generator) -> None:
-        self.kind, self.j, self.size, self.number = fault.kind, fault.joint, fault.size, fault.number
+    def __init__(
+        self, fault: Fault, law: Friction, sample_time: float, rng: np.random.Generator
+    ) -> None:
+        self.kind, self.j, self.size, self.number = (
+            fault.kind,
+            fault.joint,
+            fault.size,
+            fault.number,
+        )
         self._law, self._lasting, self._rng = law, sample_time, rng
         self._heat, self._hop = 0.0, 1.0
         late = round(self.size / sample_time) if self.kind in ("torque_delay", "time_delay") else 0
@@ -83,39 +89,55 @@ class Acting:
 
     def load(self, now: Now) -> Array:
         """Return the load (joints,) [N m] in addition to friction, in the direction of motion."""
-        out, j = np.zeros_like(now.q), self.j
-        q, v, size = now.q[j], now.v[j], self.size
-        if self.kind == "asymmetric_friction":
-            out[j] = -size * abs(np.tanh(v / self._law.width[j]))
-        elif self.kind == "load_friction":
-            out[j] = -size * abs(now.applied[j]) * np.tanh(v / self._law.width[j])
-        elif self.kind == "viscous_drift":
-            out[j] = size * self._law.viscous[j] * v * np.expm1(-now.t / _DRIFTING)
-        elif self.kind == "quadratic_drag":
-            out[j] = -size * v * abs(v)
-        elif self.kind == "concave_friction":
-            out[j] = -size * np.tanh(v / self.number)
-        elif self.kind == "position_friction":
-            out[j] = -size * now.dry[j] * np.sin(self.number * q + _PHASE)
-        elif self.kind == "heat from another joint":
-            out[j] = -self._heat * (now.dry[j] + self._law.viscous[j] * v)
-        elif self.kind == "hopping torque":
-            out[j] = self._hop * size
-        elif self.kind == "torque_offset":
-            out[j] = size
-        elif self.kind == "cogging":
-            out[j] = size * (np.sin(self.number * q + _PHASE) + 0.3 * np.sin(2.0 * self.number * q))
-        elif self.kind == "spring":
-            out[j] = -size * ((q - self.number) + 0.1 * (q - self.number) ** 3)
-        elif self.kind == "contact" and _TOUCH[0] <= now.t < _TOUCH[1]:
-            out = now.pushed(np.array([np.cos(self.number), np.sin(self.number), 0.3]) * size)
+        out = np.zeros_like(now.q)
+        if self.kind == "contact":
+            if _TOUCH[0] <= now.t < _TOUCH[1]:
+                out = now.pushed(
+                    np.array([np.cos(self.number), np.sin(self.number), 0.3]) * self.size
+                )
+            return out
+        out[self.j] = self._friction(now) + self._other(now)
         return out
+
+    def _friction(self, now: Now) -> float:
+        """Return the load [N m] of a fault of friction."""
+        j, size, v = self.j, self.size, now.v[self.j]
+        if self.kind == "asymmetric_friction":
+            return -size * abs(np.tanh(v / self._law.width[j]))
+        if self.kind == "load_friction":
+            return -size * abs(now.applied[j]) * np.tanh(v / self._law.width[j])
+        if self.kind == "viscous_drift":
+            return size * self._law.viscous[j] * v * np.expm1(-now.t / _DRIFTING)
+        if self.kind == "quadratic_drag":
+            return -size * v * abs(v)
+        if self.kind == "concave_friction":
+            return -size * np.tanh(v / self.number)
+        if self.kind == "position_friction":
+            return -size * now.dry[j] * np.sin(self.number * now.q[j] + _PHASE)
+        if self.kind == "heat from another joint":
+            return -self._heat * (now.dry[j] + self._law.viscous[j] * v)
+        return 0.0
+
+    def _other(self, now: Now) -> float:
+        """Return the load [N m] of a fault that has nothing to do with friction."""
+        q, size = now.q[self.j], self.size
+        if self.kind == "hopping torque":
+            return self._hop * size
+        if self.kind == "torque_offset":
+            return size
+        if self.kind == "cogging":
+            return size * (np.sin(self.number * q + _PHASE) + 0.3 * np.sin(2.0 * self.number * q))
+        if self.kind == "spring":
+            return -size * ((q - self.number) + 0.1 * (q - self.number) ** 3)
+        return 0.0
 
     def after(self, applied: Array, v: Array) -> None:
         """Update the state at the end of a sample."""
         if self.kind == "heat from another joint":
             other = int(self.number)
-            self._heat += self._lasting / _HEATING * (abs(applied[other] * v[other]) / self.size - self._heat)
+            self._heat += (
+                self._lasting / _HEATING * (abs(applied[other] * v[other]) / self.size - self._heat)
+            )
         if self.kind == "hopping torque" and self._rng.random() < self._lasting / _HOPS:
             self._hop = -self._hop
 
@@ -144,7 +166,9 @@ class Acting:
 class Several:
     """All faults of an arm during one run, applied in order."""
 
-    def __init__(self, faults: tuple[Fault, ...], law: Friction, sample_time: float, rng: np.random.Generator) -> None:
+    def __init__(
+        self, faults: tuple[Fault, ...], law: Friction, sample_time: float, rng: np.random.Generator
+    ) -> None:
         self._all = [Acting(fault, law, sample_time, rng) for fault in faults]
 
     def driven(self, command: Array) -> Array:

@@ -8,8 +8,6 @@ import numpy as np
 
 from pipelines.io.experiment import Array
 
-__all__ = ["Friction"]
-
 
 @dataclass(frozen=True, eq=False)
 class Friction:
@@ -36,4 +34,4 @@ class Friction:
         """Dry friction at a steady speed [N m]."""
         if self.kind not in ("stribeck", "lugre"):
             return self.coulomb
-        return self.coulomb * (1.0 + (self.breakaway - 1.0) * np.exp(-(v / self.slow) ** 2))
+        return self.coulomb * (1.0 + (self.breakaway - 1.0) * np.exp(-((v / self.slow) ** 2)))

@@ -1,9 +1,11 @@
-"""Simulate MuJoCo's bodies under a held torque, with friction, drive, encoder and faults in plain numpy.
+"""Simulate MuJoCo's bodies under a held torque, with friction, drive, encoder and faults in plain
+numpy.
 
     plant = Plant(arm, Friction("lugre", …), (Fault("cogging", 1, 0.4),), noise, …)
     q, tau = plant.run(loop, motion, sample_time, rng)     (samples, joints) what a log holds
 
-MuJoCo integrates by Runge-Kutta with many steps a sample; what rubs, pulls or sticks is asked for at each of its stages.
+MuJoCo integrates by Runge-Kutta with many steps a sample; what rubs, pulls or sticks is asked for
+at each of its stages.
 """
 
 from __future__ import annotations
@@ -19,8 +21,6 @@ from benchmarks.other_plants.faults import Fault, Now, Several
 from benchmarks.other_plants.friction import Friction
 from benchmarks.other_plants.loops import Loop
 from pipelines.io.experiment import Array
-
-__all__ = ["Plant"]
 
 _LONGEST = 5e-4  # [s] of a step
 _STABLE = 1.0  # steps a time constant of the stiffest joint: Runge-Kutta 4 bears 2.78
@@ -38,9 +38,14 @@ class Plant:
     coloured: bool
     resolution: Array  # [rad] (joints,) of the encoders
 
-    def run(self, loop: Loop, path: tuple[Array, Array, Array], sample_time: float,
-            rng: np.random.Generator) -> tuple[Array, Array]:
-        """Encoder readings and commands (samples, joints) along `path`."""
+    def run(
+        self,
+        loop: Loop,
+        path: tuple[Array, Array, Array],
+        sample_time: float,
+        rng: np.random.Generator,
+    ) -> tuple[Array, Array]:
+        """Return encoder readings and commands (samples, joints) along `path`."""
         state = _State(self, loop.inertia, sample_time, rng, path[0].shape)
         data = state.data
         data.qpos[:], data.qvel[:] = path[0][0], path[1][0]
@@ -59,7 +64,14 @@ class Plant:
 class _State:
     """One run: what friction, drive and fault remember."""
 
-    def __init__(self, plant: Plant, inertia: Array, sample_time: float, rng: np.random.Generator, shape: tuple[int, ...]) -> None:
+    def __init__(
+        self,
+        plant: Plant,
+        inertia: Array,
+        sample_time: float,
+        rng: np.random.Generator,
+        shape: tuple[int, ...],
+    ) -> None:
         self.plant, self.rng = plant, rng
         law = plant.friction
         rate = (law.coulomb * law.breakaway / law.width + law.viscous) / inertia
@@ -69,9 +81,14 @@ class _State:
             rate = 2.0 * np.sqrt(self.stiff / inertia)
         self.steps = int(np.ceil(sample_time / min(_LONGEST, _STABLE / float(rate.max()))))
         self.h = sample_time / self.steps
-        tilt, towards = next(((one.size, one.number) for one in plant.faults if one.kind == "gravity_tilt"), (0.0, 0.0))  # [rad]
+        tilt, towards = next(
+            ((one.size, one.number) for one in plant.faults if one.kind == "gravity_tilt"),
+            (0.0, 0.0),
+        )  # [rad]
         payload = sum(one.size for one in plant.faults if one.kind == "payload")
-        down = np.cos(tilt) * np.array(plant.arm.gravity) + 9.81 * np.sin(tilt) * np.array([np.cos(towards), np.sin(towards), 0.0])
+        down = np.cos(tilt) * np.array(plant.arm.gravity) + 9.81 * np.sin(tilt) * np.array(
+            [np.cos(towards), np.sin(towards), 0.0]
+        )
         self.model = plant.arm.model(self.h, tuple(down.tolist()), payload=payload)
         self.data: Any = mujoco.MjData(self.model)
         self.z = np.zeros(shape[1])
@@ -99,18 +116,21 @@ class _State:
         return np.asarray(self.blur * np.sqrt(2.0 / self.share - 1.0))
 
     def _bend(self) -> None:
-        """Bristles of LuGre over one step, exact for a steady speed: dz/dt = v - σ0 |v| z/g(v). Canudas de Wit et al. 1995, (2)."""
+        """Bristles of LuGre over one step, exact for a steady speed: dz/dt = v - σ0 |v| z/g(v).
+        Canudas de Wit et al. 1995, (2).
+        """
         v = self.data.qvel
         rate = self.stiff * np.abs(v) / self.plant.friction.level(v)
-        self.z = self.z * np.exp(-rate * self.h) + v * self.h * np.where(rate > 1e-9, -np.expm1(-rate * self.h) /
-                                                                         np.maximum(rate * self.h, 1e-12), 1.0)
+        self.z = self.z * np.exp(-rate * self.h) + v * self.h * np.where(
+            rate > 1e-9, -np.expm1(-rate * self.h) / np.maximum(rate * self.h, 1e-12), 1.0
+        )
 
     def passive(self, model: Any, data: Any) -> None:
         """All that acts beside the drives, at one stage of the integrator."""
         v, law = data.qvel, self.plant.friction
         if law.kind == "lugre":
             bent = v - self.stiff * np.abs(v) / law.level(v) * self.z
-            dry = self.stiff * self.z + self.damper * bent * np.exp(-(v / law.slow) ** 2)
+            dry = self.stiff * self.z + self.damper * bent * np.exp(-((v / law.slow) ** 2))
         else:
             dry = law.dry(v)
         now = Now(data.time, data.qpos, v, dry, self.applied, self._pushed)

@@ -1,4 +1,6 @@
-"""A model for the controller out of disturbed links, by MuJoCo: feed-forward that owes nothing to a fit."""
+"""A model for the controller out of disturbed links, by MuJoCo: feed-forward that owes nothing to a
+fit.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +18,19 @@ Floats = list[float]
 
 
 class LinkModel:
-    """Links and friction of a machine, each number within ± `error` of the truth. It has no text: the log cannot say it."""
+    """Links and friction of a machine, each number within ± `error` of the truth. It has no text:
+    the log cannot say it.
+    """
 
     text: str | None = None
 
     def __init__(self, machine: Machine, seed: int = 0, error: float = 0.05) -> None:
         rng = np.random.default_rng([25, seed])
-        joints = tuple(replace(joint, link=Solid.of_link(joint.link).drawn(rng, error).as_link())
-                       for joint in machine.robot.joints if joint.link is not None)
+        joints = tuple(
+            replace(joint, link=Solid.of_link(joint.link).drawn(rng, error).as_link())
+            for joint in machine.robot.joints
+            if joint.link is not None
+        )
         self._rigid = RigidDynamics(replace(machine.robot, joints=joints))
         self._friction = [law.drawn(rng, error).law() for law in machine.friction]
 

@@ -1,8 +1,10 @@
-"""A fault's answer means what causes.md says: measured torque = model torque + the fault's load, by Pinocchio.
+"""A fault's answer means what causes.md says: measured torque = model torque + the fault's load, by
+Pinocchio.
 
-The load is the logged torque less Pinocchio's inverse dynamics of the true motion and less the machine's own friction. The
-column of causes.md, at the parameters of the answer, has to be found in it with a coefficient near one: exactly where the
-fault is done as the column has it, roughly where it is done otherwise on purpose.
+The load is the logged torque less Pinocchio's inverse dynamics of the true motion and less the
+machine's own friction. The column of causes.md, at the parameters of the answer, has to be found in
+it with a coefficient near one: exactly where the fault is done as the column has it, roughly where
+it is done otherwise on purpose.
 """
 
 from __future__ import annotations
@@ -66,10 +68,14 @@ def explained(recording: Recording, arm: Arm) -> Measured:
     q, ddq = 0.5 * (q0 + q1) + SAMPLE_TIME / 8.0 * (v0 - v1), (v1 - v0) / SAMPLE_TIME
     v = 1.5 * (q1 - q0) / SAMPLE_TIME - 0.25 * (v0 + v1)
     data = arm.model.createData()
-    rigid = np.array([pin.rnea(arm.model, data, arm.offset(a), b, c) for a, b, c in zip(q, v, ddq, strict=True)])
+    rigid = np.array(
+        [pin.rnea(arm.model, data, arm.offset(a), b, c) for a, b, c in zip(q, v, ddq, strict=True)]
+    )
     friction = np.array(FC) * np.tanh(SHARPNESS * v) + np.array(FV) * v
     tau = recording.tau[:-1]
-    return Measured(recording.t[:-1] + 0.5 * SAMPLE_TIME, q, v, ddq, tau, rigid, tau - rigid - friction)
+    return Measured(
+        recording.t[:-1] + 0.5 * SAMPLE_TIME, q, v, ddq, tau, rigid, tau - rigid - friction
+    )
 
 
 SWAY = sway(2.0, hz=0.6, amplitude=0.7)  # to and fro at up to 3 rad/s
@@ -93,17 +99,27 @@ def dahl(m: Measured, j: int, distance: float) -> np.ndarray:
 
 
 def drift(m: Measured, j: int, p: Answer) -> np.ndarray:
-    return np.asarray(p.relative_change * FV[j] * (1.0 - np.exp(-m.t / p.time_constant)) * m.dq[:, j])
+    return np.asarray(
+        p.relative_change * FV[j] * (1.0 - np.exp(-m.t / p.time_constant)) * m.dq[:, j]
+    )
 
 
 Column = Callable[[Measured, int, Answer], np.ndarray]
 # The load of causes.md on the fault's own row, and by how much its coefficient may differ from one.
 COLUMNS: dict[str, tuple[Column, float]] = {
     "cogging": (lambda m, j, p: p.amplitude * np.sin(p.order * m.q[:, j] + p.phase), 0.15),
-    "stribeck": (lambda m, j, p: p.amplitude * np.exp(-((m.dq[:, j] / p.speed) ** 2)) * turned(m.dq[:, j]), 0.15),
+    "stribeck": (
+        lambda m, j, p: p.amplitude * np.exp(-((m.dq[:, j] / p.speed) ** 2)) * turned(m.dq[:, j]),
+        0.15,
+    ),
     "concave_friction": (lambda m, j, p: p.amplitude * np.tanh(m.dq[:, j] / p.speed), 0.35),
-    "asymmetric_friction": (lambda m, j, p: 0.5 * p.coulomb_difference * np.abs(turned(m.dq[:, j]))
-                            + 0.5 * p.viscous_difference * np.abs(m.dq[:, j]), 0.05),
+    "asymmetric_friction": (
+        lambda m, j, p: (
+            0.5 * p.coulomb_difference * np.abs(turned(m.dq[:, j]))
+            + 0.5 * p.viscous_difference * np.abs(m.dq[:, j])
+        ),
+        0.05,
+    ),
     "torque_offset": (lambda m, j, p: np.full(len(m.t), p.offset), 0.01),
     "load_friction": (lambda m, j, p: p.mu * np.abs(m.rigid[:, j]) * turned(m.dq[:, j]), 0.05),
     "presliding": (lambda m, j, p: p.amplitude * dahl(m, j, p.distance), 0.25),
@@ -121,7 +137,9 @@ COLUMNS: dict[str, tuple[Column, float]] = {
 def coupled(m: Measured, j: int, p: Answer) -> np.ndarray:
     i = p.with_joint - 1
     s = m.dq[:, i] + m.dq[:, j]
-    return np.asarray(p.inertia * (m.ddq[:, i] + m.ddq[:, j]) + p.viscous * s + p.coulomb * turned(s))
+    return np.asarray(
+        p.inertia * (m.ddq[:, i] + m.ddq[:, j]) + p.viscous * s + p.coulomb * turned(s)
+    )
 
 
 def coefficient(load: np.ndarray, column: np.ndarray, nuisance: np.ndarray) -> float:
@@ -132,40 +150,65 @@ def coefficient(load: np.ndarray, column: np.ndarray, nuisance: np.ndarray) -> f
 
 
 def test_nothing_is_left_of_a_healthy_machine() -> None:
-    """Pinocchio and the friction that was put in explain the torque to 2 mN m away from reversals."""
+    """Pinocchio and the friction that was put in explain the torque to 2 mN m away from
+    reversals.
+    """
     m = measured()
     assert np.abs(np.where(np.abs(m.dq) > 0.1, m.load, 0.0)[20:]).max() < 2e-3
 
 
-@pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
-@pytest.mark.parametrize("name", usually(
-    COLUMNS, "cogging", "stribeck", "presliding", "torque_gain", "torque_crosstalk", "drive_lag", "rotor_inertia"))
+@pytest.mark.parametrize(
+    "joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)]
+)
+@pytest.mark.parametrize(
+    "name",
+    usually(
+        COLUMNS,
+        "cogging",
+        "stribeck",
+        "presliding",
+        "torque_gain",
+        "torque_crosstalk",
+        "drive_lag",
+        "rotor_inertia",
+    ),
+)
 def test_a_load_has_the_sign_and_the_size_of_its_answer(name: str, joint: int) -> None:
     """The column of causes.md at the answer's parameters, coefficient near one."""
     fault = make(name, machine(), joint, seed=2, duration=2.0)
     m, (column, within) = measured(fault), COLUMNS[name]
     j, settled = joint - 1, slice(50, None)
     nuisance = np.column_stack([turned(m.dq[:, j]), m.dq[:, j]])[settled]
-    found = coefficient(m.load[settled, j], column(m, j, Answer(**fault.parameters()))[settled], nuisance)
+    found = coefficient(
+        m.load[settled, j], column(m, j, Answer(**fault.parameters()))[settled], nuisance
+    )
     assert abs(found - 1.0) < within, found
 
 
 def test_a_load_touches_no_other_row() -> None:
-    """Of load-dependent friction, torque gain and crosstalk at joint 2 the equations of the other joints know nothing."""
+    """Of load-dependent friction, torque gain and crosstalk at joint 2 the equations of the other
+    joints know nothing.
+    """
     for name in ("load_friction", "torque_gain", "torque_crosstalk"):
         m = measured(make(name, machine(), 2, seed=2))
         other = np.where(np.abs(m.dq) > 0.1, m.load, 0.0)[20:, [0, 2]]
         assert np.abs(other).max() < 4e-3, name
 
 
-@pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    "joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)]
+)
 def test_the_main_harmonic_of_wear_is_the_answers(joint: int) -> None:
-    """Friction over one whole turn in one direction: its Fourier coefficient at the order has the amplitude and phase told."""
+    """Friction over one whole turn in one direction: its Fourier coefficient at the order has the
+    amplitude and phase told.
+    """
     fault, j = make("position_friction", machine(), joint, seed=3), joint - 1
     recording = run(machine(), Decentralised(), sway(3.0, hz=0.2, amplitude=3.3), [fault])
     m = explained(recording, arm_of(machine().robot))
     moving = np.flatnonzero(m.dq[:, j] > 0.1)
-    forth = slice(moving[0], moving[np.append(np.diff(moving) > 1, True)][0])  # from the start to the first reversal
+    forth = slice(
+        moving[0], moving[np.append(np.diff(moving) > 1, True)][0]
+    )  # from the start to the first reversal
     start = m.q[forth, j][0]
     angle = start + 2.0 * np.pi * np.arange(720) / 720
     assert m.q[forth, j][-1] > angle[-1]
@@ -193,14 +236,20 @@ def test_a_push_takes_torque_off_every_joint_by_the_jacobian() -> None:
         tip = data.oMi[3] * arm.link_in_joint[-1]
         jacobian = pin.getJointJacobian(arm.model, data, 3, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
         lever = np.cross(tip.translation - data.oMi[3].translation, np.array(fault.direction))
-        expected.append(-size * (jacobian[:3].T @ np.array(fault.direction) + jacobian[3:].T @ lever))
+        expected.append(
+            -size * (jacobian[:3].T @ np.array(fault.direction) + jacobian[3:].T @ lever)
+        )
     moving = np.abs(m.dq) > 0.1
-    np.testing.assert_allclose(np.where(moving, m.load, 0.0)[20:], np.where(moving, expected, 0.0)[20:], atol=1e-2)
+    np.testing.assert_allclose(
+        np.where(moving, m.load, 0.0)[20:], np.where(moving, expected, 0.0)[20:], atol=1e-2
+    )
     assert (np.abs(expected).max(axis=0) > 0.5).all()
 
 
 def test_a_longer_link_is_a_longer_link() -> None:
-    """Pinocchio with a2 larger by the error, the link's body where it was on its axis, leaves nothing; the drawing does."""
+    """Pinocchio with a2 larger by the error, the link's body where it was on its axis, leaves
+    nothing; the drawing does.
+    """
     error, robot = 0.012, machine().robot
     joints = list(robot.joints)
     joints[1] = replace(joints[1], a=joints[1].a + error)
@@ -219,7 +268,9 @@ def test_an_encoder_follows_its_neighbour() -> None:
     fault = make("encoder_crosstalk", machine(), 2, seed=2)
     recording = run(machine(), Decentralised(), sway(0.3), [fault])
     c = fault.parameters()["coefficient"]
-    np.testing.assert_allclose(recording.q[:, 1] - recording.true_q[:, 1], c * recording.true_q[:, 0], atol=1e-12)
+    np.testing.assert_allclose(
+        recording.q[:, 1] - recording.true_q[:, 1], c * recording.true_q[:, 0], atol=1e-12
+    )
     np.testing.assert_array_equal(recording.q[:, [0, 2]], recording.true_q[:, [0, 2]])
     np.testing.assert_allclose(recording.q[0], recording.reference.q[0], atol=1e-12)
 
@@ -227,18 +278,35 @@ def test_an_encoder_follows_its_neighbour() -> None:
 def test_a_fault_of_the_library_answers_with_the_names_of_causes() -> None:
     """Every known fault has the parameters that a finding of its cause reports."""
     asked = {
-        "cogging": {"order", "amplitude", "phase"}, "stribeck": {"amplitude", "speed"}, "concave_friction": {"amplitude", "speed"},
-        "asymmetric_friction": {"coulomb_difference", "viscous_difference"}, "torque_offset": {"offset"}, "load_friction": {"mu"},
-        "position_friction": {"amplitude", "order", "phase"}, "presliding": {"distance", "amplitude"},
-        "quadratic_drag": {"coefficient"}, "viscous_drift": {"relative_change", "time_constant"},
-        "spring": {"stiffness", "rest_angle"}, "torque_gain": {"gain_error"}, "torque_saturation": {"limit"},
-        "torque_crosstalk": {"coefficient", "from_joint"}, "drive_lag": {"time_constant"}, "torque_lag": {"time_constant"},
-        "time_delay": {"delay"}, "encoder_eccentricity": {"amplitude", "phase"}, "encoder_crosstalk": {"coefficient", "from_joint"},
-        "transmission_coupling": {"with_joint", "inertia", "viscous", "coulomb"}, "payload": {"mass", "first_moment"},
-        "gravity_tilt": {"angle", "direction"}, "link_length": {"error", "link"}, "rotor_inertia": {"inertia"},
+        "cogging": {"order", "amplitude", "phase"},
+        "stribeck": {"amplitude", "speed"},
+        "concave_friction": {"amplitude", "speed"},
+        "asymmetric_friction": {"coulomb_difference", "viscous_difference"},
+        "torque_offset": {"offset"},
+        "load_friction": {"mu"},
+        "position_friction": {"amplitude", "order", "phase"},
+        "presliding": {"distance", "amplitude"},
+        "quadratic_drag": {"coefficient"},
+        "viscous_drift": {"relative_change", "time_constant"},
+        "spring": {"stiffness", "rest_angle"},
+        "torque_gain": {"gain_error"},
+        "torque_saturation": {"limit"},
+        "torque_crosstalk": {"coefficient", "from_joint"},
+        "drive_lag": {"time_constant"},
+        "torque_lag": {"time_constant"},
+        "time_delay": {"delay"},
+        "encoder_eccentricity": {"amplitude", "phase"},
+        "encoder_crosstalk": {"coefficient", "from_joint"},
+        "transmission_coupling": {"with_joint", "inertia", "viscous", "coulomb"},
+        "payload": {"mass", "first_moment"},
+        "gravity_tilt": {"angle", "direction"},
+        "link_length": {"error", "link"},
+        "rotor_inertia": {"inertia"},
         "joint_elasticity": {"stiffness", "damping", "frequency", "motor_inertia"},
-        "base_resonance": {"frequency", "damping_ratio", "inertia"}, "backlash": {"gap"},
-        "contact": {"start", "duration", "force"}}
+        "base_resonance": {"frequency", "damping_ratio", "inertia"},
+        "backlash": {"gap"},
+        "contact": {"start", "duration", "force"},
+    }
     known = {name for name in fault_names() if find_fault(name).known}
     assert known == set(asked)
     for name in known:

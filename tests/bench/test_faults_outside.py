@@ -1,4 +1,6 @@
-"""Faults that no candidate describes do what their story says: closed forms and Pinocchio are the judges."""
+"""Faults that no candidate describes do what their story says: closed forms and Pinocchio are the
+judges.
+"""
 
 from __future__ import annotations
 
@@ -28,20 +30,28 @@ def test_at_least_six_kinds_are_outside_the_library() -> None:
 
 def settled(*faults: object) -> tuple[np.ndarray, np.ndarray]:
     """Position and torque (3,) after three seconds at rest, means of the last half second."""
-    recording = run(frictionless(paper_machine().ideal), Decentralised(), at_rest(CENTRE, 3.0), faults)  # type: ignore[arg-type]
+    recording = run(
+        frictionless(paper_machine().ideal), Decentralised(), at_rest(CENTRE, 3.0), faults
+    )  # type: ignore[arg-type]
     return recording.true_q[-500:].mean(axis=0), recording.tau[-500:].mean(axis=0)
 
 
 def weight(q: np.ndarray, mass: float, offset: np.ndarray) -> np.ndarray:
-    """Torque (3,) of gravity with a point mass at `offset` (3,) from the tip in the last joint's frame, by Pinocchio."""
+    """Torque (3,) of gravity with a point mass at `offset` (3,) from the tip in the last joint's
+    frame, by Pinocchio.
+    """
     arm = arm_of(paper_machine().robot)
     at = arm.link_in_joint[-1].translation + offset
-    arm.model.appendBodyToJoint(3, pin.Inertia(mass, np.zeros(3), np.eye(3) * 1e-9), pin.SE3(np.eye(3), at))
+    arm.model.appendBodyToJoint(
+        3, pin.Inertia(mass, np.zeros(3), np.eye(3) * 1e-9), pin.SE3(np.eye(3), at)
+    )
     return np.array(pin.computeGeneralizedGravity(arm.model, arm.model.createData(), q))
 
 
 def test_a_rattling_mass_rests_on_the_wall_below() -> None:
-    """At rest it weighs m g at one end of its gap: where gravity pulls it, pressed in by m g sin β/k."""
+    """At rest it weighs m g at one end of its gap: where gravity pulls it, pressed in by m g sin
+    β/k.
+    """
     fault = RattlingMass(None, 0.4, 0.02, (0.0, 1.0, 0.0))
     q, tau = settled(fault)
     fallen, other = (weight(q, 0.4, np.array([0.0, side * 0.01, 0.0])) for side in (-1.0, 1.0))
@@ -50,16 +60,29 @@ def test_a_rattling_mass_rests_on_the_wall_below() -> None:
 
 
 def test_a_rattling_mass_crosses_its_gap() -> None:
-    """While the arm sways fast enough, the torque is not that of a fixed mass: it changes by more than its own weight would."""
-    loose, fixed = (run(frictionless(paper_machine().ideal), Decentralised(), sway(1.5, hz=2.0, amplitude=0.25),
-                        [RattlingMass(None, 0.4, gap, (0.0, 1.0, 0.0))]) for gap in (0.02, 0.0))
+    """While the arm sways fast enough, the torque is not that of a fixed mass: it changes by more
+    than its own weight would.
+    """
+    loose, fixed = (
+        run(
+            frictionless(paper_machine().ideal),
+            Decentralised(),
+            sway(1.5, hz=2.0, amplitude=0.25),
+            [RattlingMass(None, 0.4, gap, (0.0, 1.0, 0.0))],
+        )
+        for gap in (0.02, 0.0)
+    )
     assert np.abs(loose.tau - fixed.tau)[300:, 1].max() > 0.2
 
 
 def test_a_sloshing_load_swings_at_its_frequency() -> None:
-    """Held still, the arm feels it swing at √(1 - ζ²) 2 Hz after it was let go, and then weighs what it should."""
+    """Held still, the arm feels it swing at √(1 - ζ²) 2 Hz after it was let go, and then weighs
+    what it should.
+    """
     fault = SloshingLoad(None, 0.5, 0.08, (0.0, 0.0, 1.0), (0.0, 1.0, 0.0))
-    recording = run(frictionless(paper_machine().ideal), Decentralised(), at_rest(CENTRE, 4.0), [fault])
+    recording = run(
+        frictionless(paper_machine().ideal), Decentralised(), at_rest(CENTRE, 4.0), [fault]
+    )
     swing = recording.tau[200:, 1] - recording.tau[200:, 1].mean()
     spectrum = np.abs(np.fft.rfft(swing * np.hanning(swing.size), 1 << 17))
     assert abs(np.fft.rfftfreq(1 << 17, 1e-3)[spectrum.argmax()] - 2.0) < 0.1
@@ -74,30 +97,56 @@ def test_cables_dissipate_whatever_the_speed() -> None:
         t = times(duration)
         w = 2.0 * math.pi * hz
         q = np.outer(0.5 * (1.0 - np.cos(w * t)), [0.0, 1.0, 0.0]) + CENTRE
-        dq, ddq = np.outer(0.5 * w * np.sin(w * t), [0, 1, 0]), np.outer(0.5 * w * w * np.cos(w * t), [0, 1, 0])
+        dq, ddq = (
+            np.outer(0.5 * w * np.sin(w * t), [0, 1, 0]),
+            np.outer(0.5 * w * w * np.cos(w * t), [0, 1, 0]),
+        )
         reference = Reference(t, q, dq, ddq)
         machine = frictionless(paper_machine().ideal)
-        law = FeedForward(LinkModel(machine, error=0.0))  # or errors of tracking would differ with speed
-        well, sick = (run(machine, law, reference, faults) for faults in ([], [CableHysteresis(2, 1, 0.6, 0.4)]))
+        law = FeedForward(
+            LinkModel(machine, error=0.0)
+        )  # or errors of tracking would differ with speed
+        well, sick = (
+            run(machine, law, reference, faults)
+            for faults in ([], [CableHysteresis(2, 1, 0.6, 0.4)])
+        )
         last = slice(len(t) // 2, None)  # the second cycle
-        work.append(sum(float(np.sum((r.tau * r.true_dq)[last])) * sign * 1e-3 for r, sign in ((sick, 1.0), (well, -1.0))))
+        work.append(
+            sum(
+                float(np.sum((r.tau * r.true_dq)[last])) * sign * 1e-3
+                for r, sign in ((sick, 1.0), (well, -1.0))
+            )
+        )
     assert work[0] > 0.1
     assert abs(work[0] - work[1]) < 0.05 * work[0]
 
 
 def torn_loose(rest: float) -> np.ndarray:
-    """Speed (100,) [rad/s] of a turntable of 0.8 kg m^2, sealed with 1 N m, under 2 N m from `rest` [s] on."""
+    """Speed (100,) [rad/s] of a turntable of 0.8 kg m^2, sealed with 1 N m, under 2 N m from `rest`
+    [s] on.
+    """
     t = times(rest + 0.1)
     torque = np.where(t < rest, 0.0, 2.0)[:, None]
-    recording = run(turntable(0.8), OpenLoop(torque, (True,)), at_rest(np.zeros(1), rest + 0.1), [StickingSeal(1, 1.0, 100.0)])
+    recording = run(
+        turntable(0.8),
+        OpenLoop(torque, (True,)),
+        at_rest(np.zeros(1), rest + 0.1),
+        [StickingSeal(1, 1.0, 100.0)],
+    )
     return recording.true_dq[-100:, 0]
 
 
 def test_a_seal_sticks_the_longer_it_rests() -> None:
-    """Motion and bond by scipy: dv/dt = (τ - s tanh 100v)/J, ds/dt = (1 - s)/0.1/(1 + (v/0.05)⁴) - s|v|/0.2."""
+    """Motion and bond by scipy: dv/dt = (τ - s tanh 100v)/J, ds/dt = (1 - s)/0.1/(1 + (v/0.05)⁴) -
+    s|v|/0.2.
+    """
+
     def rate(_: float, y: np.ndarray) -> list[float]:
         v, s = y
-        return [(2.0 - s * math.tanh(100.0 * v)) / 0.8, (1.0 - s) / 0.1 / (1.0 + (v / 0.05) ** 4) - s * abs(v) / 0.2]
+        return [
+            (2.0 - s * math.tanh(100.0 * v)) / 0.8,
+            (1.0 - s) / 0.1 / (1.0 + (v / 0.05) ** 4) - s * abs(v) / 0.2,
+        ]
 
     speeds = {}
     for rest in (0.0, 0.05, 0.5):
@@ -109,7 +158,9 @@ def test_a_seal_sticks_the_longer_it_rests() -> None:
 
 
 def test_a_strut_drags_with_the_root_of_the_relative_speed() -> None:
-    """c √|s| on joint 3 and -c √|s| on joint 2, s = v3 - v2, where s is fast; the waist feels nothing."""
+    """c √|s| on joint 3 and -c √|s| on joint 2, s = v3 - v2, where s is fast; the waist feels
+    nothing.
+    """
     m = measured(RelativeDamper(3, 2, 0.5))
     s = m.dq[:, 2] - m.dq[:, 1]
     expected = 0.5 * np.sqrt(np.abs(s)) * np.sign(s)
@@ -123,7 +174,12 @@ def test_a_strut_drags_with_the_root_of_the_relative_speed() -> None:
 def test_a_drive_hunts_faster_under_torque(torque: float) -> None:
     """A sine of A at f (1 + 0.3 u/u_max) on top of the command."""
     spy, machine = Spy(), turntable(0.8)
-    run(machine, OpenLoop(np.full((1000, 1), torque), (True,)), at_rest(np.zeros(1), 1.0), [HuntingDrive(1, 0.4, 5.0), spy])
+    run(
+        machine,
+        OpenLoop(np.full((1000, 1), torque), (True,)),
+        at_rest(np.zeros(1), 1.0),
+        [HuntingDrive(1, 0.4, 5.0), spy],
+    )
     applied = np.array(spy.applied)[:, 0] - torque
     t = (np.arange(len(applied)) + 1) * (1.0 / len(applied))
     rate = 5.0 * (1.0 + 0.3 * torque / machine.torque_limit[0])
@@ -131,7 +187,9 @@ def test_a_drive_hunts_faster_under_torque(torque: float) -> None:
 
 
 def test_friction_falls_with_what_was_run_not_with_time() -> None:
-    """At one and the same time and speed, joint 1 that has run since the start rubs less than one that has rested."""
+    """At one and the same time and speed, joint 1 that has run since the start rubs less than one
+    that has rested.
+    """
     fault = SelfHeating(1, 0.8, 4.5, 0.5, 100.0)
     m = measured(fault)
     warm, v = 0.0, m.dq[:, 0]
@@ -145,7 +203,9 @@ def test_friction_falls_with_what_was_run_not_with_time() -> None:
 
 
 def test_a_counterbalance_leaks_empty() -> None:
-    """Held half a radian away from its start, k p falls as an orifice lets it: √p linearly, √p = √p0 - c t/2."""
+    """Held half a radian away from its start, k p falls as an orifice lets it: √p linearly, √p =
+    √p0 - c t/2.
+    """
     machine, moved = frictionless(paper_machine().ideal), 0.5
     t = times(3.0)
     s = np.clip(t / 0.3, 0.0, 1.0)
@@ -153,7 +213,9 @@ def test_a_counterbalance_leaks_empty() -> None:
     rate = moved * 30 * s**2 * (1 - s) ** 2 / 0.3
     curve = moved * 60 * s * (1 - s) * (1 - 2 * s) / 0.09
     way = np.array([1.0, 0.0, 0.0])
-    reference = Reference(t, CENTRE + np.outer(shape, way), np.outer(rate, way), np.outer(curve, way))
+    reference = Reference(
+        t, CENTRE + np.outer(shape, way), np.outer(rate, way), np.outer(curve, way)
+    )
     tau = run(machine, Decentralised(), reference, [LeakingCounterbalance(1, 2.5)]).tau[:, 0] / 2.5
     settled = slice(800, 1200)  # the loop has rung out, the gas has not
     slope = np.polyfit(t[settled], np.sqrt(tau[settled]), 1)[0]

@@ -16,7 +16,9 @@ def of_kind(machine: Machine, kind: type) -> list:
 
 
 def test_the_arm_of_causes_md_has_one_millinewtonmetre_of_cogging_at_each_joint() -> None:
-    assert [fault.amplitude for fault in of_kind(draw_machine(3, "fault"), Cogging)] == pytest.approx([1e-3] * 3)
+    assert [
+        fault.amplitude for fault in of_kind(draw_machine(3, "fault"), Cogging)
+    ] == pytest.approx([1e-3] * 3)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -31,7 +33,10 @@ def test_ripple_along_a_slide_turns_over_within_its_travel() -> None:
     """8 rad/m would be no ripple but a straight line over the 0.3 m that it moves."""
     machine = machine_of(ROBOTS["scara"], 5)
     travel = float(np.ptp(ROBOTS["scara"].joints[2].position))
-    waves = [fault.order * travel / (2.0 * np.pi) for fault in (*of_kind(machine, GainRipple), *of_kind(machine, Cogging))
-             if fault.joint == 3]
+    waves = [
+        fault.order * travel / (2.0 * np.pi)
+        for fault in (*of_kind(machine, GainRipple), *of_kind(machine, Cogging))
+        if fault.joint == 3
+    ]
     assert len(waves) == 2
     assert min(waves) > 2.0

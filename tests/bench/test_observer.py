@@ -12,7 +12,11 @@ T, NOISE, JERK = 1e-3, 3e-6, 4000.0
 
 def model() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     gamma = np.array([[T**3 / 6], [T**2 / 2], [T]])
-    return np.array([[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]]), JERK**2 * gamma @ gamma.T, np.array([[1.0, 0.0, 0.0]])
+    return (
+        np.array([[1, T, T**2 / 2], [0, 1, T], [0, 0, 1]]),
+        JERK**2 * gamma @ gamma.T,
+        np.array([[1.0, 0.0, 0.0]]),
+    )
 
 
 def test_gain_solves_the_riccati_equation() -> None:
@@ -39,7 +43,9 @@ def test_recursion_is_filterpys() -> None:
         for k, value in enumerate(y[:, j]):
             if k:
                 reference.x = reference.F @ reference.x
-            reference.x = reference.x + np.array(gain)[:, None] * (value - reference.H @ reference.x)
+            reference.x = reference.x + np.array(gain)[:, None] * (
+                value - reference.H @ reference.x
+            )
             states.append(reference.x[:, 0])
         if j == 0:
             ours = []

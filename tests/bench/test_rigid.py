@@ -24,9 +24,17 @@ INNER = 2.5e-4  # [s]
 
 
 def standard_parameters(machine: Machine) -> np.ndarray:
-    """(n * 10,): m, m c, inertia about the frame's origin with positive products, as the description has them."""
+    """(n * 10,): m, m c, inertia about the frame's origin with positive products, as the
+    description has them.
+    """
     links = [joint.link for joint in machine.robot.joints]
-    return np.concatenate([[link.mass, *(link.mass * np.array(link.com)), *link.inertia] for link in links if link is not None])
+    return np.concatenate(
+        [
+            [link.mass, *(link.mass * np.array(link.com)), *link.inertia]
+            for link in links
+            if link is not None
+        ]
+    )
 
 
 def runge_kutta(arm: Arm, q: np.ndarray, torque: np.ndarray) -> np.ndarray:
@@ -35,6 +43,7 @@ def runge_kutta(arm: Arm, q: np.ndarray, torque: np.ndarray) -> np.ndarray:
     for tau in torque:
         path.append(q)
         for _ in range(round(SAMPLE_TIME / INNER)):
+
             def rate(x: np.ndarray, y: np.ndarray, tau: np.ndarray = tau) -> np.ndarray:
                 return np.array(pin.aba(arm.model, data, arm.offset(x), y, tau))
 
@@ -42,7 +51,10 @@ def runge_kutta(arm: Arm, q: np.ndarray, torque: np.ndarray) -> np.ndarray:
             k2 = rate(q + INNER / 2 * v, v + INNER / 2 * k1)
             k3 = rate(q + INNER / 2 * (v + INNER / 2 * k1), v + INNER / 2 * k2)
             k4 = rate(q + INNER * (v + INNER / 2 * k2), v + INNER * k3)
-            q, v = q + INNER * v + INNER**2 / 6 * (k1 + k2 + k3), v + INNER / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+            q, v = (
+                q + INNER * v + INNER**2 / 6 * (k1 + k2 + k3),
+                v + INNER / 6 * (k1 + 2 * k2 + 2 * k3 + k4),
+            )
     return np.array(path)
 
 
@@ -50,16 +62,23 @@ def worst_difference(machine: Machine, arm: Arm, seed: int, duration: float = 1.
     """Largest |q_bench - q_Pinocchio| [rad] under random torque held for 50 ms each."""
     rng = np.random.default_rng(seed)
     arm.load(standard_parameters(machine))
-    start = rng.uniform(-1.0, 1.0, machine.n) * [1.0 if joint.revolute else 0.2 for joint in machine.robot.joints]
+    start = rng.uniform(-1.0, 1.0, machine.n) * [
+        1.0 if joint.revolute else 0.2 for joint in machine.robot.joints
+    ]
     reference = at_rest(start, duration)
-    torque = np.repeat(rng.uniform(-0.3, 0.3, (reference.samples // 50, machine.n)), 50, axis=0) * machine.torque_limit
+    torque = (
+        np.repeat(rng.uniform(-0.3, 0.3, (reference.samples // 50, machine.n)), 50, axis=0)
+        * machine.torque_limit
+    )
     recording = run(frictionless(machine.ideal), OpenLoop(torque, (True,) * machine.n), reference)
     return float(np.abs(recording.true_q - runge_kutta(arm, start, torque)).max())
 
 
 @pytest.mark.parametrize("seed", seeds(20, 2))
 def test_free_motion_is_pinocchios(seed: int) -> None:
-    """20 machines drawn at random, no friction, open loop, 1 s: within 1e-8 rad of `aba` with RK4."""
+    """20 machines drawn at random, no friction, open loop, 1 s: within 1e-8 rad of `aba` with
+    RK4.
+    """
     machine = draw_machine(seed)
     assert worst_difference(machine, by_hand(machine.robot), seed) < 1e-8
 
@@ -82,8 +101,11 @@ def test_parts_of_the_torque_are_pinocchios() -> None:
         gravity = pin.rnea(arm.model, data, q, still, still)
         bias = pin.rnea(arm.model, data, q, dq, still)
         whole = pin.rnea(arm.model, data, q, dq, ddq)
-        for ours, theirs in zip(rigid.parts(q.tolist(), dq.tolist(), ddq.tolist()),
-                                (whole - bias, bias - gravity, gravity), strict=True):
+        for ours, theirs in zip(
+            rigid.parts(q.tolist(), dq.tolist(), ddq.tolist()),
+            (whole - bias, bias - gravity, gravity),
+            strict=True,
+        ):
             np.testing.assert_allclose(ours, theirs, atol=1e-11)
 
 
@@ -93,12 +115,18 @@ def test_every_drawn_body_can_exist() -> None:
         machine = draw_machine(seed, "fault", nuisances=False)
         for m, mx, my, mz, xx, yy, zz, xy, xz, yz in standard_parameters(machine).reshape(3, 10):
             half = 0.5 * (xx + yy + zz)
-            pseudo = [[half - xx, xy, xz, mx], [xy, half - yy, yz, my], [xz, yz, half - zz, mz], [mx, my, mz, m]]
+            pseudo = [
+                [half - xx, xy, xz, mx],
+                [xy, half - yy, yz, my],
+                [xz, yz, half - zz, mz],
+                [mx, my, mz, m],
+            ]
             assert np.linalg.eigvalsh(pseudo).min() > 0
 
 
 def test_the_papers_machine_has_the_printed_base_parameters() -> None:
-    """D(q) of its bodies against the printed p1, p2, p3, p5, p6, p7, p8 (Table V) where they alone decide.
+    """D(q) of its bodies against the printed p1, p2, p3, p5, p6, p7, p8 (Table V) where they alone
+    decide.
 
     D11 at q2 = q3 = 0 is p1 + 2 a2 p3 + p5 + p7, at q2 = 0, q3 = π/2 it is p1 + p7 (p4 = 0).
     """

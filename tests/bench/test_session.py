@@ -31,10 +31,19 @@ def machine() -> Machine:
 def plans(machine: Machine) -> list[Experiment]:
     model = LinkModel(machine)
     writing = experiments.writing(sway(0.5), model)
-    return [experiments.excitation(machine, 1, period=1.0, periods=1), experiments.free(machine, 1, duration=0.5),
-            experiments.hold(CENTRE, duration=0.5), *(experiments.friction(machine, j, 1, duration=1.0) for j in (1, 2, 3)),
-            experiments.reversal(machine, 2, duration=1.0), writing[0].before(), *writing[1:],
-            *(experiments.frf(machine, j, experiments.frf_postures(machine)[0], model, duration=2.0) for j in (1, 2, 3))]
+    return [
+        experiments.excitation(machine, 1, period=1.0, periods=1),
+        experiments.free(machine, 1, duration=0.5),
+        experiments.hold(CENTRE, duration=0.5),
+        *(experiments.friction(machine, j, 1, duration=1.0) for j in (1, 2, 3)),
+        experiments.reversal(machine, 2, duration=1.0),
+        writing[0].before(),
+        *writing[1:],
+        *(
+            experiments.frf(machine, j, experiments.frf_postures(machine)[0], model, duration=2.0)
+            for j in (1, 2, 3)
+        ),
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +59,9 @@ def of_a_moment(machine: Machine) -> tuple[Experiment, ExperimentLog]:
 
 
 def test_logs_are_of_the_format(logs: list[ExperimentLog], tmp_path: Path) -> None:
-    """Every kind is written and read again in both containers, unchanged, with nothing to be said."""
+    """Every kind is written and read again in both containers, unchanged, with nothing to be
+    said.
+    """
     for log in logs:
         for ending in ("h5", "parquet"):
             write_log(tmp_path / f"{log.name}.{ending}", log)
@@ -59,29 +70,46 @@ def test_logs_are_of_the_format(logs: list[ExperimentLog], tmp_path: Path) -> No
             assert not opened.checks
 
 
-def test_logs_pass_the_strict_checker(logs: list[ExperimentLog], shared: Path, tmp_path: Path) -> None:
+def test_logs_pass_the_strict_checker(
+    logs: list[ExperimentLog], shared: Path, tmp_path: Path
+) -> None:
     """check_log.py finds no fault."""
     import subprocess
     import sys
 
     for log in logs:
         write_log(tmp_path / f"{log.name}.h5", log)
-    done = subprocess.run([sys.executable, str(shared / "tools" / "check_log.py"), str(tmp_path)], check=False,
-                          capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, str(shared / "tools" / "check_log.py"), str(tmp_path)],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_every_kind_of_experiment_is_there(logs: list[ExperimentLog]) -> None:
-    assert {log.experiment for log in logs} == {"excitation", "free", "hold", "friction", "writing", "frf"}
+    assert {log.experiment for log in logs} == {
+        "excitation",
+        "free",
+        "hold",
+        "friction",
+        "writing",
+        "frf",
+    }
     assert {log.role for log in logs} == {"identify", "validate", "reference"}
     assert len({log.name for log in logs}) == len(logs)
 
 
 @pytest.mark.parametrize("name", fault_names())
-def test_nothing_in_a_log_tells_the_fault(name: str, machine: Machine, of_a_moment: tuple[Experiment, ExperimentLog]) -> None:
-    """But for the samples, the log of a sick machine is that of the healthy one; its numbers have the same steps."""
+def test_nothing_in_a_log_tells_the_fault(
+    name: str, machine: Machine, of_a_moment: tuple[Experiment, ExperimentLog]
+) -> None:
+    """But for the samples, the log of a sick machine is that of the healthy one; its numbers have
+    the same steps.
+    """
     moment, well = of_a_moment
-    sick, = record(machine, [make(name, machine, 2)], [moment], seed=3)
+    (sick,) = record(machine, [make(name, machine, 2)], [moment], seed=3)
     assert list(well.signals) == list(sick.signals)
     assert replace(sick, signals=well.signals) == well
     assert "link" not in sick.robot_text
@@ -107,10 +135,14 @@ def test_references_keep_the_limits(machine: Machine, plans: list[Experiment]) -
             assert (np.abs(signal).max(axis=0) <= 1.001 * limits).all(), (plan.name, key)
 
 
-@pytest.mark.parametrize("joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)])
-def test_friction_logs_go_through_two_decades_of_speed_both_ways(joint: int, machine: Machine) -> None:
+@pytest.mark.parametrize(
+    "joint", [pytest.param(1, marks=pytest.mark.slow), 2, pytest.param(3, marks=pytest.mark.slow)]
+)
+def test_friction_logs_go_through_two_decades_of_speed_both_ways(
+    joint: int, machine: Machine
+) -> None:
     """Of the open joint alone; the held ones stay within 0.05 rad of where they are."""
-    log, = record(machine, [], [experiments.friction(machine, joint, 2, duration=5.0)])
+    (log,) = record(machine, [], [experiments.friction(machine, joint, 2, duration=5.0)])
     speed = np.gradient(log.q[:, joint - 1], 1e-3)
     for way in (speed, -speed):
         moving = way[way > 0.01]
@@ -121,8 +153,13 @@ def test_friction_logs_go_through_two_decades_of_speed_both_ways(joint: int, mac
 
 
 def test_a_law_that_the_log_cannot_say_is_unknown(machine: Machine) -> None:
-    """Gravity balanced from the position is no open loop; the waist, which gravity leaves alone, is driven open loop."""
-    laws = [experiments.friction(machine, joint, 2, duration=1.0).law.describe(machine).law for joint in (1, 2, 3)]
+    """Gravity balanced from the position is no open loop; the waist, which gravity leaves alone, is
+    driven open loop.
+    """
+    laws = [
+        experiments.friction(machine, joint, 2, duration=1.0).law.describe(machine).law
+        for joint in (1, 2, 3)
+    ]
     assert laws == ["open-loop", "unknown", "unknown"]
 
 
@@ -134,4 +171,6 @@ def test_answers_are_named_as_findings_are(machine: Machine) -> None:
 
 
 def test_peak_torque(logs: list[ExperimentLog]) -> None:
-    assert peak_torque(logs[:2]) == tuple(max(np.abs(log.tau[:, j]).max() for log in logs[:2]) for j in range(3))
+    assert peak_torque(logs[:2]) == tuple(
+        max(np.abs(log.tau[:, j]).max() for log in logs[:2]) for j in range(3)
+    )

@@ -1,4 +1,4 @@
-"""The bars of frequency responses on the virtual test bench: a part of `benchmarks/frf.py`, recorded anew."""
+"""The bars of frequency responses on the virtual test bench."""
 
 from __future__ import annotations
 
