@@ -28,6 +28,7 @@ import time
 import tracemalloc
 from collections.abc import Callable
 from functools import partial
+from itertools import product
 
 import numpy as np
 from filterpy.kalman import KalmanFilter
@@ -107,80 +108,29 @@ def error(states: np.ndarray, reference: np.ndarray) -> float:
 
 
 def compare(samples: int, with_statsmodels: bool) -> None:
-    y = measured(samples)
+    y, size = measured(samples), f"{samples:.0e} × 3"
     observer = design(T, SIGMA, R)
     smoother = Smoother(observer)
-    size = f"{samples:.0e} × 3"
-    seen, smoothed = their_observer(y), their_smoother(y)
-    fresh = design(T, SIGMA, R)  # what "designed anew" gives, in a run of its own
-    contests: list[tuple[str, Callable[[], object], Callable[[], object], float]] = [
-        (
-            "observer, kept, known start",
-            lambda: observe(y, observer, START),
-            lambda: their_observer(y),
-            error(observe(y, observer, START).states, seen),
-        ),
-        (
-            "observer, kept, unknown start",
-            lambda: observe(y, observer),
-            lambda: their_observer(y),
-            error(observe(y, observer).states[:, observer.settled :], seen[observer.settled :]),
-        ),
-        (
-            "observer, new, known start",
-            lambda: observe(y, design(T, SIGMA, R), START),
-            lambda: their_observer(y),
-            error(observe(y, fresh, START).states, seen),
-        ),
-        (
-            "observer, new, unknown start",
-            lambda: observe(y, design(T, SIGMA, R)),
-            lambda: their_observer(y),
-            error(
-                observe(y, design(T, SIGMA, R)).states[:, observer.settled :],
-                seen[observer.settled :],
-            ),
-        ),
-        (
-            "smoother, kept, known start",
-            lambda: smooth(y, smoother, START),
-            lambda: their_smoother(y),
-            error(smooth(y, smoother, START).states, smoothed),
-        ),
-        (
-            "smoother, kept, unknown start",
-            lambda: smooth(y, smoother),
-            lambda: their_smoother(y),
-            error(smooth(y, smoother).states[:, observer.settled :], smoothed[observer.settled :]),
-        ),
-        (
-            "smoother, new, known start",
-            lambda: smooth(y, design(T, SIGMA, R), START),
-            lambda: their_smoother(y),
-            error(smooth(y, fresh, START).states, smoothed),
-        ),
-        (
-            "smoother, new, unknown start",
-            lambda: smooth(y, design(T, SIGMA, R)),
-            lambda: their_smoother(y),
-            error(
-                smooth(y, design(T, SIGMA, R)).states[:, observer.settled :],
-                smoothed[observer.settled :],
-            ),
-        ),
-    ]
+    for name, ours, theirs, kept in (
+        ("observer", observe, their_observer, observer),
+        ("smoother", smooth, their_smoother, smoother),
+    ):
+        reference = theirs(y)
+        for of, start in product((kept, None), (START, None)):
+
+            def run(ours=ours, of=of, start=start):  # type: ignore[no-untyped-def]
+                return ours(y, of or design(T, SIGMA, R), start)
+
+            first = 0 if start else observer.settled
+            apart = error(run().states[:, first:], reference[first:])
+            title = f"{name}, {'kept' if of else 'new'}, {'known' if start else 'unknown'} start"
+            contest = race(run, partial(theirs, y), repeats=5)
+            print(row(f"{size}, {title}", contest, apart, 0.0), flush=True)
     if with_statsmodels:
-        reference = statsmodels_smoother(y)
-        contests.append(
-            (
-                "smoother, against statsmodels",
-                lambda: smooth(y, smoother, START),
-                lambda: statsmodels_smoother(y),
-                error(smooth(y, smoother, START).states, reference),
-            )
-        )
-    for name, ours, theirs, apart in contests:
-        print(row(f"{size}, {name}", race(ours, theirs, repeats=5), apart, 0.0), flush=True)
+        known = partial(smooth, y, smoother, START)
+        contest = race(known, partial(statsmodels_smoother, y), repeats=5)
+        apart = error(known().states, statsmodels_smoother(y))
+        print(row(f"{size}, smoother, against statsmodels", contest, apart, 0.0), flush=True)
 
 
 def grow(largest: int) -> None:

@@ -22,11 +22,12 @@ from benchmarks.side_by_side import HEADER, race, row  # isort: skip  # before n
 import argparse
 import gc
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import signal
 
+from pipelines.fit.rational import Mode
 from pipelines.fit.rational_search import fit_rational
 from pipelines.signal.cross_spectra import cross_spectra, welch_responses
 from pipelines.signal.frequency_response import closed_loop
@@ -170,6 +171,36 @@ def light_mode(seeds: int = 10) -> str:
     )
 
 
+def _in_a_loop(plant: Plant, multisine: bool, rng: np.random.Generator) -> tuple[np.ndarray, ...]:
+    """Record the plant for 56 s in a loop with disturbances."""
+    spectrum = np.zeros(2001, dtype=complex)
+    spectrum[4:1000] = np.exp(2j * np.pi * rng.random(996))
+    if multisine:
+        v = np.resize(np.fft.irfft(spectrum, 4000), 56_000)
+    else:
+        v = rng.standard_normal(56_000)
+    drift = np.cumsum(rng.standard_normal(len(v)))
+    disturbance = 3.0 * drift / drift.std() + 2.0 * rng.standard_normal(len(v))
+    noise = 2e-6 * rng.standard_normal(len(v))
+    return closed_loop_record(plant, 10.0 * v / v.std(), disturbance, noise, 400.0, 28.0)
+
+
+def _beside_the_truth(
+    plant: Plant, fitted: Sequence[Mode]
+) -> list[tuple[float, float, bool, bool]]:
+    """Return errors of frequency and damping of each true mode, and whether within 95 %."""
+    rows = []
+    truth = [("antiresonance", *z) for z in plant.antiresonances()]
+    truth += [("resonance", f, z) for f, z, _ in plant.modes]
+    for kind, hertz, damping in truth:
+        alike = [mode for mode in fitted if mode.kind == kind]
+        one = min(alike, key=lambda mode, f=hertz: abs(mode.frequency.value - f))
+        f, z = one.frequency, one.damping
+        off, damped = abs(f.value - hertz), abs(z.value - damping)
+        rows.append((off / hertz, damped / damping, off < 1.96 * f.std, damped < 1.96 * z.std))
+    return rows
+
+
 def modes(plants: int) -> str:
     """Fit base at 24-32 Hz and joint at 40-120 Hz in a loop with disturbances; four modes each."""
     found: dict[str, list[tuple[float, float, bool, bool]]] = {
@@ -186,29 +217,13 @@ def modes(plants: int) -> str:
                     (rng.uniform(40, 120), rng.uniform(0.01, 0.04), rng.uniform(0.3, 1.5)),
                 )
             )
-            spectrum = np.zeros(2001, dtype=complex)
-            spectrum[4:1000] = np.exp(2j * np.pi * rng.random(996))
-            v = (
-                np.resize(np.fft.irfft(spectrum, 4000), 56_000)
-                if way == "multisine"
-                else rng.standard_normal(56_000)
-            )
-            drift = np.cumsum(rng.standard_normal(len(v)))
-            x = closed_loop_record(
-                plant,
-                10.0 * v / v.std(),
-                3.0 * drift / drift.std() + 2.0 * rng.standard_normal(len(v)),
-                2e-6 * rng.standard_normal(len(v)),
-                400.0,
-                28.0,
-            )
+            x, multisine = _in_a_loop(plant, way == "multisine", rng), way == "multisine"
             start = time.process_time()
             stretches = (x[:28_000], x[28_000:])
-            several = (
-                multisine_responses(stretches, RATE, 4000).noise
-                if way == "multisine"
-                else local_polynomial(stretches, RATE, np.arange(2.0, 200.0, 0.25))
-            )
+            if multisine:
+                several = multisine_responses(stretches, RATE, 4000).noise
+            else:
+                several = local_polynomial(stretches, RATE, np.arange(2.0, 200.0, 0.25))
             p = closed_loop(several).within(2.0, 200.0)
             fitted = fit_rational(
                 p.frequency,
@@ -221,23 +236,7 @@ def modes(plants: int) -> str:
             )
             seconds += time.process_time() - start
             extra += max(len(fitted.modes()) - 4, 0)
-            truth = [("antiresonance", *z) for z in plant.antiresonances()] + [
-                ("resonance", f, z) for f, z, _ in plant.modes
-            ]
-            for kind, hertz, damping in truth:
-                one = min(
-                    (m for m in fitted.modes() if m.kind == kind),
-                    key=lambda m, f=hertz: abs(m.frequency.value - f),
-                )
-                f, z = one.frequency, one.damping
-                rows.append(
-                    (
-                        abs(f.value / hertz - 1.0),
-                        abs(z.value / damping - 1.0),
-                        abs(f.value - hertz) < 1.96 * f.std,
-                        abs(z.value - damping) < 1.96 * z.std,
-                    )
-                )
+            rows += _beside_the_truth(plant, fitted.modes())
     lines = [
         f"modes, {plants} plants, two excitations: {extra} that are not there, "
         f"{seconds / plants / 2:.2f} s of CPU each"

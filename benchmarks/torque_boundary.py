@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -89,49 +89,38 @@ def _dh(
     """Draw (a, alpha, d, type) of each joint, and the mean posture."""
     h, u = np.pi / 2, rng.uniform
     if family == "rrr":
-        return [
-            (0, h, u(0.3, 0.6), "revolute"),
-            (u(0.15, 0.5), 0, u(0, 0.2), "revolute"),
-            (u(0.15, 0.5), 0, u(0, 0.1), "revolute"),
-        ], [0, -0.8, 0.6]
+        rows = [(0, h, u(0.3, 0.6)), (u(0.15, 0.5), 0, u(0, 0.2)), (u(0.15, 0.5), 0, u(0, 0.1))]
+        return _turning(rows), [0, -0.8, 0.6]
     if family == "scara":
-        return [
-            (u(0.2, 0.4), 0, u(0.2, 0.4), "revolute"),
-            (u(0.2, 0.4), np.pi, 0, "revolute"),
-            (0, 0, 0, "prismatic"),
-            (0, 0, u(0.05, 0.1), "revolute"),
-        ], [0, 0.5, 0.15, 0]
+        first, second = (u(0.2, 0.4), 0, u(0.2, 0.4)), (u(0.2, 0.4), np.pi, 0)
+        slide = (0, 0, 0, "prismatic")
+        last = (0, 0, u(0.05, 0.1))
+        return [*_turning([first, second]), slide, *_turning([last])], [0, 0.5, 0.15, 0]
     if family == "ur":
         s = u(0.6, 1.5)
-        return [
-            (0, h, 0.09 * s, "revolute"),
-            (-0.425 * s, 0, 0, "revolute"),
-            (-0.392 * s, 0, 0, "revolute"),
-            (0, h, 0.11 * s, "revolute"),
-            (0, -h, 0.095 * s, "revolute"),
-            (0, 0, 0.08 * s, "revolute"),
-        ], [0, -1.2, 1.2, -1.5, -1.5, 0]
+        rows = [(0, h, 0.09 * s), (-0.425 * s, 0, 0), (-0.392 * s, 0, 0)]
+        rows += [(0, h, 0.11 * s), (0, -h, 0.095 * s), (0, 0, 0.08 * s)]
+        return _turning(rows), [0, -1.2, 1.2, -1.5, -1.5, 0]
     if family == "six":
         s = u(0.6, 2.0)
-        return [
-            (0.1 * s, -h, 0.4 * s, "revolute"),
-            (0.4 * s, 0, 0, "revolute"),
-            (0.03 * s, -h, 0, "revolute"),
-            (0, h, 0.4 * s, "revolute"),
-            (0, -h, 0, "revolute"),
-            (0, 0, 0.08 * s, "revolute"),
-        ], [0, -1.2, 0.3, 0, 0.6, 0]
+        rows = [(0.1 * s, -h, 0.4 * s), (0.4 * s, 0, 0), (0.03 * s, -h, 0)]
+        rows += [(0, h, 0.4 * s), (0, -h, 0), (0, 0, 0.08 * s)]
+        return _turning(rows), [0, -1.2, 0.3, 0, 0.6, 0]
     if family == "seven":
         s = u(0.7, 1.2)
-        return [
-            (0, -h, 0.34 * s, "revolute"),
-            (0, h, 0, "revolute"),
-            (0, h, 0.4 * s, "revolute"),
-            (0, -h, 0, "revolute"),
-            (0, -h, 0.4 * s, "revolute"),
-            (0, h, 0, "revolute"),
-            (0, 0, 0.12 * s, "revolute"),
-        ], [0, 0.6, 0, -1.2, 0, 0.8, 0]
+        rows = [(0, -h, 0.34 * s), (0, h, 0), (0, h, 0.4 * s), (0, -h, 0)]
+        rows += [(0, -h, 0.4 * s), (0, h, 0), (0, 0, 0.12 * s)]
+        return _turning(rows), [0, 0.6, 0, -1.2, 0, 0.8, 0]
+    return _any_arm(rng)
+
+
+def _turning(rows: Sequence[tuple[float, float, float]]) -> list[tuple[float, float, float, str]]:
+    return [(a, alpha, d, "revolute") for a, alpha, d in rows]
+
+
+def _any_arm(rng: np.random.Generator) -> tuple[list[tuple[float, float, float, str]], list[float]]:
+    """Draw two to seven joints of any kind, and the mean posture."""
+    h, u = np.pi / 2, rng.uniform
     n = int(rng.integers(2, 8))
     rows = []
     for k in range(n):

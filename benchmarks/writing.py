@@ -26,6 +26,7 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.regressor import rrr
+from pipelines.io.experiment import Array
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.rrr_kinematics import BRANCHES, Geometry, inverse, rrr_geometry, tip
 from pipelines.model.writing.inverse import ClosedForm, Numerical
@@ -115,43 +116,23 @@ def main() -> None:
     def theirs() -> np.ndarray:
         return newton(model, tips, q[0], behind)
 
-    def line(
-        name: str,
-        ours: Callable[[], object],
-        mine: np.ndarray,
-        peer: Callable[[], np.ndarray],
-        other: np.ndarray,
-    ) -> str:
-        errors = (
-            missed(geometry, mine, tips[: len(mine)]),
-            missed(geometry, other, tips[: len(other)]),
-        )
-        few = min(len(mine), len(other))
-        return (
-            f"{row(name, race(ours, peer, 5), *errors)}   apart "
-            f"{np.abs(mine[:few] - other[:few]).max():.1e} rad"
-        )
+    def line(name: str, ours: Callable[[], object], q: Array, peer: Callable[[], Array]) -> str:
+        other = peer()
+        few = min(len(q), len(other))
+        errors = missed(geometry, q, tips[: len(q)]), missed(geometry, other, tips[: len(other)])
+        apart = np.abs(q[:few] - other[:few]).max()
+        return f"{row(name, race(ours, peer, 5), *errors)}   apart {apart:.1e} rad"
 
     print(f"'{arguments.text}', {len(t)} samples, {task.duration:.1f} s\n{HEADER}")
-    iterated = theirs()
-    print(line("q, against Newton on Pinocchio", closed, q, theirs, iterated), flush=True)
-    print(line("q, dq, ddq, against its q alone", motion, q, theirs, iterated), flush=True)
+    print(line("q, against Newton on Pinocchio", closed, q, theirs), flush=True)
+    print(line("q, dq, ddq, against its q alone", motion, q, theirs), flush=True)
     answer = general()
     assert isinstance(answer, tuple)
-    print(line("any serial arm: q, dq, ddq", general, answer[0], theirs, iterated), flush=True)
+    print(line("any serial arm: q, dq, ddq", general, answer[0], theirs), flush=True)
     if arguments.toolbox:
-        few = tips[:_TOOLBOX_SAMPLES]
-        run = toolbox(few, q[:_TOOLBOX_SAMPLES])
-        few_q = q[:_TOOLBOX_SAMPLES]
-        print(
-            line(
-                f"{len(few)} samples, Robotics Toolbox",
-                lambda: inverse(geometry, few),
-                few_q,
-                run,
-                run(),
-            )
-        )
+        few, few_q = tips[:_TOOLBOX_SAMPLES], q[:_TOOLBOX_SAMPLES]
+        name = f"{len(few)} samples, Robotics Toolbox"
+        print(line(name, lambda: inverse(geometry, few), few_q, toolbox(few, few_q)))
 
 
 if __name__ == "__main__":

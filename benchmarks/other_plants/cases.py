@@ -91,52 +91,32 @@ class Case:
             own = np.random.default_rng([seed, place])
             t: Array = np.arange(round(self.duration / self.sample_time)) * self.sample_time
             path = motion(kind, arm, t, own)
-            loop = Loop(
-                self.loop,
-                arm,
-                self.sample_time,
-                inertia,
-                min(5.0, 0.02 / self.sample_time),
-                counts,
-                limit,
-            )
-            now = (
-                ()
-                if role == "reference"
-                else tuple(one for one in sick if one.kind != "contact" or place == _TOUCHED)
-            )
-            plant = Plant(
-                self._bent(arm) if now else arm,
-                law,
-                now,
-                self.noise * typical,
-                self.coloured,
-                resolution,
-            )
+            cycle = min(5.0, 0.02 / self.sample_time)
+            loop = Loop(self.loop, arm, self.sample_time, inertia, cycle, counts, limit)
+            now = [one for one in sick if one.kind != "contact" or place == _TOUCHED]
+            if role == "reference":
+                now = []
+            bodies, noise = self._bent(arm) if now else arm, self.noise * typical
+            plant = Plant(bodies, law, tuple(now), noise, self.coloured, resolution)
             q, tau = plant.run(loop, path, self.sample_time, own)
-            values = {
-                "t": t + 3.0 * place,
-                "q": q,
-                "tau": tau,
-                **dict(zip(("q_ref", "dq_ref", "ddq_ref"), path, strict=True)),
-            }
+            values = {"t": t + 3.0 * place, "q": q, "tau": tau}
+            values |= dict(zip(("q_ref", "dq_ref", "ddq_ref"), path, strict=True))
             signals = {
                 name: Signal(array, schema.unit_of(name, "pd"), schema.SIGNALS[name][1])
                 for name, array in values.items()
             }
-            logs.append(
-                ExperimentLog(
-                    name=f"{role}-{kind}-{place}",
-                    experiment="excitation" if kind == "fourier" else "free",
-                    role=role,
-                    origin="simulated",
-                    robot_name=robot.name,
-                    sample_time=self.sample_time,
-                    robot_text=format_robot(robot),
-                    signals=signals,
-                    controller=loop.told(),
-                )
+            log = ExperimentLog(
+                name=f"{role}-{kind}-{place}",
+                experiment="excitation" if kind == "fourier" else "free",
+                role=role,
+                origin="simulated",
+                robot_name=robot.name,
+                sample_time=self.sample_time,
+                robot_text=format_robot(robot),
+                signals=signals,
+                controller=loop.told(),
             )
+            logs.append(log)
         return logs
 
     def _fault(self, typical: Array, law: Friction, speed: Array) -> Fault | None:
