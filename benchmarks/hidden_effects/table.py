@@ -59,13 +59,9 @@ def table(scores: Sequence[Score]) -> str:
 
 def rows(scores: Sequence[Score]) -> list[Row]:
     """One row of the issue's table after the other."""
-    of = {
-        name: [one for one in scores if one.family == name]
-        for name in {one.family for one in scores}
-    }
 
     def family(*names: str) -> list[Score]:
-        return [one for name in names for one in of.get(name, [])]
+        return [one for name in names for one in scores if one.family == name]
 
     def right(title: str, bar: float | None, *names: str) -> Row:
         return _counted(title, [one.right for one in family(*names)], bar)
