@@ -188,8 +188,7 @@ def _read(kind: str, path: Path) -> str:
         elif kind == "recipe":
             parse_recipe(path.read_text(encoding="utf-8", errors="surrogateescape"), path)
         elif kind == "settings":
-            stage = __import__("pipelines.convert", fromlist=["STAGE"]).STAGE
-            make_settings(stage.settings, "convert", ("convert", "diagnose"), path, (), {})
+            make_settings("convert", path, (), {})
         else:
             guess_recipe(path)
         outcome = "read"

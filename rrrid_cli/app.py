@@ -17,6 +17,8 @@ from pipelines.errors import Check, EnvironmentFault, UsageError, did_you_mean, 
 from pipelines.io.option import option
 from rrrid_cli import console
 from rrrid_cli.options import (
+    COMMANDS,
+    STAGES,
     Common,
     make_settings,
     parameters,
@@ -32,85 +34,49 @@ if TYPE_CHECKING:
 
 __all__ = ["STAGES", "build", "schema_of"]
 
-# In the order in which they are needed.
-COMMANDS = ["run", "batch", "demo", "inspect", "import", "convert", "design-excitation"]
-COMMANDS += ["fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf", "simulate"]
-COMMANDS += ["diagnose", "extend", "compare", "report", "schema", "doctor"]
-STAGES = tuple(name for name in COMMANDS if name not in ("batch", "report", "schema", "doctor"))
+# Fields of `Inputs` that a command takes beside its settings; any other has those of a command that
+# reads logs by their roles.
+LOGS = ("logs", "joints", "session")
+ROLES = ("logs", "identify", "validate", "reference", "joints", "session")
+INPUTS = {"inspect": LOGS, "convert": LOGS, "reconstruct": LOGS, "demo": (), "import": ()}
+INPUTS |= {"simulate": ("replay", "session"), "design-excitation": ("prior_logs", "session")}
+INPUTS |= {"compare": ("a", "b"), "report": ("folder",), "schema": ("what",), "doctor": ("quick",)}
+REQUIRED = ("a", "b", "folder", "root")
 # Shared options without effect: they are accepted, and help is silent about them.
-IDLE: dict[str, tuple[str, ...]] = {
-    "inspect": ("format",),
-    "frf": ("format",),
-    "diagnose": ("format",),
-}
+IDLE: dict[str, tuple[str, ...]]
+IDLE = {"inspect": ("format",), "frf": ("format",), "diagnose": ("format",)}
 IDLE |= {"import": ("check",), "convert": ("check",), "simulate": ("check",)}
-IDLE |= {
-    "compare": ("robot", "assume_units", "format", "strict"),
-    "demo": ("robot", "assume_units"),
-}
+IDLE |= {"demo": ("robot", "assume_units")}
+IDLE |= {"compare": ("robot", "assume_units", "format", "strict")}
+# Shared options of commands that do not take them all.
+SHARED = {"report": ("out", "force", "quiet", "debug"), "schema": (), "doctor": ("json", "debug")}
 OUT = {"demo": "demo", "batch": "runs/several/ROOT/batch", "report": "DIR"}
 
 
 @dataclass(frozen=True)
-class Nothing:
-    """No inputs but those that the settings name."""
-
-
-@dataclass(frozen=True)
-class Session:
-    """Which of the logs are taken."""
-
-    text = "Of several robots or days take this: 'ROBOT', or 'ROBOT 2026-05-18'."
-    session: str = option("", text)
-
-
-@dataclass(frozen=True)
-class Logs(Session):
-    """Logs that are all used alike."""
-
-    logs: tuple[Path, ...] = option((), "Logs, or folders of logs.", "LOGS", required=True)
-    joints: tuple[int, ...] = option(
-        (), "Joints to take of every log: 1,3; --robot describes them."
-    )
-
-
-@dataclass(frozen=True)
-class RoleLogs(Logs):
-    """Logs by their roles."""
+class Inputs:
+    """What commands work on."""
 
     logs: tuple[Path, ...] = option((), "Logs, or folders of logs.", "LOGS")
+    a: Path = option(Path(), "A command's folder, result.json or model.json.", "A")
+    b: Path = option(Path(), "Another one of the same command.", "B")
+    folder: Path = option(Path(), "A folder that a command has left.", "DIR")
+    what: str = option("model", "A command, for its result.json; model; log.", "WHAT")
+    replay: tuple[Path, ...] = option((), "Log to replay, or a folder. Repeatable.")
+    prior_logs: tuple[Path, ...] = option((), "Earlier logs, or a result of frf. Repeatable.")
     identify: tuple[str, ...] = option((), "Identification logs, instead of the logs' own roles.")
     validate: tuple[str, ...] = option((), "Validation logs, instead of the logs' own roles.")
     reference: tuple[str, ...] = option((), "Logs of the arm as it was before.")
-
-
-@dataclass(frozen=True)
-class Replay(Session):
-    """Logs to imitate."""
-
-    replay: tuple[Path, ...] = option((), "Log to replay, or a folder. Repeatable.")
-
-
-@dataclass(frozen=True)
-class PriorLogs(Session):
-    """Logs of earlier experiments."""
-
-    prior_logs: tuple[Path, ...] = option((), "Earlier logs, or a result of frf. Repeatable.")
-
-
-@dataclass(frozen=True)
-class Results:
-    """Two results."""
-
-    a: Path = option(Path(), "A command's folder, result.json or model.json.", "A", required=True)
-    b: Path = option(Path(), "Another one of the same command.", "B", required=True)
+    joints: tuple[int, ...] = option((), "Joints to take of every log: 1,3. --robot is theirs.")
+    session: str = option("", "Of several robots or days: 'ROBOT', or 'ROBOT 2026-05-18'.")
+    quick: bool = option(False, "Leave the self-test out.")
 
 
 @dataclass(frozen=True)
 class Batch:
     """Many folders of logs, and how they are worked through."""
 
-    root: Path = option(Path(), "Folder with many folders of logs.", "ROOT", required=True)
+    root: Path = option(Path(), "Folder with many folders of logs.", "ROOT")
     stage: str = option("run", "Command to run on each: run, estimate-bps, inspect, …")
     each_log: bool = option(False, "On each log, not on each folder that holds logs.")
     jobs: int | None = option(None, "Items at a time. [as many as there are cores]")
@@ -121,36 +87,7 @@ class Batch:
     shard: str | None = option(None, "I/N: every Nth item alone, from the Ith on. [all]")
     backend: str = option("local", "local, or dask://HOST:PORT: a Dask scheduler.")
     baseline: str | None = option(None, "Known model.json: only what goes beyond it is found.")
-    joints: tuple[int, ...] = option(
-        (), "Joints to take of every log: 1,3; --robot describes them."
-    )
-
-
-@dataclass(frozen=True)
-class Folder:
-    """The result of a command."""
-
-    folder: Path = option(Path(), "A folder that a command has left.", "DIR", required=True)
-
-
-@dataclass(frozen=True)
-class Schema:
-    """Which schema is printed."""
-
-    what: str = option("model", "A command, for its result.json; model; log.", "WHAT")
-
-
-@dataclass(frozen=True)
-class Doctor:
-    """How much is examined."""
-
-    quick: bool = option(False, "Leave the self-test out.")
-
-
-INPUTS = {"demo": Nothing, "import": Nothing, "inspect": Logs, "convert": Logs, "reconstruct": Logs}
-INPUTS |= {"design-excitation": PriorLogs, "simulate": Replay, "compare": Results, "batch": Batch}
-INPUTS |= {"report": Folder, "schema": Schema, "doctor": Doctor}  # any other: RoleLogs
-SHARED = {"report": ("out", "force", "quiet", "debug"), "schema": (), "doctor": ("json", "debug")}
+    joints: tuple[int, ...] = option((), "Joints to take of every log: 1,3. --robot is theirs.")
 
 
 def build(word: str) -> typer.Typer:
@@ -161,9 +98,8 @@ def build(word: str) -> typer.Typer:
     for name in COMMANDS:
         title = _title(name)
         if name == word:
-            app.command(name, help=_help(name), short_help=title, epilog=_end(name))(
-                _function(name)
-            )
+            call, text, end = _function(name), _help(name), _end(name)
+            app.command(name, help=text, short_help=title, epilog=end)(call)
         else:
             app.command(name, short_help=title)(_not_called)
     return app
@@ -194,7 +130,10 @@ def _function(name: str) -> Callable[..., None]:
     def called(**given: Any) -> None:
         raise typer.Exit(ACTIONS.get(name, _stage)(name, given))
 
-    options = parameters(INPUTS.get(name, RoleLogs))
+    needed = REQUIRED if "identify" in INPUTS.get(name, ROLES) else (*REQUIRED, "logs")
+    options = parameters(Inputs, INPUTS.get(name, ROLES), needed)
+    if name == "batch":
+        options = parameters(Batch, required=REQUIRED)
     if name in STAGES:
         options += parameters(stage_of(name).settings)
     out = f"Folder for the output. [{OUT.get(name, 'runs/ROBOT/FOLDER/COMMAND')}]"
@@ -244,26 +183,20 @@ def _read(name: str, given: Mapping[str, Any]) -> tuple[Any, Any, Any, Common]:
     from pipelines.stage import Request
 
     stage, common = stage_of(name), read(Common, given)
-    inputs = vars(read(INPUTS.get(name, RoleLogs), given))
-    own, sets = read_values(stage.settings, given), common.set
-    roles = {
-        role: inputs[role] for role in ("identify", "validate", "reference") if inputs.get(role)
-    }
+    inputs, own = read_values(Inputs, given), read_values(stage.settings, given)
+    roles = {name: inputs[name] for name in ROLES[1:4] if name in inputs}
     if "identify" in _names_of(stage.settings):
         own, roles = own | roles, {}
+    sets = common.set
     if name == "convert" and given["common_format"]:
         sets = (f"convert.to={common.format}", *sets)
     if name == "estimate-bps" and common.no_report:
         own["compare"] = False  # what only the report shows
-    settings = make_settings(stage.settings, name, STAGES, common.config, sets, own)
-    paths = [inputs.get(key, ()) for key in ("logs", "replay", "prior_logs")]
-    paths.append(tuple(inputs[key] for key in ("a", "b") if key in inputs))
-    request = Request(
-        tuple(path for part in paths for path in part),
-        tell=console.Progress(common),
-        roles=roles,
-        **_fields_of(Request, vars(common) | inputs),
-    )
+    settings = make_settings(name, common.config, sets, own)
+    paths = [path for key in ("logs", "replay", "prior_logs") for path in inputs.get(key, ())]
+    paths += [inputs[key] for key in ("a", "b") if key in inputs]
+    values = vars(common) | inputs | {"paths": tuple(paths), "roles": roles}
+    request = Request(tell=console.Progress(common), **_fields_of(Request, values))
     return stage, request, settings, common
 
 
@@ -341,8 +274,6 @@ def _demo(name: str, given: Mapping[str, Any]) -> int:
     if not common.quiet:
         logs = f"{len(recorded.result.logs)} logs into {out / 'recording/logs'}"
         print(f"Simulated {logs}; now: rrrid run {out / 'recording'}", file=sys.stderr)
-        moved = [check for check in recorded.checks if check.code == "RRID-C05"]
-        console.print_checks(moved, stream=sys.stderr)
     request = replace(request, paths=(out / "recording",), out=out / "run")
     try:
         outcome = _outcome(workflow, request, its_settings, common)
@@ -379,8 +310,8 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
         if not possible:
             raise UsageError("C02", f"'{value}' is not possible", where=flag, remedy=remedy)
     module, values = module_of(own.stage), vars(common) | vars(own)
-    kind = load_stage(module).settings
-    settings = make_settings(kind, own.stage, STAGES, common.config, common.set, {})
+    load_stage(module)
+    settings = make_settings(own.stage, common.config, common.set, {})
     options = Options(**_fields_of(Options, values | {"memory": _bytes(own.memory)}))
     values |= {"jobs": own.jobs or processors(), "shard": read_shard(own.shard)}
     progress = console.Progress(common)
@@ -409,7 +340,7 @@ def _report(name: str, given: Mapping[str, Any]) -> int:
     from pipelines.io.stored_result import read_result
     from pipelines.stored.redraw import redraw
 
-    common, folder = read(Common, given), read(Folder, given).folder
+    common, folder = read(Common, given), read(Inputs, given).folder
     home, target = folder.absolute(), common.out and common.out.absolute()
     checks: tuple[Check, ...] = ()
     if home.is_dir() and read_result(home).command == "batch":
@@ -428,7 +359,7 @@ def _doctor(name: str, given: Mapping[str, Any]) -> int:
     from pipelines.installation.examine import examine
 
     found, as_json = [], read(Common, given).json
-    for one in examine(self_test=not read(Doctor, given).quick):  # each is printed when it is known
+    for one in examine(self_test=not read(Inputs, given).quick):  # each is printed when it is known
         found.append(one)
         if not as_json:
             remedy = f" ({one.remedy})" if one.remedy else ""
@@ -452,7 +383,7 @@ def _schema(name: str, given: Mapping[str, Any]) -> int:
     """Print the JSON schema of a command's result.json, of model.json, or of a log."""
     from pipelines.io.results import json_text
 
-    sys.stdout.write(json_text(schema_of(read(Schema, given).what)))
+    sys.stdout.write(json_text(schema_of(read(Inputs, given).what)))
     return 0
 
 

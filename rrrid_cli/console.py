@@ -175,17 +175,11 @@ def print_table(
 def print_checks(
     checks: Iterable[Check], verbose: bool = False, stream: TextIO | None = None, most: int = 12
 ) -> None:
-    """Print findings, what explains the most first; findings that differ in numbers alone once.
-
-    That an earlier result was moved comes before all of it: no report has that.
-    """
+    """Print findings, what explains the most first; findings that differ in numbers alone once."""
     from pipelines.io.codes import first_to_read
 
-    def order(check: Check) -> tuple[Any, ...]:
-        return check.code != "RRID-C05", *first_to_read(check)
-
     alike: dict[tuple[str, str], list[Check]] = {}
-    for check in sorted(dict.fromkeys(checks), key=order):
+    for check in sorted(dict.fromkeys(checks), key=first_to_read):
         if verbose or check.level != "ok":
             alike.setdefault((check.code, VALUES.sub("#", check.message)), []).append(check)
     for check, *others in list(alike.values())[:most]:

@@ -27,6 +27,11 @@ from pipelines.io.toml_text import TomlError, parse_toml
 __all__ = ["Common", "make_settings", "parameters", "read", "read_values", "settable", "stage_of"]
 
 S = TypeVar("S")
+# In the order in which they are needed.
+COMMANDS = ["run", "batch", "demo", "inspect", "import", "convert", "design-excitation"]
+COMMANDS += ["fit-friction", "reconstruct", "estimate-bps", "validate-writing", "frf", "simulate"]
+COMMANDS += ["diagnose", "extend", "compare", "report", "schema", "doctor"]
+STAGES = tuple(name for name in COMMANDS if name not in ("batch", "report", "schema", "doctor"))
 # What a stage reads by itself. Within `run` it has logs and models from the run, unless the field
 # says `in_run`.
 OWN_INPUTS = ("identify", "validate", "reference", "model", "text", "via_points", "recipe")
@@ -79,12 +84,17 @@ def stage_file(command: str) -> Path:
 
 
 def parameters(
-    kind: type[Any], only: Iterable[str] | None = None, hidden: Iterable[str] = (), **texts: str
+    kind: type[Any],
+    only: Iterable[str] | None = None,
+    required: Iterable[str] = (),
+    hidden: Iterable[str] = (),
+    **texts: str,
 ) -> list[Parameter]:
     """Return the typer parameters of a dataclass's options.
 
     Args:
         only: fields that are offered; None: all.
+        required: fields that must be given.
         hidden: fields about which help is silent.
         texts: field -> other help.
     """
@@ -100,26 +110,17 @@ def parameters(
         flag = _flags(field)[0]
         text = texts.get(field.name, field.metadata["help"])
         default: Any = field.default
-        required = field.metadata.get("required", False)
-        if default not in (None, False, True, (), "") and not text.endswith("]") and not required:
+        if default not in (None, False, True, (), "", Path()) and not text.endswith("]"):
             text += f" [{','.join(map(str, default)) if many else default}]"
         about: Any = typer.Argument(help=text, metavar=flag, show_default=False)
         if flag.startswith("-"):
-            about = typer.Option(
-                *_flags(field),
-                help=text,
-                metavar=metavar,
-                hidden=field.name in hidden,
-                show_default=False,
-            )
-        found.append(
-            Parameter(
-                _key(kind, field),
-                Parameter.KEYWORD_ONLY,
-                default=Parameter.empty if required else None,
-                annotation=Annotated[taken if required else taken | None, about],
-            )
-        )
+            silent = field.name in hidden
+            about = typer.Option(*_flags(field), help=text, metavar=metavar, hidden=silent)
+        must = field.name in required
+        shape: Any = taken if must else taken | None
+        name, start = _key(kind, field), Parameter.empty if must else None
+        noted = Annotated[shape, about]
+        found.append(Parameter(name, Parameter.KEYWORD_ONLY, default=start, annotation=noted))
     return found
 
 
@@ -180,10 +181,8 @@ def _number(kind: type[Any], text: str, flag: str, listed: str) -> Any:
     name, one, several = EXAMPLES[kind]
     message, remedy = f"'{clean(text, 60)}' is no {name}", f"give a {name}, such as {one}"
     if listed:
-        message, remedy = (
-            f"'{clean(listed, 60)}' is no list of {name}s",
-            f"write for example {several}",
-        )
+        message = f"'{clean(listed, 60)}' is no list of {name}s"
+        remedy = f"write for example {several}"
     raise UsageError("C02", message, where=flag, remedy=remedy)
 
 
@@ -191,10 +190,11 @@ def settable(command: str) -> dict[str, list[str]]:
     """Return what --set takes for a command: stage -> names; for `run` those of all its stages."""
     if command != "run":
         return {command: _names(stage_of(command).settings)}
-    kinds = {stage: stage_of(stage).settings for stage in _run_stages()}
-    return {
-        stage: [n for n in _names(kind) if not _is_own(kind, n)] for stage, kind in kinds.items()
-    }
+    found = {}
+    for stage in _run_stages():
+        kind = stage_of(stage).settings
+        found[stage] = [name for name in _names(kind) if not _is_own(kind, name)]
+    return found
 
 
 def _names(kind: type[Any]) -> list[str]:
@@ -213,19 +213,13 @@ def _run_stages() -> list[str]:
 
 
 def make_settings(
-    kind: type[S],
-    stage: str,
-    stages: Iterable[str],
-    config: Path | None,
-    sets: Iterable[str],
-    given: Mapping[str, Any],
-) -> S:
+    stage: str, config: Path | None, sets: Iterable[str], given: Mapping[str, Any]
+) -> Any:
     """Return settings of a file, then --set, then the command's own options: the last one counts.
 
     Args:
         stage: the command's name. Its table of the file is used; the others are checked all the
             same, and `run` hands them to its stages.
-        stages: every known name, for a hint where one is misspelt.
         given: the command's own options, of those that were given.
 
     Raises:
@@ -234,16 +228,13 @@ def make_settings(
     """
     chosen: dict[str, dict[str, Any]] = {stage: {}}
     for where, name, options in (*_from_file(config), *_from_sets(sets)):
-        if name not in stages:
-            message = f"'{name}' is no stage{did_you_mean(name, stages)}"
+        if name not in STAGES:
+            message = f"'{name}' is no stage{did_you_mean(name, STAGES)}"
             raise UsageError("C01", message, where=where, remedy="write STAGE.OPTION")
         if not isinstance(options, Mapping):
-            message, remedy = (
-                f"'{name}' is a stage, not an option",
-                f"write [{name}] and its options",
-            )
+            message, remedy = f"'{name}' is a stage, not an option", f"write a table [{name}]"
             raise UsageError("C01", message, where=where, remedy=remedy)
-        owner = kind if name == stage else stage_of(name).settings
+        owner = stage_of(name).settings
         for key, value in options.items():
             if stage == "run" and name in _run_stages() and _is_own(owner, key):
                 message = f"{name}.{key} has no place in a run, whose stages share logs and models"
@@ -254,7 +245,7 @@ def make_settings(
     own = chosen.pop(stage) | dict(given)
     if stage == "run":
         own["stages"] = {name: stage_of(name).settings(**values) for name, values in chosen.items()}
-    return kind(**own)
+    return stage_of(stage).settings(**own)
 
 
 def _from_file(path: Path | None) -> Iterator[tuple[str, str, Any]]:
@@ -279,10 +270,7 @@ def _from_sets(sets: Iterable[str]) -> Iterator[tuple[str, str, Any]]:
         name, equals, value = text.partition("=")
         stage, dot, key = name.strip().partition(".")
         if not (equals and dot and key):
-            message, remedy = (
-                f"'{text}' is not STAGE.OPTION=VALUE",
-                "write for example convert.to=csv",
-            )
+            message, remedy = f"'{text}' is not STAGE.OPTION=VALUE", "write convert.to=csv, say"
             raise UsageError("C01", message, where="--set", remedy=remedy)
         try:
             parsed = parse_toml(f"x = {value}")["x"]
@@ -296,9 +284,8 @@ def _value(kind: type[Any], name: str, value: Any, where: str) -> Any:
     known = _names(kind)
     if name not in known:
         message = f"no such option{did_you_mean(name, known)}"
-        raise UsageError(
-            "C01", message, where=where, remedy=f"there are: {', '.join(known) or 'none'}"
-        )
+        there = ", ".join(known) or "none"
+        raise UsageError("C01", message, where=where, remedy=f"there are: {there}")
     wanted, many = _kind(typing.get_type_hints(kind)[name])
     listed = [value] if many and isinstance(value, str) else value  # a text: a list of one
     if many and isinstance(listed, list) and all(_fits(wanted, item) for item in listed):

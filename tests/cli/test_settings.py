@@ -11,7 +11,7 @@ from rrrid_cli.options import make_settings, read_values
 
 
 def made(*sets: str) -> Settings:
-    return make_settings(Settings, "diagnose", ("diagnose",), None, sets, {})
+    return make_settings("diagnose", None, sets, {})
 
 
 @pytest.mark.parametrize(("text", "without"), [

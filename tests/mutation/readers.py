@@ -23,7 +23,6 @@ from pipelines.model.effects.base import Motion
 from pipelines.model.named_cause import acting_cause
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Request, Stage
-from rrrid_cli.app import STAGES
 from rrrid_cli.options import make_settings
 from tests.healthy import fourier, make_log
 from tests.importers.good import RECIPE, good, text
@@ -223,8 +222,8 @@ def _configs(folder: Path) -> list[bytes]:
 
 
 def _config(path: Path) -> None:
-    for stage, module in (("reconstruct", reconstruct), ("inspect", inspect)):
-        settings = make_settings(module.STAGE.settings, stage, STAGES, path, (), {})
+    for stage in ("reconstruct", "inspect"):
+        settings = make_settings(stage, path, (), {})
         if stage == "reconstruct" and _deep(path):
             _through(reconstruct.STAGE, Request((_short_log(path),)), settings)
 
