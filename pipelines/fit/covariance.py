@@ -28,7 +28,6 @@ import numpy.typing as npt
 
 from pipelines.fit.equations import Array, Block, Indices
 from pipelines.fit.least_squares import Solution
-from pipelines.io.order_statistics import distinct
 
 __all__ = ["Robust", "robust_covariance"]
 
@@ -127,7 +126,7 @@ def _meat(block: _Transformed, weights: Array, noise: _Noise) -> Array:
         if felt == [a]:  # its phase does not matter
             used, mixed = block.columns[a], block.spectra[a] * np.abs(factors[a])
         else:
-            used = distinct(np.concatenate([block.columns[j] for j in felt])) if felt else block.columns[a][:0]
+            used = np.unique(np.concatenate([block.columns[j] for j in felt])) if felt else block.columns[a][:0]
             mixed = np.zeros((len(used), bins), dtype=np.complex128)
             for j in felt:
                 mixed[np.searchsorted(used, block.columns[j])] += block.spectra[j] * factors[j]

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.io.experiment import Array
-from pipelines.io.order_statistics import median
 
 __all__ = [
     "ABSURD",
@@ -88,7 +87,7 @@ def jitter(ticks: Array) -> tuple[float, float]:
     near = ticks[(ticks > 0.0) & (ticks <= GAP_TICKS)]
     regular = near[np.abs(near - 1.0) < 0.5]
     regular = regular if regular.size > near.size / 2 else near
-    off = np.abs(regular - median(regular)) if regular.size else np.zeros(1)
+    off = np.abs(regular - np.median(regular)) if regular.size else np.zeros(1)
     return float(np.sqrt(np.mean(off**2))), float(off.max())
 
 

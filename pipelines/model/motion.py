@@ -21,7 +21,6 @@ import numpy.typing as npt
 
 from pipelines.io.derive import derived_by
 from pipelines.io.experiment import Array, ExperimentLog
-from pipelines.io.order_statistics import median
 from pipelines.model.even import Evened, evened
 from pipelines.model.measured import Measured, measured
 from pipelines.model.rigid.body import Motion
@@ -65,7 +64,9 @@ class Reconstructed:
         if self.std is None:
             return np.zeros(self.motion.q.shape, dtype=bool)
         std = self.std[2]
-        return np.asarray(std > _VAGUE * np.array([median(column[~np.isnan(column)]) for column in std.T]))
+        known = [column[~np.isnan(column)] for column in std.T]
+        usual = np.array([np.median(x) if x.size else np.nan for x in known])
+        return np.asarray(std > _VAGUE * usual)
 
     def signals(self) -> dict[str, Array]:
         """What a derived log gets."""

@@ -14,7 +14,6 @@ import numpy.typing as npt
 
 from pipelines.errors import UsageError
 from pipelines.io.experiment import Array
-from pipelines.io.order_statistics import distinct
 from pipelines.model.measured import Measured
 from pipelines.model.tuned import Observers, Reconstruction, tuned_observers
 from pipelines.quality.segments import Mask, long_blocks
@@ -79,7 +78,7 @@ def _padded(observer: Observer, filter_: Callable[[Array, Indices | None], Track
         lead = present.argmax(axis=0)
         lead[lead <= _LEAD] = 0
         lead[present.sum(axis=0) <= order] = len(y)  # fewer samples than states: the joint is not known here
-        for first in distinct(lead[lead < len(y)]).tolist():
+        for first in np.unique(lead[lead < len(y)]).tolist():
             joints = np.flatnonzero(lead == first)
             whole = len(joints) == y.shape[1]
             track = filter_(y[first:], None) if whole else filter_(y[first:, joints], joints)

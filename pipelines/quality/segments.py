@@ -22,7 +22,6 @@ import numpy.typing as npt
 from pipelines.io import limits
 from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.limits import ABSURD, GAP_LIMIT, GAP_TICKS, SHORTEST, sentinels
-from pipelines.io.order_statistics import distinct, median, quantile
 from pipelines.quality.config import CONFIG
 
 __all__ = ["SHORTEST", "Mask", "TimeBase", "Usable", "lagged_speed", "long_blocks", "quantum"]
@@ -65,7 +64,7 @@ def time_base(log: ExperimentLog) -> TimeBase:
     unit, scale, is_rate, typical = "s", 1.0, False, nominal
     if forward.size:
         unit, scale, is_rate = _time_unit(forward, nominal)
-        typical = float(median(forward)) * scale
+        typical = float(np.median(forward)) * scale
     with np.errstate(over="ignore", invalid="ignore"):
         ticks = interval * scale / (nominal if unit and not is_rate else typical)
     same = np.flatnonzero(interval == 0.0)
@@ -95,7 +94,7 @@ def time_base(log: ExperimentLog) -> TimeBase:
 
 def _time_unit(forward: Array, nominal: float) -> tuple[str, float, bool]:
     """Return the unit of t by its steps, its seconds, and whether the sample time is a rate."""
-    typical, mean = float(median(forward)), float(np.mean(forward))
+    typical, mean = float(np.median(forward)), float(np.mean(forward))
     if min(abs(typical / nominal - 1.0), abs(mean / nominal - 1.0)) < 5.0 * CONFIG.unit_fits:
         return "s", 1.0, False
     if typical < nominal and abs(typical * nominal - 1.0) < CONFIG.unit_fits:
@@ -219,13 +218,13 @@ def blocks(mask: Mask) -> list[tuple[int, int]]:
 
 def quantum(x: Array) -> float | None:
     """Return the step in which `x` (samples,) was counted, or None where no step is visible."""
-    values = distinct(x[np.isfinite(x)])
+    values = np.unique(x[np.isfinite(x)])
     steps = np.diff(values)
     steps = steps[steps > 1e-11 * np.abs(values).max(initial=0.0)]
     if steps.size < limits.FEWEST - 1:
         return None
     # the smallest ten: one alone may be a rounding error of the recording
-    step = float(median(np.partition(steps, 9)[:10]))
+    step = float(np.median(np.partition(steps, 9)[:10]))
     counts = steps[steps < 1000 * step] / step
     whole = np.mean(np.abs(counts - np.rint(counts)) < CONFIG.step_fits)
     return step if whole > CONFIG.steps_fit else None
@@ -253,7 +252,7 @@ def _glitch_floors(log: ExperimentLog, shown: tuple[float | None, ...]) -> tuple
     finite = np.where(np.isfinite(log.tau), log.tau, 0.0)
     limit = torque_limit(log)
     limit = np.where(np.isfinite(limit), limit, 0.0)
-    torque = CONFIG.glitch_torque * (quantile(finite, 0.99) - quantile(finite, 0.01))
+    torque = CONFIG.glitch_torque * (np.quantile(finite, 0.99) - np.quantile(finite, 0.01))
     torque = np.maximum(torque, CONFIG.glitch_limit * limit)
     control = log.controller
     if control is not None and control.kp is not None and control.kd is not None:
@@ -293,7 +292,7 @@ def spikes(x: Array, smooth: bool, floor: Array) -> Mask:
         off = np.where(np.isfinite(off), off, 0.0)
         # a kink, as at a hard stop, continues one of its sides
         kink = np.minimum(np.abs(x[at] - left), np.abs(x[at] - right))
-        glitch = off > np.maximum(CONFIG.glitch * quantile(off, 0.99), floor)
+        glitch = off > np.maximum(CONFIG.glitch * np.quantile(off, 0.99, axis=0), floor)
         glitch &= kink > CONFIG.glitch_alone * off
         glitch &= np.maximum(np.abs(left - right), spread) < CONFIG.glitch_sides * off
         found[at] |= glitch & _above_surroundings(off, glitch)
@@ -315,7 +314,7 @@ def _above_surroundings(off: Array, candidate: Mask) -> Mask:
     around = off[np.clip(row[:, None] + beside, 0, len(off) - 1), column[:, None]]
     result = np.zeros_like(candidate)
     if row.size:
-        usual = quantile(around, 0.9, axis=1)
+        usual = np.quantile(around, 0.9, axis=1)
         result[row, column] = off[row, column] > CONFIG.glitch * usual
     return result
 
@@ -403,9 +402,9 @@ def _jumps(q: Array) -> tuple[Mask, Array]:
     if len(q) < limits.FEWEST or largest < CONFIG.jump_least / 2.0:
         return np.zeros(step.shape, dtype=bool), np.zeros(step.shape)
     padded = np.pad(step, ((3, 3), (0, 0)), mode="edge")
-    around = median(np.stack([padded[k : k + len(step)] for k in (0, 1, 2, 4, 5, 6)]))
+    around = np.median(np.stack([padded[k : k + len(step)] for k in (0, 1, 2, 4, 5, 6)]), axis=0)
     excess = np.where(np.isfinite(step - around), step - around, 0.0)
-    usual = quantile(np.abs(excess), 0.99)
+    usual = np.quantile(np.abs(excess), 0.99, axis=0)
     jump = np.abs(excess) > np.maximum(CONFIG.jump * usual, CONFIG.jump_least)
     padded = np.pad(excess, ((2, 2), (0, 0)))
     for k in (0, 1, 3, 4):  # a glitch comes back within two samples; a jump stays
@@ -430,7 +429,7 @@ def _lost_reference(log: ExperimentLog) -> tuple[int, str] | None:
     error = np.abs(log.q - log["q_ref"])
     measured = np.isfinite(error)
     spread = np.std(np.where(np.isfinite(log["q_ref"]), log["q_ref"], 0.0), axis=0)
-    usual = median(np.where(measured, error, 0.0))
+    usual = np.median(np.where(measured, error, 0.0), axis=0)
     lost = (error > np.maximum(np.maximum(0.05, 0.25 * spread), 8.0 * usual)) | ~measured
     starts = _start_of_last_run(lost & measured.any(axis=0))
     joint = int(starts.argmin())
@@ -452,7 +451,7 @@ def _power_cut(log: ExperimentLog, shortest: int) -> tuple[int, str] | None:
     start = int(_start_of_last_run((log.tau == 0.0).all(axis=1)[:, None])[0])
     speed = np.abs(lagged_speed(log.q, log.sample_time))
     speed = np.where(np.isfinite(speed), speed, 0.0)
-    usual = quantile(speed, 0.75)
+    usual = np.quantile(speed, 0.75, axis=0)
     before = speed[max(0, start - shortest) : start].max(axis=0, initial=0.0)
     moving = ((before > 0.3 * usual) & (usual > 0)).any()
     return (start, "all torques drop to zero while the arm moves") if moving else None

@@ -10,7 +10,6 @@ import numpy as np
 from pipelines.errors import Check, Level
 from pipelines.io import schema
 from pipelines.io.limits import ABSURD, GAP_LIMIT, percent, sentinels
-from pipelines.io.order_statistics import distinct
 from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import long_blocks, torque_limit
 from pipelines.quality.subject import NotTested, Place, Subject, flagged, many, spread
@@ -59,7 +58,7 @@ def absurd_samples(s: Subject) -> list[Check]:
         if name in ("q", "tau"):
             bad |= sentinels(x)
         for j, at in flagged(bad):
-            values = ", ".join(f"{v:g}" for v in distinct(x[at, j])[:4])
+            values = ", ".join(f"{v:g}" for v in np.unique(x[at, j])[:4])
             samples = ", ".join(map(str, at[:8]))
             words = f"{many(at.size, 'sample')} of {name} with the value {values}, which is no "
             words += f"measurement (samples {samples}{', …' * bool(at[8:].size)})"
@@ -155,7 +154,7 @@ def resolution(s: Subject) -> Sequence[Check | NotTested]:
     hidden = ", ".join(str(j + 1) for j, step in enumerate(s.good.steps) if step is None)
     for j, step in enumerate(s.good.steps):
         declared, q = s.log.robot.joints[j].encoder_resolution, s.good.log.q[:, j]
-        if step is None or distinct(q[np.isfinite(q)]).size < CONFIG.distinct:
+        if step is None or np.unique(q[np.isfinite(q)]).size < CONFIG.distinct:
             continue
         coarse, told = s.travel[j] < CONFIG.few_steps * step, f"{s.travel[j] / step:.0f} in all"
         if declared:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.errors import Check, Level
-from pipelines.io.order_statistics import quantile
 from pipelines.io.units import UNITS
 from pipelines.quality.config import CONFIG
 from pipelines.quality.motion import peak_speed
@@ -29,7 +28,9 @@ def torque_unit(s: Subject) -> Sequence[Check | NotTested]:
     if not np.isfinite(limit).any():
         return s.cannot_tell("S05", "the robot's description has no torque limits", signal="tau")
     tau = np.nan_to_num(np.abs(s.good.log.tau))
-    often, peak = (quantile(tau, share) / limit for share in (CONFIG.often, CONFIG.at_limit))
+    often, peak = (
+        np.quantile(tau, share, axis=0) / limit for share in (CONFIG.often, CONFIG.at_limit)
+    )
     j, unit = int(np.argmax(often)), s.unit("tau", int(np.argmax(often)))
     if often[j] <= CONFIG.far:
         words = f"torque is beyond no limit by more than {CONFIG.far:g} times for long"

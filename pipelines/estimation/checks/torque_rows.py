@@ -21,7 +21,6 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.order_statistics import median
 from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.base import base_set
 from pipelines.model.rigid.chain import regressor
@@ -180,13 +179,13 @@ class RowFilter:
         self.edges: list[tuple[int, int]] = []
         spacing, done = [], 0
         for motion in motions:
-            step = float(median(np.diff(motion.t)))
+            step = float(np.median(np.diff(motion.t)))
             cuts = 1 + np.flatnonzero(np.abs(np.diff(motion.t) - step) > 0.5 * step)
             bounds = [done, *(done + cuts).tolist(), done + len(motion.t)]
             self.edges += list(pairwise(bounds))
             spacing.append(step)
             done += len(motion.t)
-        self.spacing = float(median(np.asarray(spacing)))
+        self.spacing = float(np.median(np.asarray(spacing)))
         rates = [
             np.sqrt(np.mean(motion.dq**2, axis=0)) / np.maximum(np.std(motion.q, axis=0), 1e-12)
             for motion in motions

@@ -13,7 +13,6 @@ import numpy as np
 
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.torque_rows import Array
-from pipelines.io.order_statistics import median
 from pipelines.quality.segments import Usable
 
 __all__ = ["touches_of_zero"]
@@ -68,4 +67,4 @@ def _touches(parts: Sequence[tuple[Array, Array]], config: BoundaryConfig) -> in
 def _finite_median(x: Array) -> float:
     """Return the median of the finite values of `x`; 0 without any."""
     finite = x[np.isfinite(x)]
-    return float(median(finite)) if finite.size else 0.0
+    return float(np.median(finite)) if finite.size else 0.0

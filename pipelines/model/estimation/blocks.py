@@ -23,7 +23,6 @@ import numpy as np
 from pipelines.fit.equations import Array, Block, Indices
 from pipelines.fit.least_squares import Errors, solve
 from pipelines.fit.statistics import Gram, Triangles, gather, triangulate
-from pipelines.io.order_statistics import distinct
 
 S = TypeVar("S", Gram, Triangles)
 
@@ -60,7 +59,7 @@ def by_blocks(equations: Iterable[Block], samples: int, blocks: int, guard: int,
         weighted: joints by their own residual; all alike without.
     """
     edges, guard = np.linspace(0, samples, min(blocks, samples) + 1).astype(np.intp), min(guard, samples // _MOST_ASIDE)
-    cuts = distinct(np.clip(np.concatenate([edges - guard, edges, edges + guard]), 0, samples))
+    cuts = np.unique(np.clip(np.concatenate([edges - guard, edges, edges + guard]), 0, samples))
     if triangles:
         return _held_out(_parts(equations, cuts, triangulate), cuts, edges, guard, weighted)
     return _held_out(_parts(equations, cuts, gather), cuts, edges, guard, weighted)

@@ -20,7 +20,6 @@ import numpy.typing as npt
 
 from pipelines.fit.contrasts import of_mean
 from pipelines.fit.equations import Block
-from pipelines.io.order_statistics import median
 from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.estimation.conditioning import Conditioning
 from pipelines.model.estimation.peaks import bridged, near_peaks
@@ -276,7 +275,8 @@ class LogEquations:
         if found.std is None:
             return np.ones_like(lost)
         std = found.std[0][kept]
-        usual = np.array([median(column[~np.isnan(column)]) for column in std.T])
+        known = [column[~np.isnan(column)] for column in std.T]
+        usual = np.array([np.median(x) if x.size else np.nan for x in known])
         return np.asarray(lost | ~(std <= _LOST * usual))
 
     def stretch(self, wide: slice) -> tuple[Motion, Array]:
