@@ -19,12 +19,16 @@ from typing import Any
 
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
-from pipelines.io.compared import called, label_of, of_other_commands
 from pipelines.io.option import option
-from pipelines.io.result_figures import fitted, numbers_of, residuals, robot_of
-from pipelines.io.result_models import less_findings, modelled
 from pipelines.io.run_results import read_any_result
 from pipelines.model.parameter_names import named_in, quantity_of
+from pipelines.report.compared_results import (
+    called,
+    label_of,
+    less_findings,
+    modelled,
+    of_other_commands,
+)
 from pipelines.report.comparison_report import (
     Answer,
     Comparison,
@@ -33,6 +37,7 @@ from pipelines.report.comparison_report import (
     comparison_report,
 )
 from pipelines.report.report import Report
+from pipelines.report.result_figures import fitted, numbers_of, residuals, robot_of
 from pipelines.stage import Inputs, Request, Stage
 
 __all__ = ["STAGE", "Comparison", "Settings", "compute", "read", "report"]

@@ -19,7 +19,6 @@ import numpy as np
 from pipelines.errors import Check, Level, RrridError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
-from pipelines.io.codes import first_to_read, title_of
 from pipelines.io.derive import recording
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import Opened
@@ -32,6 +31,7 @@ from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import quantum
 from pipelines.quality.subject import many
 from pipelines.quality.units import TRUSTED
+from pipelines.report.codes import first_to_read, title_of
 from pipelines.report.config import REPORT
 from pipelines.report.log_preview import Preview, log_preview, preview_figures
 from pipelines.report.report import Report, Section, Table

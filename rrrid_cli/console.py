@@ -176,7 +176,7 @@ def print_checks(
     checks: Iterable[Check], verbose: bool = False, stream: TextIO | None = None, most: int = 12
 ) -> None:
     """Print findings, what explains the most first; findings that differ in numbers alone once."""
-    from pipelines.io.codes import first_to_read
+    from pipelines.report.codes import first_to_read
 
     alike: dict[tuple[str, str], list[Check]] = {}
     for check in sorted(dict.fromkeys(checks), key=first_to_read):

@@ -10,8 +10,8 @@ import pytest
 
 from pipelines import inspect
 from pipelines.errors import Check
-from pipelines.io.codes import first_to_read
 from pipelines.io.files import write_log
+from pipelines.report.codes import first_to_read
 from pipelines.stage import Request, run_stage
 from tests.fault_table import FAULTS, Fault
 from tests.healthy import good_log, with_signal

@@ -19,10 +19,10 @@ from pipelines.batch.record import Record
 from pipelines.errors import Check, clean
 from pipelines.fit.differences import difference
 from pipelines.io.model_file import ModelFile, StoredEffect, StoredValue
-from pipelines.io.result_figures import name_in
 from pipelines.model.effects import effect_names, find_effect
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.parameter_names import quantity_of
+from pipelines.report.result_figures import name_in
 from pipelines.report.style import format_number, unit_in_words
 from pipelines.report.words import figure_in_words, title_of
 

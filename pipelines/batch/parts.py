@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from pipelines.io.result_figures import fitted, residuals
+from pipelines.report.result_figures import fitted, residuals
 
 __all__ = ["Part", "part_of", "place_of", "read_part"]
 

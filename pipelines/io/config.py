@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import timedelta
 
-__all__ = ["FORMAT", "SANDBOX", "TEXT", "URDF"]
+__all__ = ["FORMAT", "LIMITS", "SANDBOX", "SESSIONS", "TEXT", "URDF"]
 
 
 @dataclass(frozen=True)
@@ -65,10 +66,46 @@ class UrdfConfig:
     number: float = 1e9  # squares and products of it stay finite; a limit of that size is none
     no_limit: float = 1e16  # what URDFs write for no limit
     short: float = 1e-9  # length of an axis without direction
+    longest: float = 100.0  # [m] no arm has such a link
     rounding: float = 0.01  # of the trace: an inertia of two digits has half a percent
 
 
+@dataclass(frozen=True)
+class SessionsConfig:
+    """What belongs together, and how much of it is named."""
+
+    pause: timedelta = timedelta(hours=3)  # at most, in a session that goes on after midnight
+    longest: timedelta = timedelta(hours=12)  # of such a session
+    named: int = 4  # logs or folders of a session that a message names
+    listed: int = 6  # sessions that a message lists with their logs
+
+
+@dataclass(frozen=True)
+class LimitsConfig:
+    """How much may be wrong with the samples of a log."""
+
+    fewest: int = 20  # samples; fewer have no statistics, and show no motion (T08)
+    shortest: int = 100  # samples; less is over before an observer or a filter has settled (T04)
+    gap: int = 10  # missing samples that an observer predicts through (T03, T04)
+    lost: float = 1.5  # sample times beside the missing ones in the longest such interval
+    steps: int = 5  # a clock that was set back more often is not a clock (T01)
+    jitter: float = 0.05  # of the sample time (T05)
+    varying: float = 0.15  # of the sample time: long intervals are then nothing special
+    half: float = 0.5  # of the sample time, by which an interval is still one sample long
+    absurd: float = 1e9  # no joint is there, in any SI unit (D03)
+    reach: float = 10.0  # [rad, m] at least between a filler and the measurements
+    shown: float = 1e-5  # a smaller share has no digits that count
+    sentinels: tuple[float, ...] = (
+        *(10.0**digits - 1.0 for digits in (3, 4, 5, 6)),
+        *(2.0**bits - 1.0 for bits in (15, 16, 31, 32)),
+        2.0**15,
+        2.0**31,
+    )
+
+
+LIMITS = LimitsConfig()
 SANDBOX = SandboxConfig()
+SESSIONS = SessionsConfig()
 TEXT = TextConfig()
 FORMAT = FormatConfig()
 URDF = UrdfConfig()

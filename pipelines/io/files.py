@@ -311,7 +311,7 @@ def _oriented(
 ) -> Signal:
     """Return a signal that is stored as (joints, samples), or t as a column, turned (S11)."""
     values, n, samples = signal.values, log.n_joints, log.t.size
-    if name == "t" and values.ndim == 2 and 1 in values.shape:
+    if name == "t" and values.ndim > 1 and 1 in values.shape:
         turned, remedy = values.reshape(-1), "store t as a vector"
     elif name != "t" and n == 1 and values.shape == (samples,):
         return replace(signal, values=values[:, None])
@@ -404,7 +404,7 @@ def _refuse_shapes(log: ExperimentLog, where: str) -> None:
             raise InputRejected("S05", words, where=place, remedy="convert the samples to SI")
         if (name == "t" and len(shape) == 1) or (name != "t" and shape == wanted):
             continue
-        if name != "t" and len(shape) == 2 and shape[0] == samples[0]:
+        if name != "t" and shape[:-1] == samples:
             words = f"{shape[1]} columns for a robot of {n} joints"
             remedy = "give the description of this robot, or choose the columns with --joints"
             raise InputRejected("S02", words, where=place, remedy=remedy)
@@ -503,7 +503,7 @@ def nothing_there(
         passed = f"; links and results of rrrid are passed over, here {len(over)}"
         there = [path for path in over if os.path.isdir(path)]
         if there:
-            more = " …" if len(there) > 3 else ""
+            more = " …" if there[3:] else ""
             remedy = f"give what is meant by its own path: {shlex.join(there[:3])}{more}"
     elif recorded:
         passed = f", but recordings such as {recorded[0].name}"

@@ -323,7 +323,7 @@ def refuse_bad_dataset(dataset: Any, where: str) -> None:
         code, remedy = "X02" if "raw" in foreign else "X03", "store the data in the log itself"
         raise InputRejected(code, f"{foreign} refused", where=where, remedy=remedy)
     kind = dataset.dtype
-    if kind.kind not in "fiu" or kind.itemsize > 8 or dataset.ndim < 1:
+    if kind.kind not in "fiu" or kind.itemsize > np.dtype(float).itemsize or dataset.ndim < 1:
         words = f"type {kind} of shape {dataset.shape}, not real numbers over samples"
         remedy = "store float64 of shape (samples, joints)"
         raise InputRejected("S12", words, where=where, remedy=remedy)

@@ -359,9 +359,9 @@ def _record(log: ExperimentLog) -> dict[str, Any]:
 def columns_in(log: ExperimentLog) -> int:
     """Return how many joints the samples have, whatever the description says; 0 for none."""
     samples = log.t.size if "t" in log else -1
-    shapes = [s.values.shape for k, s in log.signals.items() if s.values.ndim == 2 and k != "t"]
+    shapes = [s.values.shape for k, s in log.signals.items() if s.values.ndim > 1 and k != "t"]
     wide = [shape for shape in shapes if 1 not in shape] or shapes
-    return max((n if count == samples else count for count, n in wide), default=0)
+    return max((n if count == samples else count for count, n, *_ in wide), default=0)
 
 
 def with_robot(log: ExperimentLog, robot: RobotDescription) -> ExperimentLog:
@@ -412,9 +412,9 @@ def select_joints(
     signals = {}
     for name, signal in log.signals.items():
         values = signal.values
-        if values.ndim == 2 and values.shape == (samples, columns):
+        if values.shape == (samples, columns):
             values = np.ascontiguousarray(values[:, chosen])
-        elif values.ndim == 2 and values.shape == (columns, samples):  # turned round (S11)
+        elif values.shape == (columns, samples):  # turned round (S11)
             values = values[chosen]
         signals[name] = replace(signal, values=values)
     controller = log.controller

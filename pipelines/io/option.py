@@ -13,9 +13,10 @@ def option(default: Any, text: str, *flags: str, **more: Any) -> Any:
 
     Args:
         default: default of the field.
-        text: help. What holds by default stands in brackets at its end where `default` does not say it.
-        flags: names on the command line, "--no-rest" of a field that is true by default, "--a/--no-a" for both;
-            one without dashes is a positional argument. By default "--" and the field's name.
+        text: help; the default in brackets at its end where `default` does not say it.
+        flags: names on the command line, "--no-rest" of a field that is true by default,
+            "--a/--no-a" for both; one without dashes is a positional argument. By default "--"
+            and the field's name.
         more: metadata of the field.
     """
     return dataclasses.field(default=default, metadata={"help": text, "flags": flags, **more})

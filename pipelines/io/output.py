@@ -192,7 +192,7 @@ _OLD = "-of-"  # between the name of a draft and that of the folder whose place 
 
 
 def _draft_name() -> str:
-    """Return a new hidden name: the machine, whose processes alone can be asked, and the process."""
+    """Return a new hidden name: of the machine, which can ask its processes alone, and process."""
     return f"{_machine()}{os.getpid()}-{os.urandom(4).hex()}"
 
 

@@ -44,7 +44,6 @@ Vector = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
 _GEOMETRY = ("a", "alpha", "d", "offset")
-_LONGEST = 100.0  # numerics: [m] no arm has such a link
 _CORRECT = "correct the robot description"
 _TEXT = r"^[^\x00]*[^\x00\s][^\x00]*$"
 
@@ -238,7 +237,7 @@ def _refuse_impossible(table: _Table) -> None:
             words = f"{place}.alpha: is {joint.alpha:g} rad: looks like degrees"
             raise _Wrong(words, "write it in rad")
         for key in ("a", "d"):
-            if abs(getattr(joint, key)) > _LONGEST:
+            if abs(getattr(joint, key)) > URDF.longest:
                 words = f"{place}.{key}: is {getattr(joint, key):g} m: looks like mm"
                 raise _Wrong(words, "write it in m")
         low, high = joint.position

@@ -241,7 +241,7 @@ def _serve(work: Callable[[], Answer], sender: Connection, seconds: float, memor
 def _replied(
     work: Callable[[], Answer], seconds: float, memory: int
 ) -> tuple[dict[str, Any], list[Array]]:
-    """Return what `work` found, or why it found nothing, as JSON; and its arrays that have bytes."""
+    """Return what `work` found, or why it found nothing, as JSON; and its arrays with bytes."""
     import numpy as np
 
     problem: RrridError
@@ -339,7 +339,7 @@ def _error(error: Mapping[str, Any], path: Path) -> RrridError:
 
 
 def _reaped(child: int, *, kill: bool) -> int:
-    """Wait for the child, killed before where it may live on; return the signal it died of, or 0."""
+    """Wait for the child, killed before where asked; return the signal it died of, or 0."""
     with contextlib.suppress(ProcessLookupError, ChildProcessError):
         if kill:
             os.kill(child, signal.SIGKILL)

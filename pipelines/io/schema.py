@@ -229,7 +229,7 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
 
 
 def plain(value: object) -> Any:
-    """Return `value` as strict JSON can hold it: lists, and texts for numbers that are not finite."""
+    """Return `value` as strict JSON can hold it: lists, and texts for what is not finite."""
     if isinstance(value, Mapping):
         return {key: plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):

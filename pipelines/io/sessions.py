@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, clean, did_you_mean
+from pipelines.io.config import SESSIONS
 from pipelines.io.files import Opened, find_logs, open_log
 from pipelines.io.output import written_by
 from pipelines.io.robot import RobotDescription
@@ -39,9 +40,6 @@ __all__ = [
 ]
 
 Key = tuple[str, str, str]  # robot's name, its description, day
-
-_PAUSE = timedelta(hours=3)
-_SESSION = timedelta(hours=12)
 
 
 def _silent(words: str) -> None:
@@ -225,9 +223,8 @@ def _all_of(rejected: list[Rejected]) -> RrridError:
     first, others = rejected[0].error, rejected[1:]
     if not others:
         return first
-    named = ", ".join(f"{clean(r.path.name, 40)} ({r.error.code})" for r in others[:6])
-    more = f" and {len(others) - 6} more" if len(others) > 6 else ""
-    words = f"{clean(first.message, 160)}; {len(others)} more cannot be used: {named}{more}"
+    named = _first_of([f"{r.path.name} ({r.error.code})" for r in others])
+    words = f"{clean(first.message, 160)}; {len(others)} more cannot be used: {named}"
     code, where = first.code.removeprefix("RRID-"), first.where or rejected[0].path
     return InputRejected(code, words, where=where, remedy=first.remedy)
 
@@ -357,7 +354,7 @@ def _across_midnight(logs: list[Opened]) -> list[tuple[Key, Opened]]:
         if before not in times or before in same:
             continue
         pause, whole = min(after) - max(times[before]), max(after) - min(times[before])
-        if pause <= _PAUSE and whole <= _SESSION:
+        if pause <= SESSIONS.pause and whole <= SESSIONS.longest:
             same[key] = before
     return [(same.get(key, key), opened) for key, opened in by_day]
 
@@ -387,7 +384,7 @@ def of_one_session(inputs: Inputs) -> Inputs:
         paths = {opened.path for opened in session.logs if opened.log.origin != "planned"}
         used[session.name] = (session, paths)
     every = set().union(*(paths for _, paths in used.values()))
-    if len(used) < 2 or not every:
+    if not every:
         return inputs
     for session, paths in used.values():
         if paths == every:
@@ -431,7 +428,7 @@ def refuse_mixed(inputs: Inputs, folders: Iterable[Path]) -> None:
 def _listed(sessions: list[Session]) -> str:
     """Name the sessions, and of a few the logs of each: by a folder that holds no others."""
     names = [clean(session.name, 60) for session in sessions]
-    if len(sessions) > 6:
+    if len(sessions) > SESSIONS.listed:
         return "; ".join(names)
     logs = [[o for o in session.logs if o.log.origin != "planned"] for session in sessions]
     homes: dict[Path, set[int]] = defaultdict(set)
@@ -441,7 +438,7 @@ def _listed(sessions: list[Session]) -> str:
     parts = []
     for name, own in zip(names, logs, strict=True):
         folders = list(dict.fromkeys(opened.path.parent for opened in own))
-        if len(folders) < 4 and all(len(homes[folder]) == 1 for folder in folders):
+        if len(folders) < SESSIONS.named and all(len(homes[folder]) == 1 for folder in folders):
             count = f"{len(own)} log{'s' if len(own) > 1 else ''}"
             there = f"{count} in {', '.join(clean(folder.name, 40) for folder in folders)}"
         else:
@@ -451,8 +448,9 @@ def _listed(sessions: list[Session]) -> str:
 
 
 def _first_of(names: Sequence[str]) -> str:
-    more = f" and {len(names) - 4} more" if len(names) > 4 else ""
-    return f"{', '.join(clean(name, 40) for name in names[:4])}{more}"
+    first, rest = names[: SESSIONS.named], names[SESSIONS.named :]
+    more = f" and {len(rest)} more" if rest else ""
+    return f"{', '.join(clean(name, 40) for name in first)}{more}"
 
 
 def check_alike(inputs: Inputs) -> tuple[Check, ...]:
@@ -471,8 +469,8 @@ def check_alike(inputs: Inputs) -> tuple[Check, ...]:
         doubled = [own for own in homes.values() if len(set(own.values())) > 1]
         folders = list(dict.fromkeys(folder for own in doubled for folder in own))
         if doubled:
-            words = f"the folders {_first_of([folder.name for folder in folders])} hold logs of the same "
-            words += "names, robot and day, "
+            names = _first_of([folder.name for folder in folders])
+            words = f"the folders {names} hold logs of the same names, robot and day, "
             words += "and were taken for one session"
             remedy = (
                 "if they are of two machines or sessions, give each folder by itself, or let "

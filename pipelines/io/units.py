@@ -26,7 +26,7 @@ class Unit:
 
 
 _TURN = 2.0 * math.pi
-_KGF, _LBF = 9.80665, 4.4482216152605  # [N] NIST SP 811 (2008), table B.8
+_KGF, _LBF = 9.80665, 4.4482216152605  # numerics: [N] NIST SP 811 (2008), table B.8
 
 UNITS: Final[dict[str, Unit]] = {
     # time
@@ -116,22 +116,46 @@ _ALIASES = {
 _IN_OTHER_LANGUAGES: Final = {
     "rad": "弧度 ラジアン рад radians radianes radianti radianos",
     "deg": "度 град град. grados degrés gradi graus graden grader stopnie",
-    "rad/s": "弧度/秒 弧度/s рад/с", "deg/s": "度/秒 度/s град/с grados/s degrés/s gradi/s",
+    "rad/s": "弧度/秒 弧度/s рад/с",
+    "deg/s": "度/秒 度/s град/с grados/s degrés/s gradi/s",
     "rpm": "转/分 об/мин tr/min giri/min obr/min ot/min",
-    "s": "秒 с Sekunden secondes segundos secondi", "ms": "毫秒 ミリ秒 мс", "us": "微秒",
-    "N m": "牛米 牛顿米 Нм", "A": "安 安培 А", "mA": "毫安 мА",
-}  # fmt: skip
+    "s": "秒 с Sekunden secondes segundos secondi",
+    "ms": "毫秒 ミリ秒 мс",
+    "us": "微秒",
+    "N m": "牛米 牛顿米 Нм",
+    "A": "安 安培 А",
+    "mA": "毫安 мА",
+}
 _ALIASES |= {word: unit for unit, words in _IN_OTHER_LANGUAGES.items() for word in words.split()}
 _ALIASES |= {"牛 米": "N m", "Н м": "N m"}
-_WORDS: Final = ((r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"), (r"\bmilli[ -]?(?=deg|rad|newton|amp|sec|met)", "m"),
-                 (r"\bmicro[ -]?(?=sec|met|newton)", "u"), (r"\bnano[ -]?(?=sec)", "n"), (r"\bcenti[ -]?(?=met|newton)", "c"),
-                 (r"newton[ -]?met(?:er|re)s?\b", "N m"), (r"newtons?\b", "N"), (r"met(?:er|re)s?\b", "m"),
-                 (r"deg(?:ree)?s?\b", "deg"), (r"rad(?:ian)?s?\b", "rad"), (r"\b(?:rev(?:olution)?|turn)s?\b", "rev"),
-                 (r"sec(?:ond)?s?\b", "s"), (r"amp(?:ere)?s?\b", "A"), (r"°", "deg"), (r"/s/s\b|/s\^?2\b", "/s^2"),
-                 (r"\bdps\b", "deg/s"), (r"\brps\b", "rev/s"), (r"rev/min(?:ute)?\b", "rpm"), (r"^min(?:ute)?s?$", "min"),
-                 (r"\bkg(?=[ -])", "kgf"), (r"(?i)^a[ _-]?rms$", "Arms"),
-                 (r"\b(?:ft|in)[ -](?:lbs?|lbf|oz)\b", lambda m: _turned(m[0])), (r"\blbs?(?=[ -])", "lbf"),
-                 (r"\boz(?=[ -])", "ozf"), (r"(?<=f)-", " "), (r"^([mcuk]?)n[ .-]?m$", r"\1N m"))  # fmt: skip
+_WORDS: Final = (
+    (r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"),
+    (r"\bmilli[ -]?(?=deg|rad|newton|amp|sec|met)", "m"),
+    (r"\bmicro[ -]?(?=sec|met|newton)", "u"),
+    (r"\bnano[ -]?(?=sec)", "n"),
+    (r"\bcenti[ -]?(?=met|newton)", "c"),
+    (r"newton[ -]?met(?:er|re)s?\b", "N m"),
+    (r"newtons?\b", "N"),
+    (r"met(?:er|re)s?\b", "m"),
+    (r"deg(?:ree)?s?\b", "deg"),
+    (r"rad(?:ian)?s?\b", "rad"),
+    (r"\b(?:rev(?:olution)?|turn)s?\b", "rev"),
+    (r"sec(?:ond)?s?\b", "s"),
+    (r"amp(?:ere)?s?\b", "A"),
+    (r"°", "deg"),
+    (r"/s/s\b|/s\^?2\b", "/s^2"),
+    (r"\bdps\b", "deg/s"),
+    (r"\brps\b", "rev/s"),
+    (r"rev/min(?:ute)?\b", "rpm"),
+    (r"^min(?:ute)?s?$", "min"),
+    (r"\bkg(?=[ -])", "kgf"),
+    (r"(?i)^a[ _-]?rms$", "Arms"),
+    (r"\b(?:ft|in)[ -](?:lbs?|lbf|oz)\b", lambda m: _turned(m[0])),
+    (r"\blbs?(?=[ -])", "lbf"),
+    (r"\boz(?=[ -])", "ozf"),
+    (r"(?<=f)-", " "),
+    (r"^([mcuk]?)n[ .-]?m$", r"\1N m"),
+)
 
 
 _SHARE: Final = re.compile(r"(\d++(?:\.\d++)?|\.\d++)?\s*+(%|‰|pct|per ?cent)", re.IGNORECASE)
@@ -146,7 +170,7 @@ def _turned(name: str) -> str:
 
 
 def canonical_unit(unit: str) -> str:
-    """`unit` as `UNITS` spells it: "Nm" and "N·m" are "N m"."""
+    """Return `unit` as `UNITS` spells it: "Nm" and "N·m" are "N m"."""
     name = " ".join(str(unit).translate(_SPELLINGS).split())
     return _ALIASES.get(name) or (
         name if name in UNITS or _NO_WORDS.search(name) else _in_words(name)
@@ -154,7 +178,7 @@ def canonical_unit(unit: str) -> str:
 
 
 def _in_words(name: str) -> str:
-    """Return the unit of "degrees per second", "Newton metres" or "DEG/SEC"; any other name as it is."""
+    """Return the unit of "degrees per second" or "Newton metres"; any other name as it is."""
     plain = name.lower()
     for pattern, symbol in _WORDS:
         plain = re.sub(pattern, symbol, plain)
@@ -163,17 +187,19 @@ def _in_words(name: str) -> str:
 
 
 def of_rated(unit: str, quantity: str) -> str:
-    """Say how the recipe takes a share of a rated torque, current or speed, as drives count in; "" where `unit` is none."""
+    """Say how a recipe takes a share of a rated torque, current or speed; "" where it is none."""
     found = _SHARE.fullmatch(unit.strip())
     step = float(found[1] or 1) if found is not None else 0.0
     if found is None or quantity not in _RATED or step == 0.0:
         return ""
     parts = (1000.0 if found[2] == "‰" else 100.0) / step
-    return f"scale = rated {quantity} / {parts:g}, one a joint, from the drive's data sheet, and unit = '{_RATED[quantity]}'"
+    unit = _RATED[quantity]
+    scale = f"scale = rated {quantity} / {parts:g}, one a joint, from the drive's data sheet"
+    return f"{scale}, and unit = '{unit}'"
 
 
 def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
-    """The conversion of `unit` for a signal of `quantity` ("position", "torque", …).
+    """Return the conversion of `unit` for a signal of `quantity` ("position", "torque", …).
 
     Raises:
         InputRejected: S05, the unit is unknown or measures something else.
@@ -182,22 +208,13 @@ def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
     accepted = [known for known, value in UNITS.items() if value.quantity == quantity]
     found = UNITS.get(name)
     if share := of_rated(str(unit), quantity):
-        raise InputRejected(
-            "S05",
-            f"'{unit}' is a share of what the drive is rated for",
-            where=where,
-            remedy=f"declare {share}",
-        )
+        words, remedy = f"'{unit}' is a share of what the drive is rated for", f"declare {share}"
+        raise InputRejected("S05", words, where=where, remedy=remedy)
     if found is None or found.quantity != quantity:
-        what = (
-            f"unknown unit '{unit}'{did_you_mean(name, UNITS)}"
-            if found is None
-            else f"'{unit}' is a unit of {found.quantity}"
-        )
-        raise InputRejected(
-            "S05",
-            f"{what}; {quantity} needs one of {', '.join(accepted)}",
-            where=where,
-            remedy="declare the unit the numbers are in",
-        )
+        words = f"unknown unit '{unit}'{did_you_mean(name, UNITS)}"
+        if found is not None:
+            words = f"'{unit}' is a unit of {found.quantity}"
+        words = f"{words}; {quantity} needs one of {', '.join(accepted)}"
+        remedy = "declare the unit the numbers are in"
+        raise InputRejected("S05", words, where=where, remedy=remedy)
     return found

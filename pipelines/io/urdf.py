@@ -442,7 +442,7 @@ def _vector(
     if text is None:
         return np.array(default)
     words = text.split()
-    if "$" not in text and len(words) != 3:
+    if "$" not in text and len(words) != len(default):
         raise source.wrong(f"{place}: {key} must hold three numbers, not {len(words)}")
     return np.array([_finite(word, key, place, source) for word in words])
 
@@ -455,7 +455,7 @@ def _origin(element: Element, place: str, source: _Source) -> tuple[Array, Array
 
 
 def _rotation_of(rpy: Array) -> Array:
-    """R = Rz(yaw) Ry(pitch) Rx(roll): turns about fixed axes, in the order roll, pitch, yaw."""
+    """Return R = Rz(yaw) Ry(pitch) Rx(roll): turns about fixed axes, roll first."""
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     return np.array(
         [
@@ -499,7 +499,10 @@ def _tensor(element: Element, place: str, source: _Source) -> Array:
 def _inertial(
     element: Element, r: Array, p: Array, place: str, source: _Source
 ) -> tuple[float, Array, Array]:
-    """Mass, first moment and inertia about the body's origin: I_o = R I_c Rᵀ + m (|c|² 1 - c cᵀ)."""
+    """Return mass, first moment and inertia about the body's origin.
+
+    I_o = R I_c Rᵀ + m (|c|² 1 - c cᵀ)
+    """
     mass = _number(element.find("mass"), "value", place, source)
     if mass < 0.0:
         raise source.wrong(f"{place} has negative mass {mass}")

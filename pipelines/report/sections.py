@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from pipelines.errors import Check, Level
 from pipelines.estimation.checks.boundary import Boundary
-from pipelines.io.codes import title_of
+from pipelines.report.codes import title_of
 from pipelines.report.report import Section, Table, Tone
 from pipelines.report.sentences import as_sentence, paragraphs, sentence
 

@@ -12,8 +12,8 @@ from pipelines.batch.drift import Course, drift_of, from_others
 from pipelines.batch.record import Record
 from pipelines.batch.result import Result
 from pipelines.batch.summary import Summary, summary_report
-from pipelines.io.result_figures import fitted, residuals
 from pipelines.io.result_schema import result_schema
+from pipelines.report.result_figures import fitted, residuals
 from tests.batch.conftest import Lay, obey
 from tests.batch.records import STD, item_of
 

@@ -6,7 +6,7 @@ import ast
 import re
 from pathlib import Path
 
-from pipelines.io.codes import CODES, title_of
+from pipelines.report.codes import CODES, title_of
 
 REPO = Path(__file__).resolve().parents[2]
 

@@ -1,8 +1,8 @@
-"""Take out of a stage's result what can be followed from item to item: fitted figures with their std, and residuals.
+"""Take out of a stage's result the fitted figures with their std, and the residuals.
 
-Any stage's result will do: a figure is what has `value`, `std` and `unit`; a residual is what bears one of a few names. Each
-gets a name in words from where it stands: "p1", "joint 2 viscous", "cogging joint 2 amplitude". What a diagnosis leaves before
-any extension and what it leaves with it are told apart: "nominal model residual rms …", "extended model residual rms …".
+A figure is what has `value`, `std` and `unit`; a residual is what bears one of a few names. Each
+gets a name in words from where it is: "p1", "joint 2 viscous", "cogging joint 2 amplitude",
+"nominal model residual rms", "extended model residual rms".
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
-from pipelines.io.toml_text import TomlError, parse_toml
+from pipelines.io.sandbox import TomlError, parse_toml
 
 __all__ = ["fitted", "name_in", "numbers_of", "residuals", "robot_of"]
 
@@ -27,7 +27,7 @@ _SAID_BEFORE: Final = {
     "after_rms": "noise_floor"
 }  # it is no model's, and stands with the nominal one already
 _SLIDING: Final = {"N m": "N", "rad": "m"}  # of a joint that slides
-# Fields that tell one of a list from another; containers whose name says nothing; what the stage itself judges or draws.
+# Fields that name one of a list; containers without a name; what the stage itself judges.
 _NAMING: Final = ("name", "label", "effect", "cause", "kind", "law", "joint", "posture", "method")
 _SILENT: Final = ("parameters", "result", "torque")
 _PASSED_OVER: Final = (
@@ -54,7 +54,7 @@ def fitted(result: Mapping[str, Any]) -> dict[str, tuple[float, float, str]]:
 
 
 def numbers_of(result: Mapping[str, Any]) -> tuple[str, ...]:
-    """The name of every figure of `result`, whether anybody knows its std or not."""
+    """Return the name of every figure of `result`, with a std or without."""
     return tuple(dict.fromkeys(name for name, _ in _figures(result)))
 
 
@@ -70,7 +70,7 @@ def residuals(
     """Name -> (value, unit) of every residual of `result`.
 
     Args:
-        turning: which joints turn, where the caller knows the robot; else what the result says of their units.
+        turning: which joints turn, of a known robot; else what the units of the result say.
     """
     found: dict[str, tuple[float, str]] = {}
     slides = {j + 1 for j, turns in enumerate(turning) if not turns} or _sliding(result)
@@ -88,7 +88,7 @@ def residuals(
 
 
 def _sliding(value: Any) -> set[int]:
-    """The joints, from 1, that slide by the units that a result gives of them."""
+    """Return the joints, from 1, that slide by the units of a result."""
     if isinstance(value, Mapping):
         told = [
             unit
@@ -103,7 +103,7 @@ def _sliding(value: Any) -> set[int]:
 
 
 def robot_of(result: Any) -> str:
-    """The name of the first robot that a result is of, however deep; "" where it says none."""
+    """Return the name of the first robot that a result is of; "" where it says none."""
     if isinstance(result, Mapping):
         if "base_parameters" in result and isinstance(
             result.get("robot"), str
@@ -148,7 +148,7 @@ def _walk(value: Any, path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
 
 
 def _words(item: Any) -> list[str]:
-    """What tells one of a list from the others."""
+    """Return what distinguishes one of a list from the others."""
     if not isinstance(item, Mapping):
         return []
     said = []
@@ -164,7 +164,7 @@ def _words(item: Any) -> list[str]:
 def _leaves(
     value: Any, words: tuple[str, ...] = (), joint: int = 0, but: str | None = None
 ) -> Iterator[tuple[str, int, float]]:
-    """Words, the joint they are of or 0, and the number; without what stands under the key `but`."""
+    """Yield words, their joint or 0, and the number; without what is under the key `but`."""
     if _number(value):
         yield " ".join(words), joint, float(value)
     elif isinstance(value, Mapping):

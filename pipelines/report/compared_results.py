@@ -1,20 +1,26 @@
-"""What two results that are compared are called, where their comparison goes, and what to name instead of two that cannot be."""
+"""Say what two compared results are called, where their comparison goes, and what both have.
+
+A model that was fitted says the numbers of a cause again that a finding has said: a figure that
+both `extend` and its model have counts once.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Container, Iterator, Mapping
 from itertools import takewhile
+from typing import Any, Final
 
 from pipelines.errors import UsageError
-from pipelines.io.places import written_by
-from pipelines.io.stored_result import StoredResult
+from pipelines.io.output import written_by
+from pipelines.io.results import StoredResult
 
-__all__ = ["called", "label_of", "of_other_commands"]
+__all__ = ["called", "label_of", "less_findings", "modelled", "of_other_commands"]
 
 _RESULT, _MODEL = "result.json", "model.json"
 
 
 def called(a: StoredResult, b: StoredResult) -> tuple[str, str]:
-    """What the two are called: as much of their paths, from the end, as tells them apart; nothing of where they lie."""
+    """Return the names of the two: as much of their paths, from the end, as differs."""
     parts = [_path(one) for one in (a, b)]
     for depth in range(1, 5):
         names = ["/".join(part[-depth:]) for part in parts]
@@ -28,7 +34,7 @@ def _path(one: StoredResult) -> tuple[str, ...]:
 
 
 def label_of(a: StoredResult, b: StoredResult) -> str:
-    """What the default --out calls the two, so that no comparison takes the place of another: "monday-and-friday-estimate-bps"."""
+    """Return the default --out of the two: "monday-and-friday-estimate-bps"."""
     first, second = _belonging(a), _belonging(b)
     if a.path == b.path and a.folder == b.folder:
         return "-".join(first)
@@ -46,9 +52,9 @@ def _alike(pair: tuple[str, str]) -> bool:
 
 
 def _belonging(one: StoredResult) -> tuple[str, ...]:
-    """The logs it is of, the command, the stage of a run, and the file, as far as its place says so.
+    """Return the logs it is of, the command, the stage of a run, and the file.
 
-    In runs/ROBOT/LABEL/COMMAND it is of the logs LABEL; beside that lies what `extend` has moved aside, COMMAND-CAUSE.
+    In runs/ROBOT/LABEL/COMMAND it is of the logs LABEL.
     """
     owner = next(
         (folder for folder in (one.folder, *one.folder.parents[:2]) if written_by(folder)),
@@ -64,7 +70,7 @@ def _belonging(one: StoredResult) -> tuple[str, ...]:
 
 
 def of_other_commands(a: StoredResult, b: StoredResult) -> UsageError:
-    """C02, with what can be compared of the two instead: a stage within a run, or the models that both have left."""
+    """Return C02, with what can be compared instead: a stage within a run, or two models."""
     return UsageError(
         "C02",
         f"results of different commands: {a.command} and {b.command}",
@@ -74,7 +80,7 @@ def of_other_commands(a: StoredResult, b: StoredResult) -> UsageError:
 
 
 def _instead(run: StoredResult, other: StoredResult) -> str:
-    """The stage of a run that the other is a result of."""
+    """Return the stage of a run that the other is a result of."""
     names = (
         [one.get("name") for one in run.object.get("stages") or ()] if run.command == "run" else []
     )
@@ -95,3 +101,45 @@ def _models(a: StoredResult, b: StoredResult) -> str:
     if not without:
         return f"compare two of one command, or their models: rrrid compare {files[0]} {files[1]}"
     return f"compare two of one command, or two model.json; {' and '.join(without)} left none there"
+
+
+Place = tuple[str, int | None]  # cause; joint, from 1
+_FINDINGS: Final = ("findings", "baseline_effects")
+
+
+def modelled(result: Mapping[str, Any]) -> frozenset[Place]:
+    """Every law and effect of every model in `result`: a stage's, a run's, or a model file's.
+
+    Raises:
+        KeyError, TypeError, AttributeError: it is no result.
+    """
+    return frozenset(_held(result))
+
+
+def _held(result: Mapping[str, Any]) -> Iterator[Place]:
+    for kind in ("friction", "effects") if "base_parameters" in result else ():
+        yield from ((str(one["effect"]), one["joint"]) for one in result[kind])
+    if isinstance(result.get("model"), Mapping):
+        yield from _held(result["model"])
+    for step in result.get("stages") or ():
+        yield from _held(step.get("result") or {})
+
+
+def less_findings(result: Mapping[str, Any], held: Container[Place]) -> dict[str, Any]:
+    """Return `result` without the findings, and baseline effects, that are `held`."""
+    less = dict(result)
+    for kind in _FINDINGS:
+        if isinstance(less.get(kind), list):
+            less[kind] = [one for one in less[kind] if not _is_held(one, held)]
+    if less.get("stages"):
+        less["stages"] = [
+            {**step, "result": less_findings(step["result"], held)} if step.get("result") else step
+            for step in less["stages"]
+        ]
+    return less
+
+
+def _is_held(finding: Any, held: Container[Place]) -> bool:
+    return (
+        isinstance(finding, Mapping) and (str(finding.get("cause")), finding.get("joint")) in held
+    )

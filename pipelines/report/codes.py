@@ -1,6 +1,7 @@
-"""What every code stands for, in a few words. A code never changes its meaning; tests and scripts may rely on it.
+"""Name every code in a few words. A code never changes its meaning.
 
-The letters: F container, S structure and units, T time, D samples, C configuration, P process, X security, Z ourselves.
+The letters: F container, S structure and units, T time, D samples, C configuration, P process,
+X security, Z internal.
 """
 
 from __future__ import annotations
@@ -118,10 +119,10 @@ CODES: Final[dict[str, str]] = {
 
 
 def first_to_read(check: Check) -> tuple[bool, bool, int, int]:
-    """What findings are sorted by, the first to read first.
+    """Return what findings are sorted by, the first to read first.
 
-    Columns in the wrong place, in the wrong unit or at the wrong time explain what else is found; what is said of a container
-    spoils no fit.
+    Columns in the wrong place, unit or time explain what else is found; what is said of a
+    container spoils no fit.
     """
     code = check.code.removeprefix("RRID-")
     rank = 0 if code.startswith("S") or code == "T06" else 1 if code[:1] in ("T", "D") else 2
@@ -129,5 +130,5 @@ def first_to_read(check: Check) -> tuple[bool, bool, int, int]:
 
 
 def title_of(code: str) -> str:
-    """A few words for a code, with or without its prefix; empty for one that is not known."""
+    """Return a few words for a code, with or without its prefix; "" for an unknown one."""
     return CODES.get(code.removeprefix("RRID-"), "")
