@@ -1,10 +1,4 @@
-"""What a new output takes the place of: rrrid's own earlier one is replaced, and no result is lost that nobody meant to replace.
-
-A result of another command is moved aside as a whole, whoever chose the folder: who names one with --out need not know what lies
-there. One of the same command is moved aside in a default folder alone, where it is of other data (two folders of logs may have
-one name), or has a model that is not made anew; a folder that was named is replaced, as asked. With --force nothing is kept. What
-is kept or lost is said.
-"""
+"""Move an earlier batch aside: until batch refuses it like every command."""
 
 from __future__ import annotations
 
@@ -28,11 +22,7 @@ _LOOK = "look there for it, or choose folders with --out"
 
 
 def of_other_data(inputs: object, read: Iterable[str]) -> bool:
-    """Whether an output of `inputs` (path -> SHA-256) is of logs, and none of them is among those that were `read`, by SHA-256 or
-    place, of which no more are asked than it takes; also where it says nothing.
-
-    What was made anew in its old place, imported again say, is no other data.
-    """
+    """Return whether an output of `inputs` is of other logs than those that were `read`."""
     if not isinstance(inputs, Mapping):
         return True
     earlier = _data_of(inputs)
@@ -57,7 +47,7 @@ def free_name(folder: Path) -> Path:
 
 
 def beside(out: Path, ending: str) -> Path:
-    """The free place beside `out` for what lies there now."""
+    """Return the free place beside `out` for what is there now."""
     place = (
         out if out.name not in ("", "..") else Path(os.path.abspath(out))
     )  # a/.. has a name as well

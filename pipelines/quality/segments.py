@@ -252,9 +252,10 @@ def _glitch_floors(log: ExperimentLog, shown: tuple[float | None, ...]) -> tuple
     finite = np.where(np.isfinite(log.tau), log.tau, 0.0)
     limit = torque_limit(log)
     limit = np.where(np.isfinite(limit), limit, 0.0)
-    low, high = np.quantile(finite, (0.01, 0.99), axis=0) if finite.size else (np.nan, np.nan)
-    torque = CONFIG.glitch_torque * (high - low)
-    torque = np.maximum(torque, CONFIG.glitch_limit * limit)
+    torque = CONFIG.glitch_limit * limit
+    if finite.size:
+        low, high = np.quantile(finite, (0.01, 0.99), axis=0)
+        torque = np.maximum(CONFIG.glitch_torque * (high - low), torque)
     control = log.controller
     if control is not None and control.kp is not None and control.kd is not None:
         pd = control.law.startswith("pd") / 4.0

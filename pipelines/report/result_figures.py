@@ -40,15 +40,14 @@ _PASSED_OVER: Final = (
 )
 _PICTURES: Final = "previews"  # whose units are of position and torque, not of joints
 _A_MODEL: Final = "model"  # whose "robot" is a whole description
-_MOST = 400  # figures of one item
 
 
-def fitted(result: Mapping[str, Any]) -> dict[str, tuple[float, float, str]]:
+def fitted(result: Mapping[str, Any], most: int = 400) -> dict[str, tuple[float, float, str]]:
     """Name -> (value, std, unit) of every figure of `result` whose std is known."""
     found: dict[str, tuple[float, float, str]] = {}
     for name, holder in _figures(result):
         value, std = holder["value"], holder["std"]
-        if _number(value) and _number(std) and std > 0.0 and len(found) < _MOST:
+        if _number(value) and _number(std) and std > 0.0 and len(found) < most:
             found[_free(name, found)] = (float(value), float(std), str(holder["unit"]))
     return found
 
@@ -65,7 +64,7 @@ def _figures(result: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]
 
 
 def residuals(
-    result: Mapping[str, Any], turning: Sequence[bool] = ()
+    result: Mapping[str, Any], turning: Sequence[bool] = (), most: int = 400
 ) -> dict[str, tuple[float, str]]:
     """Name -> (value, unit) of every residual of `result`.
 
@@ -78,7 +77,7 @@ def residuals(
         for key, (called, unit) in _RESIDUALS.items():
             if isinstance(holder, Mapping) and key in holder:
                 for words, joint, value in _leaves(holder[key], but=_SAID_BEFORE.get(key)):
-                    if len(found) < _MOST:
+                    if len(found) < most:
                         full = " ".join(filter(None, (name, called, words)))
                         found[_free(full, found)] = (
                             value,
