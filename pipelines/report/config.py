@@ -16,6 +16,7 @@ class ReportConfig:
     visible_jitter: float = 1e-3  # rms, in sample times, from which intervals are drawn
     reconstructed: int = 8  # logs whose motion is drawn
     simulated: int = 4  # logs whose simulation is drawn
+    inputs: int = 40  # at the foot of a page
     fault_numbers: int = 3  # of a finding that `demo` tells, where it hid another
 
 
