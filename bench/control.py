@@ -24,7 +24,7 @@ import numpy as np
 from bench.config import SAMPLE_TIME
 from bench.machine import Floats, Machine
 from bench.motions import Reference
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 
 FEEDFORWARD = ("friction", "inertia", "coriolis", "gravity")
 Gains = tuple[float, ...]

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.config import CONFIG
 from bench.plan import Plan, PlannedJoint, Solid, disc, plan_of
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.robot import RobotDescription
 
 

@@ -29,7 +29,7 @@ from bench.control import (
 from bench.dynamics import RigidDynamics
 from bench.machine import Machine
 from bench.motions import Reference, at_rest
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 
 WRITING_CASES: tuple[tuple[str, ...], ...] = (
     (),

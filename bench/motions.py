@@ -18,7 +18,7 @@ import numpy as np
 from bench.config import CONFIG, SAMPLE_TIME
 from bench.dynamics import RigidDynamics
 from bench.machine import Machine
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 
 
 @dataclass(frozen=True, eq=False)

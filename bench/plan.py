@@ -14,7 +14,7 @@ import numpy as np
 
 from bench.config import CONFIG
 from pipelines.errors import UsageError
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 from pipelines.io.urdf import chain_from_urdf
 

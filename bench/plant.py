@@ -30,7 +30,7 @@ from bench.motions import Reference
 from bench.plan import Plan, plan_of
 from pipelines.errors import UsageError
 from pipelines.io import schema
-from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 
 

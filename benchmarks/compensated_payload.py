@@ -28,7 +28,7 @@ from benchmarks.torque_boundary import (
 )
 from pipelines.estimation.checks.boundary import torque_boundary
 from pipelines.estimation.checks.payload import CompensatedPayload
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
 
 

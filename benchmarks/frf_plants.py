@@ -33,7 +33,7 @@ from bench.plant import record
 from benchmarks.other_plants.arms import ARMS, Arm
 from benchmarks.other_plants.friction import Friction
 from pipelines.io import schema
-from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from sample_logs.bench_session import controllers_model
 

@@ -24,8 +24,8 @@ import numpy as np
 
 from benchmarks.frf_plants import KINDS, PLANTS, Session, recorded
 from benchmarks.hidden_effects.table import wilson
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import ExperimentLog
 from pipelines.model.frf.findings import Findings, frf_findings, grouped
 from pipelines.model.frf.grouping import GroupingConfig
 

@@ -25,8 +25,8 @@ from benchmarks.hidden_effects.table import wilson
 from pipelines import fit_friction
 from pipelines.errors import RrridError
 from pipelines.fit_friction import Settings
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import Opened
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.friction.result import JointResult
 from pipelines.stage import Inputs
 from tests.model.friction.closed_loop import KINDS, Machine, draw, logs_of

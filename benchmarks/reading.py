@@ -20,9 +20,9 @@ import h5py
 import numpy as np
 
 from pipelines.io import schema
-from pipelines.io.experiment import ExperimentLog, Signal
 from pipelines.io.files import open_log, write_log
 from pipelines.io.hdf5 import read_parts
+from pipelines.io.log import ExperimentLog, Signal
 
 ROBOT = Path(__file__).parents[1] / "sample_logs/robots/rrr.toml"
 NAMES = ("q", "tau", "q_ref", "dq_ref", "ddq_ref", "temperature")

@@ -28,8 +28,8 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import Look, diagnose_prepared
 from pipelines.diagnosis.trained import Standing, train
 from pipelines.import_log import STAGE, Settings
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

@@ -24,7 +24,7 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.regressor import rrr as rrr_model
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 from pipelines.model.simulation import Experiment, Noise, Plant, choose_step, run
 from sample_logs.make_model import FRICTION, synthetic_arm
 

@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from benchmarks.hidden_effects.table import wilson
 from pipelines.estimate_bps import Result, Settings, compute
-from pipelines.io.experiment import ExperimentLog, Signal
 from pipelines.io.files import Opened
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.choose import rigid_body

@@ -26,7 +26,7 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.regressor import rrr
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.rrr_kinematics import BRANCHES, Geometry, inverse, rrr_geometry, tip
 from pipelines.model.writing.inverse import ClosedForm, Numerical

@@ -20,7 +20,7 @@ from typing import Any
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.fit.differences import limit_of, standardised
 from pipelines.io.option import option
-from pipelines.io.run_results import read_any_result
+from pipelines.io.results import read_any_result
 from pipelines.model.parameter_names import named_in, quantity_of
 from pipelines.report.compared_results import (
     called,

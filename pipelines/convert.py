@@ -11,12 +11,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.canonical import digest_of
-from pipelines.io.experiment import ExperimentLog
-from pipelines.io.files import open_log, write_log
+from pipelines.io.files import open_log, write_csv, write_log
+from pipelines.io.log import ExperimentLog, digest_of
 from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
-from pipelines.io.table import write_csv
 from pipelines.quality.subject import many
 from pipelines.report.report import Report, Section, Table
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug

@@ -16,8 +16,8 @@ from pathlib import Path
 
 from pipelines.diagnosis.result import Diagnosis, NotIdentifiable
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog
 from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
 from pipelines.model.effects import find_effect

@@ -15,12 +15,15 @@ from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
 from pipelines.fit.identifiability import hard_to_see, not_separated
-from pipelines.io.canonical import digest_of
-from pipelines.io.covariance_file import read_covariance, write_covariance
-from pipelines.io.derive import derive, recording
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
-from pipelines.io.model_file import Source, read_model, write_model
+from pipelines.io.log import ExperimentLog, derive, digest_of, recording
+from pipelines.io.model_file import (
+    Source,
+    read_covariance,
+    read_model,
+    write_covariance,
+    write_model,
+)
 from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.io.schema import joint_unit

@@ -25,10 +25,8 @@ from pipelines.diagnosis.result import Extended, Extension
 from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.estimation.checks.gates import examined, logs_of_roles
-from pipelines.io.canonical import digest_of
-from pipelines.io.derive import derive, recording
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import Source, read_model, write_model
 from pipelines.io.option import option
 from pipelines.model.arm import Arm

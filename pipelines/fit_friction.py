@@ -15,10 +15,8 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
-from pipelines.io.canonical import digest_of
-from pipelines.io.derive import derive, recording
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import ModelFile, Source, read_model, write_model
 from pipelines.io.option import option
 from pipelines.io.results import encode

@@ -18,8 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.io.derive import recording
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
 from pipelines.model.arm import Arm

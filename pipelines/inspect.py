@@ -19,9 +19,8 @@ import numpy as np
 from pipelines.errors import Check, Level, RrridError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
-from pipelines.io.derive import recording
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import Opened
+from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.io.schema import joint_unit

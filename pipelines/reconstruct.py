@@ -22,9 +22,8 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, NothingMatched
-from pipelines.io.derive import derive, recording
-from pipelines.io.experiment import Array
 from pipelines.io.files import Opened, open_log, write_log
+from pipelines.io.log import Array, derive, recording
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstruction, reconstruct

@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.io.derive import recording
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
 from pipelines.io.results import encode

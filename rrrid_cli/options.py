@@ -22,7 +22,7 @@ import typer
 
 from pipelines.errors import UsageError, clean, did_you_mean
 from pipelines.io.option import option
-from pipelines.io.toml_text import TomlError, parse_toml
+from pipelines.io.sandbox import TomlError, parse_toml
 
 __all__ = ["Common", "make_settings", "parameters", "read", "read_values", "settable", "stage_of"]
 
@@ -252,7 +252,7 @@ def _from_file(path: Path | None) -> Iterator[tuple[str, str, Any]]:
     """Yield (where, stage, options) of a TOML file."""
     if path is None:
         return
-    from pipelines.io.text import read_small_text
+    from pipelines.io.sandbox import read_small_text
 
     text = read_small_text(path, what="a TOML file of settings")
     try:

@@ -21,7 +21,7 @@ from bench.machine import Fault, Friction, Machine
 from bench.motions import Reference
 from bench.plan import Solid
 from bench.plant import record
-from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Acting, Arm

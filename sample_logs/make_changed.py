@@ -13,7 +13,7 @@ from bench import experiments
 from bench.experiments import FEEDFORWARD, Experiment
 from bench.faults.drive import Cogging
 from bench.machine import Fault, Machine
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from sample_logs.bench_session import controllers_model, machine, recorded
 from sample_logs.make_healthy import WRITING_STIFFNESS, text
 

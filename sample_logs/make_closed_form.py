@@ -15,7 +15,7 @@ import numpy as np
 
 from bench.config import CONFIG, SAMPLE_TIME
 from pipelines.io import schema
-from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion

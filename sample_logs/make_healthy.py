@@ -12,7 +12,7 @@ from bench.config import SAMPLE_TIME
 from bench.experiments import Experiment
 from bench.machine import Machine
 from bench.motions import Reference
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.writing.reference import writing_task
 from sample_logs.bench_session import controllers_model, machine, recorded
 

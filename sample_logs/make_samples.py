@@ -16,8 +16,8 @@ from importlib.metadata import version
 from bench.config import SAMPLE_TIME
 from bench.dynamics import build
 from bench.plan import plan_of
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog
 from sample_logs.bench_session import machine
 from sample_logs.make_changed import changed_logs
 from sample_logs.make_closed_form import closed_form_logs

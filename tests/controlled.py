@@ -11,7 +11,7 @@ from bench.draw import paper_machine
 from bench.motions import Reference
 from bench.plant import run
 from pipelines.io import schema
-from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from tests.model.simulation.arms import waving
 

@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from tests import healthy
 from tests.healthy import arm_torque, fourier, make_log, rows, with_signal
 

@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from pipelines.io import schema
-from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.choose import rigid_body

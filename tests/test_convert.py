@@ -8,7 +8,7 @@ import numpy as np
 
 from pipelines import convert
 from pipelines.io.files import open_log, write_log
-from pipelines.io.table import csv_cell
+from pipelines.io.parquet import csv_cell
 from pipelines.stage import Request, run_stage
 from tests.io.logs import random_log, small_log
 

@@ -12,8 +12,8 @@ import pytest
 
 from pipelines import import_log, inspect, reconstruct
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import find_logs, open_log, write_log
+from pipelines.io.log import ExperimentLog
 from pipelines.io.results import decode, read_series
 from pipelines.stage import Outcome, Request, run_stage
 from tests.fault_table import FAULTS

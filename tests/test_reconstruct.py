@@ -14,9 +14,8 @@ from scipy.linalg import solve_discrete_are
 
 from pipelines import reconstruct
 from pipelines.errors import InputRejected, NothingMatched
-from pipelines.io.derive import recording
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import ExperimentLog, recording
 from pipelines.model.motion import Reconstruction
 from pipelines.model.motion import reconstruct as motion_of
 from pipelines.signal.chain import held_input, transition

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps, fit_friction, run, validate_writing
-from pipelines.io.experiment import Signal
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import Signal
 from pipelines.io.sessions import apart
 from pipelines.report.run_report import stage_lines
 from pipelines.report.sections import CARD

@@ -12,9 +12,8 @@ import numpy as np
 import pytest
 
 from bench.experiments import WRITING_CASES
-from pipelines.io.canonical import digest_of
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import ExperimentLog, digest_of
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_changed import changed_logs

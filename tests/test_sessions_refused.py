@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from pipelines.io.files import open_log, write_log
-from pipelines.io.mixed import SeveralSessions
+from pipelines.io.sessions import SeveralSessions
 from pipelines.stage import Request, Stage, run_stage
 from tests.cli.commands import rrrid
 from tests.healthy import begun

@@ -11,9 +11,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, RrridError, UsageError
-from pipelines.io.canonical import digest_of
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import ExperimentLog, digest_of
 from pipelines.io.model_file import model_text, read_model
 from pipelines.model.named_cause import acting_cause
 from pipelines.simulate import STAGE, Settings

@@ -12,7 +12,7 @@ from bench.dynamics import motor_share, typical_inertia
 from bench.filters import wall
 from bench.machine import Case, Fault, Floats, Hooks, Machine, Run
 from bench.plan import Base, Plan, Shaft, Twist, plan_of
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 
 
 def _motor_and_link(case: Case) -> tuple[float, float]:

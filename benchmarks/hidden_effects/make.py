@@ -20,8 +20,8 @@ from bench.plant import answer
 from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.sessions import Session, record_case
 from pipelines.errors import UsageError
-from pipelines.io.atomic import write_file
 from pipelines.io.files import write_log
+from pipelines.io.output import write_file
 
 _VERDICTS = {
     "zero": "no-fault-found",

@@ -32,7 +32,7 @@ from bench.plant import peak_torque
 from benchmarks.hidden_effects.cases import Hidden, SealedCase
 from benchmarks.hidden_effects.robots import ROBOTS
 from pipelines.errors import UsageError
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous

@@ -14,7 +14,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.robot import Drive, Joint, RobotDescription
 
 Vector = tuple[float, float, float]

@@ -18,7 +18,7 @@ from benchmarks.other_plants.friction import Friction
 from benchmarks.other_plants.loops import Loop, motion
 from benchmarks.other_plants.plant import Plant
 from pipelines.io import schema
-from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 
 Motions = tuple[tuple[str, str], ...]  # kind of motion, role of its log

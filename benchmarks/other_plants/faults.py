@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.other_plants.friction import Friction
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 
 _HEATING, _HOPS = 5.0, 0.7  # [s] time constant of a gear that warms, mean time between two hops
 _DRIFTING = 6.0  # [s] time constant of viscous friction that drifts

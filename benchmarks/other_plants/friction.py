@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from benchmarks.other_plants.arms import Arm
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 
 Path = tuple[Array, Array, Array]
 _DAMPING = 0.8

@@ -20,7 +20,7 @@ from benchmarks.other_plants.arms import Arm
 from benchmarks.other_plants.faults import Fault, Now, Several
 from benchmarks.other_plants.friction import Friction
 from benchmarks.other_plants.loops import Loop
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 
 _LONGEST = 5e-4  # [s] of a step
 _STABLE = 1.0  # steps a time constant of the stiffest joint: Runge-Kutta 4 bears 2.78

@@ -14,7 +14,7 @@ import numpy as np
 
 from pipelines.diagnosis.result import Answer, NotIdentifiable
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf

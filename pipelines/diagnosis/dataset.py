@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.fit.joint_table import Array, Indices, Table, by_joint, in_rows
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data, Kept, Whitening

@@ -22,7 +22,7 @@ from pipelines.diagnosis.trained import covariance
 from pipelines.diagnosis.variance import settle
 from pipelines.fit.bootstrap import wald
 from pipelines.fit.joint_table import Array, Table, in_rows
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.arm import Acting
 from pipelines.model.rows.exact import difference
 from pipelines.model.rows.prepare import Logs, Prepared, prepare

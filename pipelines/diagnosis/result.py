@@ -11,7 +11,7 @@ from typing import Literal
 
 from pipelines.errors import Check
 from pipelines.estimation.checks.boundary import Boundary
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import ModelFile
 from pipelines.io.results import NOT_STORED
 from pipelines.model.arm import Acting, Arm

@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.diagnosis.result import Alternative, Diagnosis, Finding, Value
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.words import plain_number, within
 

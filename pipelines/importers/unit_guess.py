@@ -20,7 +20,7 @@ from pipelines.importers.evidence import (
     unlike_links,
 )
 from pipelines.importers.recipe import BLANK
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.robot import Joint
 from pipelines.io.units import UNITS, of_rated
 

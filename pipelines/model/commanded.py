@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.rigid.body import Array
 from pipelines.model.simulation import Experiment
 from pipelines.model.simulation.control import Controlling

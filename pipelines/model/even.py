@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.quality.segments import Mask, Usable, usable
 from pipelines.signal.instants import Instants, average_held, instants, merge_close
 from pipelines.signal.resample import grid, resample

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
-from pipelines.io.derive import recording
+from pipelines.io.log import recording
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.logs import Recipe, equations_of, with_cutoff
 from pipelines.model.estimation.nominal import nominal_columns

@@ -25,9 +25,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, Level
-from pipelines.io.derive import recording
-from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.limits import shorter_than_period
+from pipelines.io.log import Array, ExperimentLog, Signal, recording
 from pipelines.model.measured import Measured, measured
 from pipelines.model.motion import (
     Mean,

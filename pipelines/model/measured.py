@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.limits import SHORTEST, recorded_span
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.quality.segments import Usable, usable
 from pipelines.signal.grid import Grid, grids
 

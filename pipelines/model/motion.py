@@ -19,8 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.derive import derived_by
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog, derived_by
 from pipelines.model.even import Evened, evened
 from pipelines.model.measured import Measured, measured
 from pipelines.model.rigid.body import Motion

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.measured import Measured
 from pipelines.model.motion import Reconstructed
 from pipelines.model.tuned import encoder_resolution

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import UsageError
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.measured import Measured
 from pipelines.model.tuned import Observers, Reconstruction, tuned_observers
 from pipelines.quality.segments import Mask, long_blocks

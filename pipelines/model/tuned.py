@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.option import option
 from pipelines.quality.segments import Usable
 from pipelines.signal.chain import ORDERS, stationary

@@ -17,8 +17,8 @@ from dataclasses import replace
 from typing import Final
 
 from pipelines.errors import Check
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import Opened
+from pipelines.io.log import ExperimentLog
 from pipelines.quality.clock import CLOCK_CHECKS, ORDER_CHECKS, length
 from pipelines.quality.config import CONFIG
 from pipelines.quality.motion import MOTION_CHECKS, both_ways

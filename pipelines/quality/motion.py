@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.errors import Check, Level
-from pipelines.io.experiment import Array
 from pipelines.io.limits import FEWEST, percent
+from pipelines.io.log import Array
 from pipelines.quality.config import CONFIG
 from pipelines.quality.segments import lagged_speed
 from pipelines.quality.subject import NotTested, Subject, spread

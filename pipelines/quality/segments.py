@@ -20,8 +20,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.io import limits
-from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.limits import ABSURD, GAP_LIMIT, GAP_TICKS, SHORTEST, sentinels
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.quality.config import CONFIG
 
 __all__ = ["SHORTEST", "Mask", "TimeBase", "Usable", "lagged_speed", "long_blocks", "quantum"]

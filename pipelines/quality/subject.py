@@ -10,8 +10,8 @@ from typing import ClassVar, TypedDict, Unpack
 import numpy as np
 
 from pipelines.errors import Check, Level, clean
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.limits import FEWEST
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.schema import joint_unit
 from pipelines.quality.segments import Indices, Mask, Usable, usable
 

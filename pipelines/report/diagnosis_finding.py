@@ -12,7 +12,7 @@ import numpy as np
 
 from pipelines.diagnosis.result import Answer, Finding, Gain, ResidualRms, TipError
 from pipelines.diagnosis.words import of_any_size, taken_in, where
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.parameter_names import numbered
 from pipelines.model.rows.residual_analysis import Proof

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipelines.io.experiment import Array
 from pipelines.io.limits import GAP_TICKS
+from pipelines.io.log import Array
 from pipelines.quality.segments import long_blocks
 from pipelines.quality.subject import Subject
 from pipelines.report.figures import (

@@ -17,7 +17,7 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from pipelines.io.atomic import write_file
+from pipelines.io.output import write_file
 from pipelines.report.report import (
     Figure,
     Report,

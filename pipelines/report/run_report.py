@@ -15,7 +15,7 @@ from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Gain
 from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.errors import Check, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary
-from pipelines.io.places import slug
+from pipelines.io.output import slug
 from pipelines.io.results import FLAT, NOT_STORED
 from pipelines.model.estimation.result import Result as Estimate
 from pipelines.report import style

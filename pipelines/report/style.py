@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pipelines.errors import clean
-from pipelines.io.atomic import remove_folder, temporary_folder
+from pipelines.io.output import remove_folder, temporary_folder
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis

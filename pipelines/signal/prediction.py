@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 
 __all__ = ["prediction_errors", "prediction_weights"]
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
-from pipelines.io.atomic import write_file
+from pipelines.io.output import write_file
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage
 

@@ -10,7 +10,7 @@ import numpy as np
 from bench.draw import machine_of
 from bench.machine import Fault, Floats, Hooks, Machine, Parameters, Run, coulomb_viscous
 from bench.motions import Reference, times
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 
 CENTRE = np.array([0.3, -1.4, 0.6])  # [rad]

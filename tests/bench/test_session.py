@@ -15,9 +15,8 @@ from bench.experiments import Experiment
 from bench.faults import fault_names, make
 from bench.machine import Machine
 from bench.plant import answer, peak_torque, record
-from pipelines.io.canonical import digest_of
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import ExperimentLog, digest_of
 from tests.bench.link_model import LinkModel
 from tests.bench.machines import CENTRE, sway
 

@@ -16,7 +16,7 @@ from bench.faults import fault_names, find_fault, make
 from bench.machine import Fault, Machine
 from bench.plant import peak_torque, record
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.estimation.logs import Recipe, fit_logs, judge, motions_of
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.tuned import Reconstruction

@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from pipelines.errors import Interrupted, RrridError
-from pipelines.io.files import hash_file, write_log
-from pipelines.io.guard import Answer, guarded
+from pipelines.io.files import write_log
+from pipelines.io.output import hash_file
+from pipelines.io.sandbox import Answer, guarded
 from tests.cli.commands import REPO, RRRID
 from tests.io.logs import small_log
 

@@ -10,8 +10,8 @@ import pytest
 
 from pipelines import design_excitation
 from pipelines.errors import UsageError
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.excitation import found as found_module
 from pipelines.model.excitation.design import FINISH, Design, finished, landscape
 from pipelines.model.excitation.task import Task

@@ -15,7 +15,7 @@ import pytest
 from pipelines import diagnose, import_log
 from pipelines.diagnosis import engine
 from pipelines.diagnosis.result import Diagnosis
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import encode
 from pipelines.model.rows.prepare import Logs
 from pipelines.report.sections import CARD

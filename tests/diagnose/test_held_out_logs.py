@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.result import Diagnosis
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.rows.prepare import Logs

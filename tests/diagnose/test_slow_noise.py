@@ -13,7 +13,7 @@ from bench.draw import draw_machine
 from bench.faults.drive import Cogging
 from bench.plant import record
 from pipelines.diagnosis.result import Diagnosis
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered

@@ -11,7 +11,7 @@ from benchmarks.hidden_effects.cases import SealedCase
 from benchmarks.hidden_effects.sessions import record_case
 from pipelines.diagnosis import engine
 from pipelines.diagnosis.result import Diagnosis
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.signal import lsim
 
-from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog, Signal
 
 __all__ = ["INERTIA", "LAG", "ORDER", "ROTOR", "turned"]
 

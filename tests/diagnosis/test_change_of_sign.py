@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.dataset import load
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rigid.body import Motion

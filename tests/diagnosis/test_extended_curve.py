@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.families import Wanted

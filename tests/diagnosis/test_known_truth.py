@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipelines import diagnose
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.effects import find_effect
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.prepare import Logs

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.trained import parameters, told
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging

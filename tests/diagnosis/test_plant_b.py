@@ -12,8 +12,8 @@ import pytest
 
 from pipelines.diagnosis.engine import Diagnosis, diagnose
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import read_unguarded
+from pipelines.io.log import ExperimentLog
 from tests.healthy import with_signal
 
 # one cause, not to be mistaken

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.prepare import Logs, prepare

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from tests.model.estimation.experiments import experiment
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from pipelines import estimate_bps
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog
 from pipelines.io.results import read_series
 from pipelines.stage import Outcome, Request, run_stage
 

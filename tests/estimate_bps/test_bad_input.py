@@ -15,8 +15,8 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.errors import InputRejected, NothingMatched, UsageError
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import Opened, write_log
+from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import format_robot
 from pipelines.quality.checks import check_log
 from pipelines.stage import Inputs

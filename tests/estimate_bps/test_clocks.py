@@ -14,8 +14,8 @@ from benchmarks.uneven_stamps import estimated as estimated_case
 from pipelines.errors import Check
 from pipelines.import_log import STAGE as IMPORT
 from pipelines.import_log import Settings as ImportSettings
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import ExperimentLog
 from pipelines.model.plausibility import plausibility
 from pipelines.quality.checks import Subject, check_log
 from pipelines.stage import Request, run_stage

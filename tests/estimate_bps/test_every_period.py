@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.estimate_bps import Result
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.report.bps_report import bps_report
 from tests.estimate_bps.test_periods import deviation, estimated, of_periods, only, std_of
 from tests.model.estimation.experiments import periodic

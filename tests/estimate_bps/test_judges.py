@@ -11,8 +11,8 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import format_robot
 from pipelines.model.estimation.compare import Compared

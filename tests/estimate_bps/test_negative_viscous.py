@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from tests.estimate_bps.estimates import SYMMETRIC, stage
 from tests.healthy import VISCOUS, with_signal
 from tests.seeds import rarely

@@ -10,8 +10,8 @@ import pytest
 
 from pipelines.errors import UsageError
 from pipelines.estimate_bps import Result, Settings, compute, report
-from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.files import Opened
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.choose import rigid_body

@@ -11,8 +11,8 @@ import pytest
 
 from pipelines import estimate_bps, reconstruct
 from pipelines.estimate_bps import Result, compute
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import Opened
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import decode, encode
 from pipelines.model.estimation.floor import Beside
 from pipelines.report.bps_report import bps_report

@@ -19,8 +19,8 @@ from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.findings import boundary_findings
 from pipelines.estimation.checks.gravity_fit import GravityModel
-from pipelines.io.experiment import ExperimentLog, Signal
 from pipelines.io.files import find_logs, open_log
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from pipelines.io.robot_files import load_robot
 from pipelines.report.sections import boundary_card

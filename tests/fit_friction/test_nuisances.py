@@ -17,8 +17,8 @@ import pytest
 
 from pipelines import fit_friction
 from pipelines.fit_friction import Settings
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import Opened
+from pipelines.io.log import ExperimentLog
 from pipelines.model.friction.findings import misfits
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.result import JointResult, Result

@@ -12,8 +12,8 @@ import pytest
 from pipelines import fit_friction
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.fit_friction import Settings
-from pipelines.io.experiment import Controller, ExperimentLog, Signal
 from pipelines.io.files import Opened, open_log, write_log
+from pipelines.io.log import Controller, ExperimentLog, Signal
 from pipelines.io.model_file import read_model
 from pipelines.io.robot import format_robot
 from pipelines.model.arm import Arm

@@ -16,7 +16,7 @@ from bench.faults.sensor import TimeDelay
 from bench.faults.structure import BaseResonance, JointElasticity
 from bench.machine import Fault, Machine
 from bench.plant import record
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from sample_logs.bench_session import ControllerModel, controllers_model
 from tests.frf.linearised import Truth, linearised
 

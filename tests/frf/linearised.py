@@ -20,7 +20,7 @@ from bench.config import SAMPLE_TIME
 from bench.dynamics import build
 from bench.machine import Fault, Machine
 from bench.plant import plan_with
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 
 __all__ = ["Truth", "linearised"]
 

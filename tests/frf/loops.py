@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import cont2discrete, freqz, lfilter
 
 from pipelines.io import schema
-from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from tests.bench.machines import turntable
 

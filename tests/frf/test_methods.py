@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Array, Signal
+from pipelines.io.log import Array, Signal
 from pipelines.model.frf.findings import frf_findings
 from pipelines.model.frf.modes import fitted_modes
 from pipelines.model.frf.responses import How, Measured, measured_responses

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure as Drawing
 from pipelines import frf
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.frf import Settings
-from pipelines.io.experiment import ExperimentLog, Signal
 from pipelines.io.files import Opened, open_log, write_log
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.model.arm import Arm
 from pipelines.model.frf.result import Posture
 from pipelines.model.parameter import Parameter

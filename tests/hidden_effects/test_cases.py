@@ -20,8 +20,8 @@ from benchmarks.hidden_effects.cases import FAMILIES, Hidden, SealedCase, campai
 from benchmarks.hidden_effects.make import answers_in, make_cases
 from benchmarks.hidden_effects.sessions import machine_of_case, record_case
 from pipelines.errors import UsageError
-from pipelines.io.canonical import digest_of
 from pipelines.io.files import open_log
+from pipelines.io.log import digest_of
 from tests.bench.machines import sway
 from tests.seeds import rarely
 

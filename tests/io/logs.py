@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.io import schema
-from pipelines.io.experiment import Controller, Derived, ExperimentLog, Signal
+from pipelines.io.log import Controller, Derived, ExperimentLog, Signal
 
 ROBOT_TEXT = (Path(__file__).parents[2] / "sample_logs/robots/rrr.toml").read_text(encoding="utf-8")
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.covariance_file import read_covariance, write_covariance
+from pipelines.io.model_file import read_covariance, write_covariance
 
 
 def test_there_and_back(tmp_path: Path) -> None:

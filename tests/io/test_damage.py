@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import EnvironmentFault, InputRejected, RrridError
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import find_logs, open_log, write_log
+from pipelines.io.log import ExperimentLog
 from tests.io.logs import small_log
 
 # Whole campaigns are slow; CI takes a part of each.

@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import RrridError
-from pipelines.io.canonical import digest_of
-from pipelines.io.derive import derive, derived_by, recording
-from pipelines.io.experiment import Derived, ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import Derived, ExperimentLog, derive, derived_by, digest_of, recording
 from tests.healthy import changed
 from tests.io.logs import random_log, small_log
 

@@ -16,9 +16,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Signal
 from pipelines.io.files import open_log, write_log
-from pipelines.io.guard import Answer, guarded
+from pipelines.io.log import Signal
+from pipelines.io.sandbox import Answer, guarded
 from tests.io.logs import small_log
 
 

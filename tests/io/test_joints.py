@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.experiment import Signal
 from pipelines.io.files import open_log, write_log
-from pipelines.io.joints import select_joints, with_robot
+from pipelines.io.log import Signal, select_joints, with_robot
 from pipelines.io.robot import RobotDescription, parse_robot
 from tests.io.logs import ROBOT_TEXT, small_log
 

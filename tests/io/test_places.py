@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.io.places import refuse_foreign, renamed, short_names, slug, tilde, told_apart
+from pipelines.io.output import refuse_foreign, renamed, short_names, slug, tilde, told_apart
 from pipelines.stage import footer_of
 
 

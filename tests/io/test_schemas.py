@@ -13,11 +13,10 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.io.experiment import Array
 from pipelines.io.files import open_log, write_log
-from pipelines.io.log_schema import log_schema
-from pipelines.io.result_schema import result_schema
-from pipelines.io.results import FLAT, NOT_STORED, encode, headed
+from pipelines.io.log import Array
+from pipelines.io.results import FLAT, NOT_STORED, encode, headed, result_schema
+from pipelines.io.schema import log_schema
 from tests.io.logs import random_log, small_log
 
 

@@ -7,9 +7,15 @@ from pathlib import Path
 import pytest
 
 from pipelines.io.files import Opened
-from pipelines.io.inputs import Inputs
-from pipelines.io.mixed import SeveralSessions, check_alike, of_one_session, refuse_mixed
-from pipelines.io.sessions import apart, called
+from pipelines.io.sessions import (
+    Inputs,
+    SeveralSessions,
+    apart,
+    called,
+    check_alike,
+    of_one_session,
+    refuse_mixed,
+)
 from tests.io.logs import ROBOT_TEXT, small_log
 
 DAY, NEXT, LATER = "2026-03-02T09:00:00Z", "2026-03-03T09:00:00Z", "2026-05-18T09:00:00Z"

@@ -9,7 +9,7 @@ import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.robot_files import load_robot, robot_sources
-from pipelines.io.text import read_small_text
+from pipelines.io.sandbox import read_small_text
 
 
 def test_a_text_is_read(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from bench.faults import make
 from bench.plant import record
 from pipelines.errors import InputRejected
 from pipelines.estimation.checks.gates import examined
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.commanded import against_command, commanded
 from pipelines.model.plausibility import mismatches
 from pipelines.quality.subject import Subject

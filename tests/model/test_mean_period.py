@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.mean_period import doubts, mean_period
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.signal.periods import Periods

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.derive import derive
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog, derive
 from pipelines.model.motion import METHODS, Reconstructed, Reconstruction, reconstruct
 from tests.fault_table import FAULTS
 from tests.healthy import (

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
-from pipelines.io.experiment import Array, ExperimentLog, Signal
 from pipelines.io.files import Opened, open_log
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import LinkParameters, format_robot
 from pipelines.io.robot_files import load_robot
 from pipelines.model import plausibility as plausibility_module

@@ -10,7 +10,7 @@ import pytest
 from bench import experiments
 from bench.draw import draw_machine
 from bench.plant import record
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.plausibility import plausibility
 from pipelines.quality.checks import Subject
 from tests.healthy import with_signal

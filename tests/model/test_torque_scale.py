@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import ExperimentLog
 from pipelines.model.evidence import Evidence
 from pipelines.model.plausibility import _against_the_others as against_the_others
 from pipelines.model.plausibility import plausibility

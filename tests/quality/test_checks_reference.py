@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import Check
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.quality.checks import check_log
 from tests.healthy import good_log, with_signal
 

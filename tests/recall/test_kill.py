@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from pipelines import reconstruct, run
-from pipelines.io.files import hash_file, write_log
+from pipelines.io.files import write_log
+from pipelines.io.output import hash_file
 from pipelines.stage import Request, run_stage
 from tests.controlled import controlled_log
 

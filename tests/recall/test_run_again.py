@@ -14,8 +14,8 @@ import pytest
 
 from pipelines import estimate_bps, inspect, reconstruct, run, validate_writing
 from pipelines.errors import EnvironmentFault, UsageError
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import ExperimentLog
 from pipelines.recall import chain
 from pipelines.recall.store import CACHE, Store
 from pipelines.report import render

@@ -9,9 +9,7 @@ from typing import Any
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.results import headed
-from pipelines.io.run_results import read_any_result
-from pipelines.io.stored_result import read_result
+from pipelines.io.results import headed, read_any_result, read_result
 from pipelines.report.compared_results import label_of, of_other_commands
 
 MODEL = {"format": "rrrid-model", "base_parameters": [], "friction": [], "effects": [], "robot": ""}

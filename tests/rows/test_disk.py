@@ -19,7 +19,8 @@ from typing import Any
 import pytest
 
 from pipelines.errors import RrridError
-from pipelines.io.files import hash_file, open_log, write_log
+from pipelines.io.files import open_log, write_log
+from pipelines.io.output import hash_file
 from pipelines.stage import Inputs, Request, Stage, run_stage
 from tests import test_every_stage
 from tests.cli.commands import REPO, RRRID

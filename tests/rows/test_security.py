@@ -18,7 +18,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.io.files import hash_file, write_log
+from pipelines.io.files import write_log
+from pipelines.io.output import hash_file
 from tests.healthy import good_log
 from tests.importers.good import RECIPE
 from tests.io.logs import small_log

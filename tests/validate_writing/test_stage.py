@@ -14,10 +14,8 @@ from matplotlib.figure import Figure as Drawing
 
 from pipelines import validate_writing
 from pipelines.errors import InputRejected, NothingMatched, RrridError, UsageError
-from pipelines.io.canonical import digest_of
-from pipelines.io.derive import recording
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log, write_log
+from pipelines.io.log import ExperimentLog, digest_of, recording
 from pipelines.io.model_file import Source, model_text, read_model, write_model
 from pipelines.io.robot import format_robot
 from pipelines.model.arm import Arm

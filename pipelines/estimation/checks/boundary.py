@@ -34,7 +34,7 @@ from pipelines.estimation.checks.torque_rows import (
     torque_rows,
 )
 from pipelines.estimation.checks.torque_sign import touches_of_zero
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
 from pipelines.io.schema import joint_unit
 from pipelines.model.rigid.chain import standard_parameters

@@ -11,8 +11,7 @@ from dataclasses import replace
 from pipelines.errors import Check, InputRejected, NothingMatched
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
-from pipelines.io.derive import recording
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog, recording
 from pipelines.model.commanded import against_command
 from pipelines.model.plausibility import mismatches
 from pipelines.model.rows.prepare import Logs

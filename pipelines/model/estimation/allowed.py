@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from pipelines.errors import UsageError
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.estimation.conditioning import HIGHEST
 
 __all__ = ["Asked", "refuse_strange", "refuse_unfit"]

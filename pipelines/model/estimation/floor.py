@@ -18,7 +18,7 @@ import numpy as np
 from pipelines.errors import InputRejected
 from pipelines.fit.least_squares import errors
 from pipelines.fit.statistics import gather
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Judged, Motions, equations_of
 from pipelines.model.estimation.regression import LogEquations

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.estimation.floor import averaged
 from pipelines.model.estimation.logs import (

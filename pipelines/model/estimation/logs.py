@@ -10,7 +10,7 @@ import numpy as np
 from pipelines.errors import InputRejected, UsageError
 from pipelines.fit.least_squares import Errors
 from pipelines.fit.statistics import Triangles, gather
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.blocks import Stretches, by_blocks, by_stretches
 from pipelines.model.estimation.conditioning import condition, cutoff_at, wanted_cutoff
 from pipelines.model.estimation.estimate import Estimate, Stacked, estimate

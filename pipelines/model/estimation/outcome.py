@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import Validity
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import cutoff_at

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import UsageError
-from pipelines.io.toml_text import TomlError, parse_toml
+from pipelines.io.sandbox import TomlError, parse_toml
 from pipelines.model.excitation.columns import ArmColumns
 from pipelines.model.rigid.body import Array
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import UsageError
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.excitation.columns import ArmColumns
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.rigid.body import Array

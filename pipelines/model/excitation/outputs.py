@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.model.excitation.others import Plan
 from pipelines.model.excitation.task import Task
 from pipelines.model.excitation.trajectory import Trajectory

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Interrupted, RrridError
-from pipelines.io.experiment import Controller
+from pipelines.io.log import Controller
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.design import FINISH, Design, finished, landscape
 from pipelines.model.excitation.others import Plan

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.frf.controller import Complex
 from pipelines.model.frf.experiment import INPUT, POSITION
 from pipelines.model.frf.responses import Measured

@@ -21,7 +21,7 @@ import numpy as np
 
 from pipelines.fit.bounded import least_squares
 from pipelines.fit.rational import Known
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.frf.modes import Pair
 
 __all__ = ["Explained", "explain", "predicted"]

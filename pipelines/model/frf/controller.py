@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 
 __all__ = ["Complex", "continuous_controller", "loop_delay", "sampled_controller"]
 

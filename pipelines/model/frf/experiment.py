@@ -17,8 +17,8 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array, Controller, ExperimentLog
 from pipelines.io.limits import GAP_LIMIT, LARGEST_JITTER, SHORTEST, percent
+from pipelines.io.log import Array, Controller, ExperimentLog
 from pipelines.quality.segments import Usable, usable
 from pipelines.signal.resample import through
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipelines.fit.rational import Known, Mode, Rational
 from pipelines.fit.rational_search import FEWEST, fit_rational, scattered
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.frf.along import along_turn
 from pipelines.model.frf.controller import Complex, loop_delay
 from pipelines.model.frf.responses import Measured, double_integrator

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.fit.bounded import least_squares
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.frf.controller import Complex
 from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop
 

@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
 from pipelines.model.frf.others_held import Held, others_held

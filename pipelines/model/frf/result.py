@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.fit.rational import Known, Mode
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.frf.findings import Findings, Seen
 from pipelines.model.frf.modes import relative_acceleration
 from pipelines.signal.frequency_response import FrequencyResponse, bands_below

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import Check, RrridError
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.joint import JointFit

@@ -16,7 +16,7 @@ import numpy as np
 
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import with_block_covariance
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
 from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect

@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.rigid.body import Motion

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
 from pipelines.model.effects.fast import from_motion

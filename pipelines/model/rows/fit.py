@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from pipelines.fit.bootstrap import apart
 from pipelines.fit.differences import difference
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect, Values
 from pipelines.model.effects.kinds import FrictionLaw

@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import plainer

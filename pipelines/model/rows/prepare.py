@@ -23,8 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.io.derive import recording
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.model.arm import Arm
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.conditioning import cutoff_at

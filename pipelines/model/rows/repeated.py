@@ -20,7 +20,7 @@ from itertools import chain
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.judgeable import Facts, one_way, predicted_std, unresolved
 from pipelines.model.estimation.nominal import with_offsets

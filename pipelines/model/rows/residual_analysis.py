@@ -20,7 +20,7 @@ from typing import Literal
 
 import numpy as np
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.rows.data import Data, LogData
 from pipelines.model.rows.fit import Refined
 from pipelines.model.simulation.comparison import Simulation

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed

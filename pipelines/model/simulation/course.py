@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.simulation.windows import Windows
 from pipelines.signal.spectra import welch
 

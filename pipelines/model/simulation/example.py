@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 
 from pipelines.io import schema
-from pipelines.io.experiment import Array, Controller, ExperimentLog, Signal
+from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.model_file import read_model
 from pipelines.io.robot import format_robot
 from pipelines.model.arm import Arm

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array, Controller, ExperimentLog
+from pipelines.io.log import Array, Controller, ExperimentLog
 from pipelines.io.model_file import parse_model
 from pipelines.model.arm import Arm
 

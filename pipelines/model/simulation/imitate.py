@@ -15,9 +15,7 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io import schema
-from pipelines.io.canonical import digest_of
-from pipelines.io.derive import created, recording
-from pipelines.io.experiment import Array, Derived, ExperimentLog, Signal
+from pipelines.io.log import Array, Derived, ExperimentLog, Signal, created, digest_of, recording
 from pipelines.io.results import NOT_STORED
 from pipelines.model.arm import Arm
 from pipelines.model.motion import Reconstruction, reconstruct

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.schema import joint_unit
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import condition

@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pipelines.errors import InputRejected, NothingMatched, UsageError
-from pipelines.io.canonical import digest_of
-from pipelines.io.derive import recording
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog, digest_of, recording
 from pipelines.io.model_file import ModelFile
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.in_folder import fitted_in_folder

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pipelines.io import schema
-from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.model.rigid.body import Motion
 

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipelines.errors import Check, RrridError
-from pipelines.io.derive import recording
-from pipelines.io.experiment import ExperimentLog
-from pipelines.io.places import slug
+from pipelines.io.log import ExperimentLog, recording
+from pipelines.io.output import slug
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct

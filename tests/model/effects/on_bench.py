@@ -15,7 +15,7 @@ from bench.experiments import excitation
 from bench.faults import make
 from bench.machine import Fault, Machine
 from bench.plant import Recording, run
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect

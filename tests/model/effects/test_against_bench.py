@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bench.plant import as_log
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.contact import Contact

@@ -17,7 +17,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from bench.config import SAMPLE_TIME
 from bench.plant import Recording, as_log
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.backlash import Backlash

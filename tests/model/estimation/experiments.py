@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipelines.io.experiment import Array, Controller, ExperimentLog
+from pipelines.io.log import Array, Controller, ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.estimation.balance import ALONE, Balance, power_balance
 from pipelines.model.estimation.logs import Recipe, fit_logs, motions_of
 from pipelines.model.estimation.nominal import nominal_columns

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.estimation.balance import Balance, power_balance
 from pipelines.model.estimation.logs import Recipe, fit_logs, motions_of
 from pipelines.model.estimation.nominal import nominal_columns

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.fit.contrasts import Cycle
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.cycle import cycle_of
 from pipelines.model.estimation.logs import Recipe, equations_of
 from pipelines.model.estimation.nominal import nominal_columns

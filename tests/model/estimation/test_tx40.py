@@ -11,8 +11,8 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from pipelines.import_log import STAGE, Settings
-from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.logs import Fitted, Recipe, equations_of, fit_logs, motions_of
 from pipelines.model.estimation.nominal import nominal_columns

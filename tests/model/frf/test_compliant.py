@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import eigh
 
 from pipelines.fit.rational import Known, Mode, Rational
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.frf.compliant import explain, predicted
 from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
 from pipelines.model.frf.modes import Modes, Pair

@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import freqz
 
 from bench.control import Observer, observer_gain
-from pipelines.io.experiment import Controller
+from pipelines.io.log import Controller
 from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
 from pipelines.model.frf.responses import double_integrator
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import ExperimentLog, Signal
+from pipelines.io.log import ExperimentLog, Signal
 from pipelines.model.frf.experiment import POSITION, excitation_period, turned_joint
 from pipelines.model.frf.responses import How, measured_responses
 from tests.frf.loops import Loop, rigid

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.io import schema
-from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import Joint, RobotDescription, format_robot
 
 RATES = (250, 500, 1000, 2000)  # [Hz]

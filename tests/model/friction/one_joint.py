@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 
 from pipelines.io import schema
-from pipelines.io.experiment import Array, ExperimentLog, Signal
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
 from pipelines.io.robot_files import load_robot
 

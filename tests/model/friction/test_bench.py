@@ -15,7 +15,7 @@ from bench.faults import make
 from bench.machine import Machine
 from bench.motions import gravity_of
 from bench.plant import record
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
 from pipelines.model.friction.laws import law_named
 from pipelines.model.motion import Reconstruction, reconstruct

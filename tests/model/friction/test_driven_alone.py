@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.friction.fit import LawFit
 from pipelines.model.friction.laws import OneJoint, law_named
 from pipelines.model.friction.refine import fit_driven_alone

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.friction.findings import misfits
 from pipelines.model.friction.fit import LawEquations, Value
 from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint

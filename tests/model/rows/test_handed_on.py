@@ -7,9 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.io.derive import derive
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import ExperimentLog, derive
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.rows.prepare import Logs, prepare

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import session

@@ -12,7 +12,7 @@ from bench.draw import draw_machine
 from bench.experiments import excitation
 from bench.machine import Machine
 from bench.plant import Recording, as_log, run
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.conditioning import wanted_cutoff
 from pipelines.model.estimation.logs import Motions, Recipe, motions_of
 from pipelines.model.motion import Reconstruction

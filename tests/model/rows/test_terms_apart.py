@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Array
 from pipelines.io.files import open_log
+from pipelines.io.log import Array
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.coulomb import Coulomb

@@ -10,7 +10,7 @@ import pytest
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import pose
 from pipelines.diagnosis.screening import best_of
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging

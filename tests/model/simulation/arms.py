@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 from pipelines.model.arm import Arm
 from pipelines.model.parameter import Parameter
 from pipelines.model.rigid.base import BaseArm

@@ -17,7 +17,7 @@ from bench.experiments import Experiment as Planned
 from bench.machine import Machine
 from bench.motions import Reference
 from bench.plant import record
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.arm import Arm
 from pipelines.model.simulation import Experiment, Noise, simulate
 from sample_logs.bench_session import arm_of, controllers_model

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Noise, Plant, one_loop, run

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.estimation.logs import Recipe

@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.errors import InputRejected
 from pipelines.io import schema
-from pipelines.io.experiment import Controller, ExperimentLog, Signal
+from pipelines.io.log import Controller, ExperimentLog, Signal
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import format_robot
 from pipelines.io.robot_files import load_robot

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import Controller
+from pipelines.io.log import Controller
 from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.simulation import Experiment, Noise, choose_step
 from pipelines.model.simulation.imitate import How, imitate

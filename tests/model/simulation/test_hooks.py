@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
 from pipelines.model.effects.quadratic_drag import QuadraticDrag

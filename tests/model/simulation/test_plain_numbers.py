@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Controller
+from pipelines.io.log import Controller
 from pipelines.model.arm import Acting
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.gravity_tilt import GravityTilt

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array, Controller
+from pipelines.io.log import Array, Controller
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.simulation import (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.model.rigid.body import Motion
 from pipelines.model.simulation import Plant, Windows, simulate_windows
 from tests.model.simulation.arms import KD, KP, TS, rrr, rrr_friction, waving

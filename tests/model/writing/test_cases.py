@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import open_log
+from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
