@@ -14,7 +14,7 @@ class SandboxConfig:
 
     seconds: float = 10.0  # [s] a healthy file of 20 MB takes a tenth of it
     bytes_a_second: float = 5e6  # [B/s] that a larger file gets in addition
-    memory: int = 1 << 30  # [B] beside what the samples need
+    memory: int = 1 << 30  # [B] in addition to the samples
     memory_a_byte: int = 1200  # [B] for each byte of the file: above the largest honest packing
     most_memory: int = 32 << 30  # [B]
     description: int = 16 << 20  # [B] of JSON beside the samples; a log's own has kilobytes
@@ -36,7 +36,7 @@ class TextConfig:
 
 @dataclass(frozen=True)
 class FormatConfig:
-    """What a file may hold before it is called a log."""
+    """Bounds of a file that is read as a log."""
 
     chunk: int = 65536  # samples of a chunk: log-format.md
     members: int = 64  # of a group, or attributes: a log has fewer than twenty
@@ -45,13 +45,13 @@ class FormatConfig:
     # gzip packs at most to 1/1032, and `t` never repeats: no honest log comes near this
     packing: int = 1100  # times the file
     always: int = 64 << 20  # [B] that any file may declare
-    # only a log in which nothing moves is packed to 1/300, and nobody records 256 MB of that
+    # only a log in which nothing moves is packed to 1/300, and no recording has 256 MB of that
     long_packing: int = 300  # times the file
     long: int = 256 << 20  # [B]
     integer: int = 2**53  # above it a float is not exact
     result: int = 256 << 20  # [B] of a result.json; a run has less than one
     model: int = 64 << 20  # [B] of a model.json
-    inline: int = 64  # numbers of an array that stand in result.json; longer ones are series
+    inline: int = 64  # numbers of an array in result.json; longer arrays are series
     digits: int = 300  # of an integer in a result: a longer one overflows a float
 
 
@@ -63,7 +63,7 @@ class UrdfConfig:
     depth: int = 100  # nested elements
     elements: int = 100_000
     links: int = 1000  # a humanoid with hands has a tenth of it
-    number: float = 1e9  # squares and products of it stay finite; a limit of that size is none
+    number: float = 1e9  # squares and products of it stay finite; a larger limit means no limit
     no_limit: float = 1e16  # what URDFs write for no limit
     short: float = 1e-9  # length of an axis without direction
     longest: float = 100.0  # [m] no arm has such a link
@@ -72,7 +72,7 @@ class UrdfConfig:
 
 @dataclass(frozen=True)
 class SessionsConfig:
-    """What belongs together, and how much of it is named."""
+    """Bounds of a session, and of its list in a message."""
 
     pause: timedelta = timedelta(hours=3)  # at most, in a session that goes on after midnight
     longest: timedelta = timedelta(hours=12)  # of such a session

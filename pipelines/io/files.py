@@ -85,7 +85,7 @@ class Opened:
     sha256: str
     log: ExperimentLog
     checks: tuple[Check, ...]
-    container: str = "hdf5"  # or "parquet": what the content is, whatever the file is called
+    container: str = "hdf5"  # or "parquet": by the content, not by the name
 
 
 def write_log(path: Path | str, log: ExperimentLog) -> None:

@@ -81,10 +81,9 @@ def late(ticks: Array, rms: float) -> npt.NDArray[np.intp]:
 
 
 def percent(share: float, digits: int = 3) -> str:
-    """ "1.5 %"; what rounding leaves of nothing is "below 0.001 %", for its digits say nothing."""
-    whole = (
-        abs(100.0 * share) >= 10.0**digits - 0.5
-    )  # more digits before the point than are asked for: "100", not "1e+02"
+    """Return "1.5 %"; a share without digits that count is "below 0.001 %"."""
+    # as many digits before the point as are asked for: "100", not "1e+02"
+    whole = abs(100.0 * share) >= 10.0**digits - 0.5
     return (
         "below 0.001 %"
         if abs(share) < LIMITS.shown

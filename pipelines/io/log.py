@@ -91,7 +91,7 @@ class Signal(_Bitwise):
 
 @dataclass(frozen=True, eq=False)
 class Controller(_Bitwise):
-    """What followed the reference. `None` means: the log does not say, and it is not guessed."""
+    """The controller of a log. `None`: the log does not say, and it is not guessed."""
 
     law: str
     kp: Array | None = None  # (n,) [N m/rad]; "computed-torque": [1/s^2]
@@ -149,7 +149,7 @@ class ExperimentLog(_Bitwise):
     source: str = field(default="", compare=False)  # the file it was read from; no part of the log
 
     def __post_init__(self) -> None:
-        # one order, whatever they were given in: equal logs make equal files
+        # one order: equal logs make equal files
         order = {name: place for place, name in enumerate((*schema.SIGNALS, *schema.DERIVED))}
         names = sorted(self.signals, key=lambda name: (order.get(name, len(order)), name))
         signals = {name: self.signals[name] for name in names}
@@ -357,7 +357,7 @@ def _record(log: ExperimentLog) -> dict[str, Any]:
 
 
 def columns_in(log: ExperimentLog) -> int:
-    """Return how many joints the samples have, whatever the description says; 0 for none."""
+    """Return how many joints the samples have, not the description; 0 for none."""
     samples = log.t.size if "t" in log else -1
     shapes = [s.values.shape for k, s in log.signals.items() if s.values.ndim > 1 and k != "t"]
     wide = [shape for shape in shapes if 1 not in shape] or shapes

@@ -243,7 +243,7 @@ def keep_apart(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> N
     """Refuse an `out` that holds one of the `sources`, or lies inside an input folder (C05)."""
     target = out.resolve()
     for source in sources:
-        # a link in `out` would be deleted as well, wherever it leads
+        # a link in `out` would be deleted as well
         linked = Path(os.path.abspath(source)).is_relative_to(os.path.abspath(out))
         if linked or source.resolve().is_relative_to(target):
             words = f"holds the input {source}, and would be replaced with it"
@@ -276,7 +276,7 @@ def refuse_foreign(
 
     Args:
         force: replace rrrid's output of any command, and with files added or changed since.
-        remade: own files, by their names in `out`, that nobody edits: they are made again (P10).
+        remade: own files, by their names in `out`, that are made again where changed (P10).
         command: refuse the output of another command than this one; "" for none.
 
     Returns:

@@ -6,7 +6,7 @@ result = decode(Result, json.loads(text), series)
 A result is a frozen dataclass of plain values, tuples, further dataclasses and arrays. Short arrays
 are part of the JSON; longer ones become series, and the JSON says which. Infinite and undefined
 numbers become null. Fields marked `metadata=NOT_STORED` are left out and come back as None. The
-fields of one marked `metadata=FLAT` are beside the others; what is None adds nothing.
+fields of one marked `metadata=FLAT` are among the others; None adds no fields.
 """
 
 from __future__ import annotations
@@ -110,7 +110,7 @@ def json_text(value: Any) -> str:
 
 
 def headed(command: str, found: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the object of a result.json: command and schema version before what was found."""
+    """Return the object of a result.json: command and schema version before the result."""
     return {"command": command, "schema_version": SCHEMA_VERSION, **found}
 
 

@@ -55,7 +55,7 @@ _ENDINGS = {"robots": ".toml", "recipes": ".toml", "models": ".json"}
 
 @dataclass(frozen=True)
 class LinkParameters:
-    """What is known of one link, in its own frame (DH: the distal one; MDH, URDF: the joint's).
+    """Known parameters of one link, in its own frame (DH: the distal one; MDH, URDF: the joint's).
 
     `inertia` holds Ixx Iyy Izz Ixy Ixz Iyz about the frame's *origin*, products with positive
     sign, Ixy = +∫xy dm: the convention of Kostić et al. 2004, eq. (7).
@@ -199,7 +199,7 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
 
 
 class _Wrong(Exception):
-    """What pydantic does not see."""
+    """A fault that pydantic does not find."""
 
     def __init__(self, words: str, remedy: str = _CORRECT) -> None:
         super().__init__(words)

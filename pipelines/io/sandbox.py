@@ -57,7 +57,7 @@ _STRING_OR_COMMENT = re.compile(
 
 @dataclass(frozen=True)
 class Answer:
-    """What a child found: a JSON object and named arrays."""
+    """The answer of a child: a JSON object and named arrays."""
 
     about: dict[str, Any]
     arrays: Mapping[str, Array]

@@ -1,6 +1,6 @@
 """Describe the experiment log as data: its attributes, signals, units and shapes (log-format.md).
 
-The dataclasses below hold what a file says of itself, as JSON has it. Their descriptions are the
+The dataclasses below hold the attributes of a file, as JSON has them. Their descriptions are the
 JSON Schema and the words of the errors; pydantic reads them when the first log is opened.
 """
 

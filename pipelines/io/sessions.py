@@ -3,7 +3,7 @@
 inputs = read_logs(request, settings)     every log among the request's paths
 inputs = of_one_session(inputs)           SeveralSessions, with the list, where there are more
 
-Sessions are told apart by what the logs say of themselves and never by where they lie.
+Sessions differ in attributes of their logs (robot, description, day), never in their folders.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def _silent(words: str) -> None:
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asked of any stage: inputs, and the options that every command takes."""
+    """The request of the user to any stage: inputs, and options that every command takes."""
 
     paths: tuple[Path, ...]
     out: Path | None = None
@@ -61,7 +61,7 @@ class Request:
     format: str = "h5"  # of derived logs
     tell: Callable[[str], None] = field(default=_silent, compare=False)  # progress, in words
     joints: tuple[int, ...] = ()  # 1-based: the joints of every log, in this order; none: all
-    # role -> paths of logs that have it, whatever they say
+    # role -> paths of logs that have it, instead of their attribute
     roles: Mapping[str, Sequence[str]] = field(default_factory=dict)
     session: str = ""  # the name of the only one to take, of several robots and days
 
@@ -128,8 +128,8 @@ def _by_role(roles: Mapping[str, Sequence[str]]) -> dict[str, tuple[Path, ...]]:
 def read_logs(request: Request, settings: object, *, keep_rejected: bool = False) -> Inputs:
     """Open every log among the request's paths, and give it the role it was named for.
 
-    A log that is named for a role has it, whatever it says of itself; of the others, those that
-    say they have this role are left out.
+    A role that the user names goes before the attribute `role` of the log; other logs with that
+    role are left out.
 
     Raises:
         InputRejected: some of them are rejected, unless `keep_rejected`. The error is the first
@@ -232,8 +232,8 @@ def _all_of(rejected: list[Rejected]) -> RrridError:
 def _label(first: Path) -> str:
     """Return what the default --out calls the inputs: the name of the first one's folder.
 
-    Of rrrid's own output in runs/ROBOT/LABEL/COMMAND, or of its `logs`, it is LABEL: what is made
-    of an import lies beside it, and two imports of one robot are not confused.
+    Of rrrid's own output in runs/ROBOT/LABEL/COMMAND, or of its `logs`, it is LABEL: results
+    of an import go into the same folder, and two imports of one robot are not confused.
     """
     folder = first if first.is_dir() else first.parent
     if folder.name == "logs" and written_by(folder.parent):
