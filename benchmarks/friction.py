@@ -5,12 +5,12 @@
 
 Both take position and torque of one joint, 20 s at 1 kHz, friction of three sigmoids, and give
 inertia, gravity and friction (ten numbers). Theirs is the paper's filter: filterpy's
-ExtendedKalmanFilter over q, dq and the ten, one pass, started 15 % off the truth and told the true
+ExtendedKalmanFilter over q, dq and the ten, one pass, started 15 % off the truth and given the true
 noise of torque and encoder; its model and derivatives are plain scalar arithmetic, faster than
-arrays of one. Ours is one call, `fit_driven_alone`, and is told neither, nor a start: only the step
-of the encoder. It tunes a smoother, fits roughly, refines the motion about that once (by default)
-or twice, fits again and gives the covariance. Errors are of the friction curve over the driven
-speeds, rms over its rms, medians over the seeds.
+arrays of one. Ours is one call, `fit_driven_alone`, and is given neither, nor a start: only the
+step of the encoder. It tunes a smoother, fits roughly, refines the motion about that once (by
+default) or twice, fits again and gives the covariance. Errors are of the friction curve over the
+driven speeds, rms over its rms, medians over the seeds.
 """
 
 from __future__ import annotations

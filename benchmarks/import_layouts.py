@@ -51,7 +51,7 @@ SETS += ("stranger_7", "stranger_8", "stranger_9")
 
 @dataclass(frozen=True)
 class Signal:
-    """What a signal may be made of: columns in the robot's order of joints, and spellings of
+    """The source of a signal: columns in the robot's order of joints, and spellings of
     their unit."""
 
     columns: tuple[str, ...]
@@ -221,7 +221,7 @@ def vector(numbers: np.ndarray) -> str:
     return ", ".join(f"{x:.6f}" for x in numbers)
 
 
-def recorded(  # noqa: PLR0913 (what 146 layouts say of a text file)
+def recorded(  # noqa: PLR0913 (146 layouts call it)
     folder: Path,
     run: Run,
     file: str,

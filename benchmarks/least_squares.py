@@ -112,7 +112,7 @@ class Task:
 
 @dataclass(frozen=True)
 class _Robot:
-    """What FIGAROH needs of a robot wrapper."""
+    """The part of a robot wrapper that FIGAROH needs."""
 
     model: Any
     data: Any

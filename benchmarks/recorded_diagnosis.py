@@ -140,7 +140,7 @@ def judged_tx40(
 
 
 def judged_odrive(data: Path, settings: Recipe = _ODRIVE) -> tuple[Look, list[Judged]]:
-    """Search on two runs, judged on the others, none of which it saw."""
+    """Search on two runs, judged on the others, which it did not see."""
     logs = imported("odrive", data)
     begin = time.process_time()
     prepared = prepare(Logs((logs["nocomp_0"], logs["nocomp_1"])), settings)

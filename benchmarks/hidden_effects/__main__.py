@@ -7,9 +7,9 @@
 
 `all` does one after the other, with causes taken out too.
 
-Whatever is there already is not done again, so each of them can be interrupted, and parts can run
-beside each other. All of it is some 650 cases of 52 s: more than two hours to make on one core, and
-as long as the diagnosis takes to judge.
+Cases and answers that exist are not made again, so each of them can be interrupted, and parts can
+run beside each other. All of it is some 650 cases of 52 s: more than two hours to make on one core,
+and as long as the diagnosis takes to judge.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What is hidden in each case of the campaign, before anything is recorded: plain data, the same
+"""The campaign: what each case hides, before anything is recorded: plain data, the same
 for the same seed.
 
     campaign(seed)                every family, shuffled, so that any part is a fair sample

@@ -1,5 +1,5 @@
-"""Let a diagnosis judge cases, one after the other; every answer is kept as one line, and none is
-asked for twice.
+"""Let a diagnosis judge cases, one after the other; every answer is kept as a line, and no case is
+judged twice.
 
     verdicts.jsonl      {"key", "without", "seconds", "cpu", "answer" | "refused" | "crashed"}
 

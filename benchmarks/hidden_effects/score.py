@@ -1,6 +1,6 @@
 """Judge one answer against the sealed one, strictly: a finding is true where cause and joint are.
 
-`right` asks of each family what the issue's table asks; everything else is counted beside it.
+`right` asks of each family what the issue's table asks; everything else is counted apart from it.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Score:
     named: tuple[str, ...]  # causes of all findings
     right: bool
     true: int = 0  # findings that are a true cause
-    wrong: int = 0  # findings that are none
+    wrong: int = 0  # findings that are no true cause
     joint: bool | None = None  # of the first finding, where one joint is to be named
     parameters: tuple[tuple[str, bool], ...] = ()  # "cogging order", whether it agrees
     angles: tuple[tuple[str, bool], ...] = ()

@@ -1,4 +1,4 @@
-"""What is recorded of a case: 52 s of logs at 1 kHz, in a mixture of experiments, with what else
+"""Record a case: 52 s of logs at 1 kHz, in a mixture of experiments, with what else
 the case has.
 
 session = record_case(case)        its logs, of role "identify", "validate" and "reference", and
@@ -52,7 +52,7 @@ Plans = list[Experiment]
 
 @dataclass(frozen=True)
 class Session:
-    """What was recorded, and the truth about it."""
+    """The logs of a case, and the truth about them."""
 
     logs: tuple[ExperimentLog, ...]
     hidden: tuple[Fault, ...]

@@ -1,4 +1,4 @@
-"""What a diagnosis said, taken out of the object that `rrrid diagnose --json` prints
+"""The answer of a diagnosis, read from the object that `rrrid diagnose --json` prints
 (cli-contract.md).
 """
 
@@ -18,7 +18,7 @@ class Found:
 
     cause: str
     joint: int | None
-    parameters: Mapping[str, tuple[Any, float]]  # name -> value, std (0 where nobody knows it)
+    parameters: Mapping[str, tuple[Any, float]]  # name -> value, std (0 where it is unknown)
     torque_after: tuple[
         float, ...
     ]  # [N m] held-out rms of each joint, with this cause and those before it

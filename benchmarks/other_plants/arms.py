@@ -1,7 +1,7 @@
 """Arms of one to six axes as plain numbers, as a robot description and as a MuJoCo model.
 
 arm = ARMS["gantry"].varied(rng)
-arm.described(resolution, geared=True)      what a log says of it
+arm.described(resolution, geared=True)      its description in a log
 arm.model(step)                             what moves, compiled by MuJoCo
 """
 

@@ -36,7 +36,7 @@ _LONG = {
 _COUPLED = {"planar": (1, 2), "upright": (2, 3), "scara": (1, 2), "six": (2, 3), "wrist": (1, 2, 3)}
 # Of two joints only the ratio of their scales shows: one too weak is the other too strong.
 _SCALED = {name: joints for name, joints in _COUPLED.items() if name != "planar"}
-# A constant force on a slide that gravity pulls along is its weight, which nobody knows.
+# A constant force on a slide that gravity pulls along is its weight, which is unknown.
 _FREE = {
     "pendulum": (1,),
     "table": (1, 2),

@@ -23,7 +23,7 @@ from pipelines.io.log import Array
 _HEATING, _HOPS = 5.0, 0.7  # [s] time constant of a gear that warms, mean time between two hops
 _DRIFTING = 6.0  # [s] time constant of viscous friction that drifts
 _TOUCH = (3.0, 3.25)  # [s] from and to when something is touched
-_PHASE = 0.7  # [rad] of whatever goes with an angle
+_PHASE = 0.7  # [rad] of a fault that goes with an angle
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What holds for every fault in the folder, whoever wrote it."""
+"""Every fault of the registry changes nothing at no strength, is frozen, and has its parameters."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def test_elastic_joint_rings_at_its_free_resonance() -> None:
 
 def test_a_soft_base_rings_at_its_own_pole() -> None:
     """After a kick the table turns against its base, which rings as e^(-ζωt) sin(ω√(1-ζ²) t),
-    whatever the table's inertia.
+    with any inertia of the table.
     """
     w, zeta, inertia, kick = 2 * math.pi * 28.0, 0.08, 8.0, 10.0 * 1e-3
     torque = np.zeros((300, 1))

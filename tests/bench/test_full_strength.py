@@ -128,7 +128,7 @@ def gantry() -> Machine:
 
 @pytest.fixture(scope="module")
 def sound() -> tuple[Machine, Reference, Recording]:
-    """The gantry in order, and what it was to follow."""
+    """Return the healthy gantry, its reference, and its run."""
     machine = gantry()
     reference = sweeps(machine, np.random.default_rng(1), 0.2)
     return machine, reference, run(machine, Decentralised(), reference)

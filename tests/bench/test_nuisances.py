@@ -1,4 +1,4 @@
-"""The imperfections of a machine in order are small beside its own noise, at every joint."""
+"""The imperfections of a healthy machine are small against its own noise, at every joint."""
 
 from __future__ import annotations
 

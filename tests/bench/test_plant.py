@@ -35,7 +35,7 @@ def test_the_inner_step_is_fine_enough(around: str) -> None:
 
 
 def test_a_run_repeats_itself() -> None:
-    """Same machine, faults and seed: the same samples, bit for bit, whatever ran in between;
+    """Same machine, faults and seed: the same samples, bit for bit, with any other run in between;
     another seed: other noise.
     """
     machine = draw_machine(3, "fault")

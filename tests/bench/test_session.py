@@ -52,7 +52,7 @@ def logs(machine: Machine, plans: list[Experiment]) -> list[ExperimentLog]:
 
 @pytest.fixture(scope="module")
 def of_a_moment(machine: Machine) -> tuple[Experiment, ExperimentLog]:
-    """A short experiment and its healthy log."""
+    """Record a short experiment on the healthy machine."""
     moment = experiments.free(machine, 1, duration=0.1)
     return moment, record(machine, [], [moment], seed=3)[0]
 
