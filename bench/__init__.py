@@ -1,3 +1,1 @@
-"""The virtual test bench: a MuJoCo plant with hidden faults, which shares only log/ and errors with
-the rest.
-"""
+"""The virtual test bench: a MuJoCo plant with faults that shares only pipelines.io."""

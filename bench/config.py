@@ -1,6 +1,4 @@
-"""The numbers that the bench chooses, each with its meaning; those of one fault are in that fault's
-class.
-"""
+"""The numbers that the bench chooses, with their meaning; those of a fault are in its class."""
 
 from __future__ import annotations
 

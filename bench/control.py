@@ -31,8 +31,7 @@ Gains = tuple[float, ...]
 
 
 def observer_gain(sample_time: float, noise: float, jerk: float) -> tuple[float, float, float]:
-    """Return k of eq. (20), stationary: the Riccati equation iterated from rest until it no longer
-    changes.
+    """Return k of eq. (20), stationary: the Riccati equation iterated until it no longer changes.
 
         E, γ of (19b);  P⁻ = E P⁺ Eᵀ + σ_ξ² γ γᵀ;  k = P⁻ c/(cᵀ P⁻ c + R);  P⁺ = (1 - k cᵀ) P⁻
 
@@ -70,9 +69,7 @@ class Observer:
         self._first = True
 
     def update(self, y: Floats) -> None:
-        """Update x̂ = E x̄, x̄ = x̂ + k (y - ê) with `y` (n,), measured minus reference position
-        [rad].
-        """
+        """Update x̂ = E x̄, x̄ = x̂ + k (y - ê) with `y` (n,) [rad], measured minus reference."""
         t, half = (0.0, 0.0) if self._first else (self._t, self._half)
         self._first = False
         for j, (k1, k2, k3) in enumerate(self._gains):
@@ -93,9 +90,7 @@ class ControllerModel(Protocol):
         """The text of its model.json, for the log; None: the log does not say."""
 
     def parts(self, q: Floats, dq: Floats, ddq: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """Return friction, inertia D ddq, Coriolis and gravity of one sample [N m], each a list of
-        n.
-        """
+        """Return friction, inertia D ddq, Coriolis and gravity of one sample [N m], lists of n."""
 
 
 Step = Callable[[int, Floats, Observer], Floats]
@@ -111,9 +106,7 @@ class Law(Protocol):
         """Return the controller's entry in the log."""
 
     def start(self, machine: Machine, reference: Reference) -> tuple[Step, dict[str, Array]]:
-        """Begin a run: return the law at work, and the further signals (samples, n) that it
-        fills.
-        """
+        """Begin a run: return the law at work, and further signals (samples, n) that it fills."""
 
 
 def _feedback(kp: Gains, kd: Gains, velocity: str, reference: Reference) -> Step:
@@ -159,9 +152,7 @@ def _describe(
 
 
 def _softer(machine: Machine, stiffness: float) -> tuple[Gains, Gains]:
-    """Return the machine's gains, softer by s in stiffness and by √s in damping: the damping ratio
-    stays.
-    """
+    """Return gains softer by s in stiffness and by √s in damping: the damping ratio stays."""
     kp, kd = machine.kp, machine.kd
     return tuple(stiffness * k for k in kp), tuple(stiffness**0.5 * k for k in kd)
 
@@ -182,8 +173,7 @@ class Decentralised:
 
 @dataclass(frozen=True, eq=False)
 class OpenLoop:
-    """Given torque on the open joints, the others held by PD. In the log the gains of an open joint
-    are zero.
+    """Given torque on the open joints, whose logged gains are zero; the others held by PD.
 
     `gravity` (n, 2) adds c sin q + c' cos q on the open joints, from the position as read: Section
     IV.B closes that loop around a joint that gravity pulls at. A log has no words for it, so that

@@ -23,8 +23,7 @@ from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 
 
 def paper_machine() -> Machine:
-    """Return the machine of Kostić et al. 2004: Table II, the limits of Section IV.C.3, friction of
-    three sigmoids.
+    """Return the machine of Kostić et al. 2004: Table II, Section IV.C.3, three sigmoids.
 
     Its links are synthetic: they have the base parameters p1, p2, p3, p5, p6, p7, p8 that Table V
     prints.
@@ -104,8 +103,7 @@ def with_links(robot: RobotDescription, links: list[LinkParameters]) -> RobotDes
 
 
 def machine_of(robot: RobotDescription, seed: int = 0, nuisances: bool = True) -> Machine:
-    """Return a machine of any serial arm. Links that its description lacks, or that cannot exist,
-    are drawn.
+    """Return a machine of any serial arm; links that are missing or cannot exist are drawn.
 
     Gains and friction follow from the inertia: each loop gets a natural frequency of 35 rad/s and
     half of critical damping, as the paper's machine has; friction is 8 % of the torque limit, which
@@ -136,9 +134,7 @@ def machine_of(robot: RobotDescription, seed: int = 0, nuisances: bool = True) -
 
 
 def _link_of(joint: Joint, rng: np.random.Generator, lightness: float) -> LinkParameters:
-    """Draw a link within 10 % of the described one, or a body of eight random point masses [kg]
-    times `lightness`.
-    """
+    """Draw a link within 10 % of the described one, or eight point masses times `lightness`."""
     if joint.link and Solid.of_link(joint.link).exists:
         return Solid.of_link(joint.link).drawn(rng, 0.10).as_link()
     mass = rng.uniform(0.5, 1.0, 8) * lightness
@@ -156,8 +152,9 @@ def _with_nuisances(machine: Machine, rng: np.random.Generator) -> Machine:
 
 
 def _nuisances_at(machine: Machine, joint: int, rng: np.random.Generator) -> tuple[Fault, ...]:
-    """Draw what a healthy joint (1-based) has: 1 mN m of cogging, 0.1 % of gain ripple, half the
-    noise again, coloured.
+    """Draw the imperfections of a healthy joint (1-based).
+
+    1 mN m of cogging, 0.1 % of gain ripple, and coloured noise of half the amplifier's.
 
     Cogging grows with the machine up to a share of the amplifier's noise: at a wrist of a twentieth
     of the largest torque it would be no small imperfection. Along a slide orders are those of a

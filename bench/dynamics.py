@@ -16,9 +16,7 @@ from pipelines.io.robot import RobotDescription
 
 @dataclass(frozen=True, eq=False)
 class Built:
-    """A compiled model and its degrees of freedom. Every joint has one, so position and speed share
-    an index.
-    """
+    """A compiled model. Each joint has one degree of freedom: q and v share an index."""
 
     model: Any  # mujoco.MjModel
     dofs: dict[str, int]  # "joint 1", "twist 1", "base 1", and the names of mobilities
@@ -96,9 +94,7 @@ def _link(parent: Any, number: int, joint: PlannedJoint) -> Any:
 
 
 def _body(parent: Any, rotation: Array, position: Array, solid: Solid) -> Any:
-    """Add a body, its inertia along principal axes found here: MuJoCo's own eigenvectors are less
-    exact.
-    """
+    """Add a body, its principal axes found here: MuJoCo's own eigenvectors are less exact."""
     moments, axes = np.linalg.eigh(solid.inertia)
     if np.linalg.det(axes) < 0:
         axes[:, 0] = -axes[:, 0]
@@ -137,9 +133,7 @@ def _add_joint(
 
 
 class RigidDynamics:
-    """D(q) ddq + c(q, dq) + h(q) of a robot whose links are described; not for two threads at
-    once.
-    """
+    """D(q) ddq + c(q, dq) + h(q) of a robot with described links; not for two threads at once."""
 
     def __init__(self, robot: RobotDescription) -> None:
         built = build(plan_of(robot), 1e-3)
@@ -191,9 +185,7 @@ class RigidDynamics:
 
 
 def _postures(robot: RobotDescription) -> Array:
-    """Return 60 postures (60, n) all over the joints' ranges, the same for every robot of the same
-    ranges.
-    """
+    """Return 60 postures (60, n) all over the joints' ranges, the same for the same ranges."""
     rng = np.random.default_rng(7)
     low, high = np.array([joint.position for joint in robot.joints]).T
     reach = np.array([np.pi if joint.revolute else 0.3 for joint in robot.joints])
@@ -202,9 +194,7 @@ def _postures(robot: RobotDescription) -> Array:
 
 
 def typical_inertia(robot: RobotDescription) -> tuple[float, ...]:
-    """Return the mean over postures of the diagonal of D [kg m^2]: what a motor feels when the
-    others are held.
-    """
+    """Return the mean over postures of the diagonal of D [kg m^2], other joints held."""
     rigid = RigidDynamics(robot)
     return tuple(
         np.mean([np.diag(rigid.mass_matrix(q)) for q in _postures(robot)], axis=0).tolist()
@@ -212,9 +202,7 @@ def typical_inertia(robot: RobotDescription) -> tuple[float, ...]:
 
 
 def typical_torque(robot: RobotDescription, acceleration: float) -> tuple[float, ...]:
-    """Return the largest over postures of gravity plus each joint's own inertia at `acceleration`
-    [rad/s^2], [N m].
-    """
+    """Return the largest over postures of gravity plus own inertia at `acceleration` [N m]."""
     rigid = RigidDynamics(robot)
     needed = [
         np.abs(rigid.gravity(q)) + np.diag(rigid.mass_matrix(q)) * acceleration
@@ -224,9 +212,7 @@ def typical_torque(robot: RobotDescription, acceleration: float) -> tuple[float,
 
 
 def motor_share(robot: RobotDescription, index: int) -> float:
-    """Return the inertia [kg m^2] (a slide: kg) of joint `index` that moves with its motor, as the
-    link can spare.
-    """
+    """Return the inertia [kg m^2] (a slide: kg) of joint `index` that moves with its motor."""
     joint = plan_of(robot).joints[index]
     if not joint.revolute:
         return CONFIG.motor_share * joint.solid.mass

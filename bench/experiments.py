@@ -1,5 +1,4 @@
-"""The experiments of a session: what moves, under which law, and what the log calls it. No name
-tells a fault.
+"""The experiments of a session: what moves and under which law. No name tells a fault.
 
 friction(machine, joint, seed)      open loop, both ways, speeds over two decades
 hold(posture)                       at rest
@@ -122,9 +121,7 @@ def reversal(machine: Machine, joint: int, duration: float = 8.0) -> Experiment:
 def writing(
     reference: Reference, model: ControllerModel, stiffness: float = 0.3
 ) -> tuple[Experiment, ...]:
-    """Follow a task in the six control cases, held out; gains are weak, so that feed-forward
-    shows.
-    """
+    """Follow a task in the six control cases, held out, at weak gains that show feed-forward."""
     laws: list[Law] = [Decentralised(stiffness=stiffness)]
     laws += [FeedForward(model, parts, stiffness=stiffness) for parts in WRITING_CASES[1:]]
     return tuple(
@@ -134,9 +131,7 @@ def writing(
 
 
 def frf_postures(machine: Machine) -> tuple[Array, ...]:
-    """Return postures (n,) to excite a joint in: the last joint bent by a right angle, stretched
-    out, one between.
-    """
+    """Return postures (n,) for a response: last joint bent, stretched out, and one between."""
     low, high = np.array([joint.position for joint in machine.robot.joints]).T
     bent = np.zeros(machine.n)
     bent[-1] = 0.5 * np.pi if machine.robot.joints[-1].revolute else 0.1
@@ -153,8 +148,7 @@ def frf(
     seed: int = 0,
     duration: float = 20.0,
 ) -> Experiment:
-    """Turn one joint (1-based) slowly there and back under computed torque and a multisine v:
-    Section IV.D.
+    """Turn one joint (1-based) under computed torque and a multisine v: Section IV.D.
 
     v takes a tenth of the joint's torque (rms), and less where gravity leaves little. The loops
     have a natural frequency of 3.2 Hz and a damping ratio of 0.7.

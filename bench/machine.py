@@ -61,9 +61,7 @@ Parameters = dict[str, float | tuple[float, ...]]
 
 @dataclass(frozen=True)
 class Friction:
-    """Torque that opposes the speed, τ = Σ_k f_k tanh(w_k v) + b v: Kostić et al. 2004, eq.
-    (10).
-    """
+    """A torque against the speed, Σ_k f_k tanh(w_k v) + b v: Kostić et al. 2004, eq. (10)."""
 
     heights: tuple[float, ...]  # [N m] f_k
     sharpnesses: tuple[float, ...]  # [s/rad] w_k, that of the highest term first
@@ -80,9 +78,7 @@ class Friction:
         return self.sharpnesses[0]
 
     def law(self) -> Callable[[float], float]:
-        """Return the torque [N m] as a function of speed [rad/s], which every stage of RK4
-        calls.
-        """
+        """Return the torque [N m] as a function of speed [rad/s], for every stage of RK4."""
         (f0, w0), *others = zip(self.heights, self.sharpnesses, strict=True)
         viscous = self.viscous
 
@@ -161,9 +157,7 @@ def listed(strength: float, *values: float) -> float:
 
 @dataclass(frozen=True)
 class Case:
-    """Where a fault is put: a machine, a joint, a source of phases, and the healthy machine's
-    torque.
-    """
+    """The place of a fault: machine, joint, a source of phases, and the healthy torque."""
 
     machine: Machine
     joint: int | None  # 1-based
@@ -188,9 +182,7 @@ class Case:
 
     @property
     def angle(self) -> float:
-        """Size of a radian of causes.md: 0.1 m along a slide, which moves by tenths of a
-        metre.
-        """
+        """Size of a radian of causes.md: 0.1 m along a slide, which moves by tenths of a metre."""
         return 1.0 if self.revolute else 0.1
 
     @property
@@ -232,9 +224,7 @@ class Case:
         return float(self.rng.choice([-1.0, 1.0]))
 
     def order(self, first: int, end: int) -> float:
-        """Draw a whole number of periods a turn; on a slide periods are tens of times shorter than
-        a metre.
-        """
+        """Draw a whole number of periods a turn, ten times as many a metre along a slide."""
         return float(self.rng.integers(first, end)) * (1.0 if self.revolute else 10.0)
 
 

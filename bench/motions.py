@@ -32,9 +32,7 @@ class Reference:
 
     @classmethod
     def of_log(cls, log: ExperimentLog) -> Reference:
-        """Return the reference that a log carries, planned logs among them; KeyError where it has
-        none.
-        """
+        """Return the reference of a log, also of a planned one; KeyError where it has none."""
         return cls(log.t - log.t[0], log["q_ref"], log["dq_ref"], log["ddq_ref"])
 
     @property
@@ -76,8 +74,7 @@ def home(machine: Machine) -> Array:
 def within_torque(
     machine: Machine, reference: Reference, centre: Array, part: float = 0.7
 ) -> Reference:
-    """Shrink the motion towards the posture `centre` (n,) until it needs at most `part` of every
-    torque limit.
+    """Shrink a motion towards the posture `centre` (n,) until it needs `part` of each torque limit.
 
     Joints that need too much shrink by a tenth at a time, the others, which load them, by a
     hundredth.
@@ -127,9 +124,7 @@ def fourier(
 
 
 def _room(machine: Machine, q: Array, dq: Array, ddq: Array) -> Array:
-    """Return by how much (n,) a motion may grow until it meets a limit of position, speed or
-    acceleration.
-    """
+    """Return by how much (n,) a motion may grow within position, speed and acceleration."""
     joints = machine.robot.joints
     widest = [2.0 * math.pi if joint.revolute else 0.4 for joint in joints]
     reach = np.array([np.ptp(joint.position) for joint in joints])
@@ -144,8 +139,7 @@ def _room(machine: Machine, q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def _through(t: Array, knots: list[tuple[float, float]]) -> tuple[Array, Array, Array]:
-    """Return position, speed and acceleration (samples,) through (time, position) knots, at rest at
-    each.
+    """Return q, dq and ddq (samples,) through (time, position) knots, at rest at each:
 
     x = x0 + Δ (10 s³ - 15 s⁴ + 6 s⁵), s = (t - t0)/(t1 - t0)
     """
@@ -163,9 +157,7 @@ def _through(t: Array, knots: list[tuple[float, float]]) -> tuple[Array, Array, 
 def _one_moving(
     joint: int, posture: Array, duration: float, moved: tuple[Array, Array, Array]
 ) -> Reference:
-    """Return the motion (samples,) of joint `joint` (1-based), the others held at `posture`
-    (n,).
-    """
+    """Return a motion of joint `joint` (1-based) alone, the others held at `posture` (n,)."""
     still = at_rest(posture, duration)
     q, dq, ddq = still.q.copy(), still.dq.copy(), still.ddq.copy()
     q[:, joint - 1], dq[:, joint - 1], ddq[:, joint - 1] = moved
@@ -173,9 +165,7 @@ def _one_moving(
 
 
 def sweeps(machine: Machine, rng: np.random.Generator, duration: float = 20.0) -> Reference:
-    """Draw moves to and fro of every joint, each at a peak speed of two decades up to 30 % of the
-    limit.
-    """
+    """Draw moves of every joint to and fro, at peak speeds up to 30 % of its limit."""
     t, start, joints = times(duration), home(machine), []
     for q0, joint in zip(start, machine.robot.joints, strict=True):
         top = 0.3 * min(joint.velocity, CONFIG.fastest_turn)
@@ -194,9 +184,7 @@ def sweeps(machine: Machine, rng: np.random.Generator, duration: float = 20.0) -
 
 
 def reversals(joint: int, posture: Array, duration: float = 10.0) -> Reference:
-    """Return joint `joint` (1-based) to and fro every 0.5 s by ± 0.05 rad, growing fourfold over
-    the log.
-    """
+    """Return joint `joint` (1-based) to and fro every 0.5 s by ± 0.05 rad, growing fourfold."""
     count = math.ceil(duration / 0.5)
     grown = 0.05 * 4.0 ** (np.arange(count + 1) / max(count, 1))
     x = posture[joint - 1] + np.where(np.arange(count + 1) % 2, grown, -grown)
@@ -206,8 +194,9 @@ def reversals(joint: int, posture: Array, duration: float = 10.0) -> Reference:
 
 
 def turning(machine: Machine, joint: int, posture: Array, duration: float = 20.0) -> Reference:
-    """Return joint `joint` (1-based) by 2π, or over its range, at constant speed and back, the
-    others held: Section IV.D.
+    """Return joint `joint` (1-based) at constant speed by 2π, or over its range, and back.
+
+    The others are held: Section IV.D.
 
     Where the time is too short for that at a quarter of the largest speed, it turns less.
     """
@@ -223,9 +212,7 @@ def turning(machine: Machine, joint: int, posture: Array, duration: float = 20.0
 
 
 def _there_and_back(samples: int, start: float, angle: float) -> tuple[Array, Array, Array]:
-    """Speed up over a tenth of the way's time by a smooth step, constant, and down again; then the
-    same backwards.
-    """
+    """Return q, dq and ddq (samples,) there and back, a tenth of the time to speed up and down."""
     half = samples // 2
     s = np.arange(half) / half
     ramp = 0.1
@@ -248,9 +235,7 @@ def _there_and_back(samples: int, start: float, angle: float) -> tuple[Array, Ar
 
 
 def gravity_of(machine: Machine, joint: int, posture: Array) -> Array:
-    """Return c and c' (2,) of h = c sin q + c' cos q at joint `joint` (1-based), the others in
-    `posture`; a slide: (0, h).
-    """
+    """Return c and c' (2,) of h = c sin q + c' cos q at a joint (1-based); a slide: (0, h)."""
     rigid = RigidDynamics(machine.robot)
 
     def h(q: float) -> float:
@@ -295,9 +280,7 @@ def friction_torque(
 
 
 def multisine(rng: np.random.Generator, samples: int, rms: float) -> Array:
-    """Draw a sum (samples,) of equal sines of random phase at every quarter of a hertz from 0.5 to
-    250 Hz.
-    """
+    """Draw equal sines (samples,) of random phase at every quarter of a hertz of 0.5 to 250 Hz."""
     lines = np.arange(2, 1001)
     length = round(4.0 / SAMPLE_TIME)
     spectrum = np.zeros(length // 2 + 1, dtype=np.complex128)

@@ -1,5 +1,4 @@
-"""The machine as bodies and joints, plain data before MuJoCo sees it: where faults change how it is
-built.
+"""The machine as bodies and joints, plain data before MuJoCo sees it, which faults change.
 
 A joint's *body frame* lies on its axis and moves with it; the link's own frame (DH: distal) is
 fixed in it.
@@ -20,9 +19,7 @@ from pipelines.io.urdf import chain_from_urdf
 
 
 def axis_rotation(axis: Array, angle: float) -> Array:
-    """Return R = 1 + sin(angle) [a]× + (1 - cos(angle)) [a]×² (3, 3), Rodrigues; `axis` (3,) is a
-    unit vector.
-    """
+    """Return R = 1 + sin(angle) [a]× + (1 - cos(angle)) [a]×² (3, 3) about a unit vector (3,)."""
     x, y, z = axis
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     return np.asarray(np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross)
@@ -40,9 +37,7 @@ class Solid:
 
     @classmethod
     def of_link(cls, link: LinkParameters) -> Solid:
-        """Convert parameters about the frame's origin: I_c = I_o - m (|c|² 1 - c cᵀ), products
-        positive there.
-        """
+        """Convert from the origin: I_c = I_o - m (|c|² 1 - c cᵀ), products positive there."""
         xx, yy, zz, xy, xz, yz = link.inertia
         about_origin = np.array([[xx, -xy, -xz], [-xy, yy, -yz], [-xz, -yz, zz]])
         c = np.array(link.com)
@@ -57,17 +52,13 @@ class Solid:
         return LinkParameters(self.mass, (x, y, z), (xx, yy, zz, -xy, -xz, -yz))
 
     def seen_from(self, rotation: Array, position: Array) -> Solid:
-        """Return the body in the frame in which its own has this rotation (3, 3) and position (3,)
-        [m].
-        """
+        """Return the body where its frame has this rotation (3, 3) and position (3,) [m]."""
         return Solid(
             self.mass, rotation @ self.com + position, rotation @ self.inertia @ rotation.T
         )
 
     def about(self, axis: Array) -> float:
-        """Return its inertia [kg m^2] about the line through the origin along the unit vector
-        `axis` (3,).
-        """
+        """Return its inertia [kg m^2] about a line through the origin, a unit vector (3,)."""
         arm = np.cross(axis, self.com)
         return float(axis @ self.inertia @ axis + self.mass * arm @ arm)
 
@@ -78,9 +69,7 @@ class Solid:
 
     @property
     def exists(self) -> bool:
-        """True where mass can be spread so: positive, and S positive definite (Traversaro et al.
-        2016).
-        """
+        """True where mass can be spread so: m > 0, S positive definite (Traversaro et al. 2016)."""
         return self.mass > 0.0 and bool(np.linalg.eigvalsh(self.second_moments).min() > 0.0)
 
     def drawn(self, rng: np.random.Generator, share: float) -> Solid:
@@ -95,15 +84,11 @@ class Solid:
         return Solid(self.mass * factor[0], self.com * factor[1:4], inertia)
 
     def without_disc(self, axis: Array, inertia: float) -> Solid:
-        """Return the rest of it when a thin disc about the unit vector `axis` (3,) turns by
-        itself.
-        """
+        """Return the rest of it when a thin disc about a unit vector (3,) turns by itself."""
         return replace(self, inertia=self.inertia - disc(axis, inertia))
 
     def largest_disc(self, axis: Array, wanted: float) -> float:
-        """Return the inertia [kg m^2] of a disc about `axis` that can be taken out of it, at most
-        `wanted`.
-        """
+        """Return the inertia [kg m^2], at most `wanted`, of a disc that can be taken out of it."""
         inertia = wanted
         while not self.without_disc(axis, inertia).exists:
             inertia *= 0.8
@@ -111,9 +96,7 @@ class Solid:
 
 
 def disc(axis: Array, inertia: float) -> Array:
-    """Return the tensor J (½ 1 + ½ a aᵀ) (3, 3) of a thin disc, the same however far it has turned
-    about `axis`.
-    """
+    """Return J (½ 1 + ½ a aᵀ) (3, 3), the tensor of a thin disc about the unit vector `axis`."""
     return np.asarray(0.5 * inertia * (np.eye(3) + np.outer(axis, axis)))
 
 
@@ -124,9 +107,7 @@ def ball(mass: float, centre: Array, radius: float) -> Solid:
 
 @dataclass(frozen=True)
 class Twist:
-    """A motor that turns apart from its link: torque, friction and encoder act on it, a spring
-    drives the link.
-    """
+    """A motor apart from its link: torque, friction and encoder on it, a spring drives the link."""
 
     motor_inertia: float  # [kg m^2], taken out of the link
     stiffness: float = 0.0  # [N m/rad]
@@ -174,9 +155,7 @@ class Shaft:
 
 @dataclass(frozen=True)
 class PlannedJoint:
-    """One joint and the body it moves. `rotation` and `position` place it in the body frame before
-    it.
-    """
+    """A joint and the body it moves, placed in the body frame before it."""
 
     rotation: Array  # (3, 3)
     position: Array  # (3,) [m]
@@ -262,8 +241,7 @@ def plan_of(robot: RobotDescription) -> Plan:
 
 
 def _table_step(joint: Joint, convention: str) -> tuple[Array, Array, Array, Array, Array]:
-    """Return rotation and position of the joint frame in the last link frame, its axis, and the
-    link frame in it.
+    """Return rotation and position of a joint in the last link frame, its axis, and its link frame.
 
     dh:  Rz(q) Tz(d) Tx(a) Rx(α), all but Rz(q) behind the joint;  mdh:  Rx(α) Tx(a) Rz(q) Tz(d),
     all before it, for turns about z and shifts along z commute.

@@ -1,5 +1,4 @@
-"""Run a machine and record its logs: encoders, observer and law at 1 kHz, drives, the true motion
-between by MuJoCo.
+"""Run a machine and record its logs: encoders, observer and law at 1 kHz, MuJoCo between.
 
     logs = record(machine, faults, experiments, seed)
     recording = run(machine, law, reference, faults, seed)
@@ -88,16 +87,12 @@ def as_log(machine: Machine, experiment: Experiment, recording: Recording) -> Ex
 
 
 def peak_torque(logs: Iterable[ExperimentLog]) -> tuple[float, ...]:
-    """Return the largest torque (n,) [N m] of each joint over `logs`: what a saturation's strength
-    is relative to.
-    """
+    """Return the largest torque (n,) [N m] of each joint over `logs`, for saturations."""
     return tuple(np.max([np.abs(log.tau).max(axis=0) for log in logs], axis=0).tolist())
 
 
 def answer(faults: Iterable[Fault]) -> list[dict[str, object]]:
-    """Return cause, joint and parameters of each fault, named as in findings; "unknown" for one
-    outside the library.
-    """
+    """Return cause, joint and parameters of each fault as findings name them; or "unknown"."""
     return [
         {
             "cause": fault.name if fault.known else "unknown",
@@ -244,9 +239,7 @@ def _mover(plant: Run, hooks: list[Hooks]) -> Callable[[Floats], None]:
 def _loop(
     plant: Run, hooks: list[Hooks], step: Step, reference: Reference, noise: list[Floats]
 ) -> list[list[Floats]]:
-    """Return q, tau, the true q and dq, and the observer's e, de and nu, each a list of samples of
-    lists of n.
-    """
+    """Return q, tau, true q and dq, and the observer's e, de and nu, samples of lists of n."""
     machine, dofs, q_ref = plant.machine, plant.dofs, reference.q.tolist()
     observer = Observer(machine.observer_gain, SAMPLE_TIME)
     move, command = _mover(plant, hooks), _quantiser(machine)

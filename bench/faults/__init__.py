@@ -1,5 +1,4 @@
-"""Every fault of the bench by its name, grouped in files by where it is: a new one is a class in
-its file and here.
+"""Every fault of the bench by its name; a new one is a class in the file of its kind and here.
 
 fault_names()                          ("asymmetric_friction", "backlash", …)
 find_fault(name)                       the class of one

@@ -13,9 +13,7 @@ from bench.machine import Case, Fault, Floats, Hooks, JointLoad, Parameters, Run
 
 @dataclass(frozen=True)
 class Cogging(JointLoad):
-    """Magnets that pull the rotor into slots, not as a pure sine: τ = A (sin(k q + φ) + 0.35 sin(2
-    k q + φ2)).
-    """
+    """Magnets that pull the rotor into slots: τ = A (sin(k q + φ) + 0.35 sin(2 k q + φ2))."""
 
     order: float  # [1/rev] k of the joint
     amplitude: float  # [N m] A
@@ -108,9 +106,7 @@ class HuntingDrive(Fault):
 
 @dataclass(frozen=True)
 class TorqueCrosstalk(Fault):
-    """A current that takes from another axis: the motor of joint j gets u_j - c u_i, the controller
-    gives c u_i more.
-    """
+    """A current that takes from another axis: the motor of joint j gets u_j - c u_i."""
 
     coefficient: float  # [1] c
     from_joint: int  # i, 1-based
@@ -156,9 +152,7 @@ class TorqueGain(Fault):
 
 @dataclass(frozen=True)
 class TorqueOffset(Fault):
-    """An amplifier whose zero is off: the motor gets u - τ0, the controller has to give τ0 more
-    than the arm needs.
-    """
+    """An amplifier whose zero is off: the motor gets u - τ0, the controller gives τ0 more."""
 
     offset: float  # [N m] τ0
 
@@ -209,9 +203,7 @@ class TorqueSaturation(Fault):
 
 @dataclass(frozen=True)
 class GainRipple(Fault):
-    """A torque constant that varies a little with the motor's angle, τ = (1 + r sin(k q + φ)) u:
-    healthy motors have it.
-    """
+    """A torque constant that varies with the angle, as healthy ones do: (1 + r sin(k q + φ)) u."""
 
     ripple: float  # [1] r
     order: float  # [1/rev] k
@@ -237,8 +229,7 @@ class GainRipple(Fault):
 
 @dataclass(frozen=True)
 class ColouredNoise(Fault):
-    """A slow wander of the amplifier's zero, which healthy ones have: white noise through a
-    first-order low-pass.
+    """A slow wander of a healthy amplifier's zero: white noise through a first-order low-pass.
 
     It is stationary from the start.
     """

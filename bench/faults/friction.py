@@ -1,6 +1,4 @@
-"""Faults of friction: in bearings, seals, gears, lubricant and cables. Torques are loads: the motor
-gives that much more.
-"""
+"""Faults of friction, in bearings, seals, gears, lubricant and cables; torques are loads."""
 
 from __future__ import annotations
 
@@ -16,8 +14,9 @@ from bench.machine import Case, Fault, Floats, Hooks, JointLoad, Parameters, Run
 
 @dataclass(frozen=True)
 class AsymmetricFriction(JointLoad):
-    """A lip that rubs in one direction and lifts in the other: τ = ½ (1 + tanh(s w v)) (C tanh(w v)
-    + B v), s = ±1.
+    """A lip that rubs in one direction of motion and lifts in the other:
+
+        τ = ½ (1 + tanh(s w v)) (C tanh(w v) + B v), s = ±1
 
     Friction is larger by C and B in the direction of s, and as it was in the other.
     """
@@ -48,8 +47,9 @@ class AsymmetricFriction(JointLoad):
 
 @dataclass(frozen=True)
 class ConcaveFriction(JointLoad):
-    """Grease that thins as it is sheared, τ = A v/(|v| + 0.549 v_0): Cross 1965, viscosity falling
-    as 1/(1 + |v|/v_c).
+    """Grease that thins as it is sheared: τ = A v/(|v| + 0.549 v_0).
+
+    Cross 1965, viscosity falling as 1/(1 + |v|/v_c).
 
     It levels off at A and is half of that where A tanh(v/v_0) would be.
     """
@@ -73,8 +73,9 @@ class ConcaveFriction(JointLoad):
 
 @dataclass(frozen=True)
 class PositionFriction(JointLoad):
-    """Bands of wear along the turn where the joint rubs harder: τ = H ¼ (1 + cos k(q - q_w))²
-    tanh(w v), k a turn.
+    """Bands of wear along the turn where the joint rubs harder, k of them:
+
+        τ = H ¼ (1 + cos k(q - q_w))² tanh(w v)
 
     ¼ (1 + cos x)² = 3/8 + ½ cos x + ⅛ cos 2x, so the main harmonic is A sin(k q + φ) with A = H/2,
     φ = π/2 - k q_w; a quarter of it is in the second, and the mean adds to Coulomb friction.
@@ -104,9 +105,7 @@ class PositionFriction(JointLoad):
 
 @dataclass(frozen=True)
 class QuadraticDrag(JointLoad):
-    """Oil that is churned, in eddies once it is fast enough: τ = c v √(v² + v_e²), viscous below
-    v_e.
-    """
+    """Oil that is churned: τ = c v √(v² + v_e²), in eddies above v_e and viscous below."""
 
     coefficient: float  # [N m s^2/rad^2] c
     eddies: float = 0.2  # [rad/s] v_e, slower flow is laminar; on a slide a tenth of it
@@ -124,8 +123,7 @@ class QuadraticDrag(JointLoad):
 
 @dataclass(frozen=True)
 class Stribeck(JointLoad):
-    """A hump of dry friction where no film of lubricant has built up: τ = A tanh(w v)/(1 + (e -
-    1)(v/v_s)²).
+    """A hump of dry friction without a film of lubricant: τ = A tanh(w v)/(1 + (e - 1)(v/v_s)²).
 
     The form of Hess & Soom 1990, with 1/e of the hump left at v_s.
     """
@@ -174,8 +172,7 @@ class ViscousDrift(JointLoad):
 
 @dataclass(frozen=True)
 class LoadFriction(Fault):
-    """Teeth and bearings that rub in proportion to the torque that passes them: τ = µ |τ_l| tanh(w
-    v).
+    """Teeth and bearings that rub with the torque that passes them: τ = µ |τ_l| tanh(w v).
 
     τ_l is the torque that truly reached the bodies beyond in the inner step before, MuJoCo's
     inverse dynamics at the motion that came about: noise, cogging and every other fault are in it.
@@ -288,8 +285,7 @@ def _travelled(z: float, way: float) -> float:
 
 @dataclass(frozen=True)
 class SelfHeating(Fault):
-    """Dry friction that falls with the warmth of the joint's own losses, with its history, not with
-    the clock:
+    """Dry friction that falls with the warmth of the joint's own losses:
 
     τ = -γ F_c (1 - e^-θ) tanh(w v),  dθ/dt = (|v|/v_w - θ)/T
     """
@@ -326,8 +322,7 @@ class SelfHeating(Fault):
 
 @dataclass(frozen=True)
 class StickingSeal(Fault):
-    """A seal that is the harder to tear loose the longer it has rested: τ = A s tanh(w v), with the
-    bond s of 0 to 1:
+    """A seal that sticks the longer it has rested: τ = A s tanh(w v), with the bond s of 0 to 1:
 
     ds/dt = (1 - s)/T_d /(1 + (v/v_s)⁴) - s |v|/x_t
     """
@@ -362,8 +357,9 @@ class StickingSeal(Fault):
 
 @dataclass(frozen=True)
 class RelativeDamper(Fault):
-    """A strut between two links that drags with the root of their relative speed s = v_j - v_i: τ =
-    c s/(s² + v_n²)^¼.
+    """A strut between two links that drags with the root of their relative speed s = v_j - v_i:
+
+        τ = c s/(s² + v_n²)^¼
 
     It loads joint j, and joint i with its opposite; at speed it is c √|s| sign s.
     """
@@ -396,8 +392,7 @@ class RelativeDamper(Fault):
 
 @dataclass(frozen=True)
 class CableHysteresis(Fault):
-    """Cables that run over two joints and rub as they bend: A z on both, z of Bouc & Wen 1976 with
-    exponent 2:
+    """Cables over two joints that rub as they bend: A z on both, z of Bouc & Wen 1976, exponent 2:
 
     dz/dx = (1 - (β sgn(z ẋ) + γ) z²)/x_y,  x = q_i + q_j,  β = 0.7, γ = 1 - β, so that the loop
     closes at z = ±1

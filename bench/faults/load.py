@@ -18,8 +18,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Contact(Fault):
-    """Something that pushes against the tip for a moment: F(t) = F sin(π (t - t0)/D) while 0 ≤ t -
-    t0 ≤ D.
+    """Something that pushes the tip for a moment: F sin(π (t - t0)/D) while 0 ≤ t - t0 ≤ D.
 
     Its direction is fixed; the joints feel Jᵀ F.
     """
@@ -123,9 +122,7 @@ class Payload(Fault):
 
 @dataclass(frozen=True)
 class RattlingMass(Fault):
-    """A loose ball in the last link that slides across the tip by ± half a gap and knocks from wall
-    to wall.
-    """
+    """A loose ball in the last link that slides across ± half a gap, from wall to wall."""
 
     mass: float  # [kg]
     gap: float  # [m]
@@ -161,8 +158,7 @@ class RattlingMass(Fault):
 
 @dataclass(frozen=True)
 class SloshingLoad(Fault):
-    """Liquid in a vessel at the tip, the part that swings: a mass at the end of an arm of length l,
-    held by a spring.
+    """Liquid in a vessel at the tip: the part that swings, a mass at the end of a sprung arm l.
 
     Its frequency √(k/(m l²)) is the same whichever way the vessel leans; the liquid at rest counts
     as payload.
@@ -198,8 +194,7 @@ class SloshingLoad(Fault):
 
 @dataclass(frozen=True)
 class Spring(JointLoad):
-    """A hose or cable that pulls the joint back, the harder the further: τ = k u (x + 0.15 y³), a
-    load.
+    """A hose that pulls the joint back, the harder the further: τ = k u (x + 0.15 y³), a load.
 
     x = (q - q0)/u, y = 2 tanh(x/2): a cubic spring that goes on straight after two radians, where a
     cubic would tear the hose.

@@ -14,8 +14,7 @@ from bench.machine import Case, Fault, Floats, Hooks, Run
 
 @dataclass(frozen=True)
 class EncoderCrosstalk(Fault):
-    """A reading that moves with another joint, in the loop as in the log: q_j as measured = q_j + c
-    q_i.
+    """A reading that moves with another joint, in loop and log: q_j as read = q_j + c q_i.
 
     q_i is the true one. The arm has settled where it reads its first reference.
     """
@@ -89,8 +88,7 @@ class EncoderEccentricity(Fault):
 
 @dataclass(frozen=True)
 class TimeDelay(Fault):
-    """A position older than its time stamp, in the loop as in the log: q_measured(t) = q(t -
-    delay).
+    """A position older than its time stamp, in loop and log: q as read(t) = q(t - delay).
 
     True states are kept at every inner step; between two a cubic joins speeds too.
     """

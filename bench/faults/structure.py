@@ -84,8 +84,9 @@ class Backlash(Fault):
 
 @dataclass(frozen=True)
 class BaseResonance(Fault):
-    """A soft table: I ẍ = -k x - d ẋ - τ1 about the first joint's axis, a pole at √(k/I), a zero
-    below at √(k/(I + J)).
+    """A soft table: I ẍ = -k x - d ẋ - τ1 about the first joint's axis.
+
+    It has a pole at √(k/I), and a zero below at √(k/(I + J)).
 
     Strength is 1/I, the frequency stays: 8, 27 and 80 kg m² at ×1, ×0.3 and ×0.1.
     """
@@ -116,9 +117,7 @@ class BaseResonance(Fault):
 
 @dataclass(frozen=True)
 class GravityTilt(Fault):
-    """A base that is not level: true gravity is turned by `angle` towards `direction`, counted from
-    the base's x axis.
-    """
+    """A base that is not level: gravity turned by `angle` to `direction`, from the x axis."""
 
     angle: float  # [rad]
     direction: float  # [rad]
@@ -143,8 +142,9 @@ class GravityTilt(Fault):
 
 @dataclass(frozen=True)
 class JointElasticity(Fault):
-    """Motor and encoder on one side of a spring, the link on the other: J_m q̈ = τ - k (q - q_l) -
-    d (q̇ - q̇_l).
+    """Motor and encoder on one side of a spring, the link on the other:
+
+        J_m q̈ = τ - k (q - q_l) - d (q̇ - q̇_l)
 
     The motor's inertia is taken out of the link: infinitely stiff, it is the healthy machine again.
     Strength is the compliance 1/k. `frequency` is √(k/J)/2π, the motor locked and J the joint's
@@ -175,9 +175,7 @@ class JointElasticity(Fault):
         )
 
     def scaled(self, factor: float) -> Self:
-        """Return it stiffer: 80 and 50 Hz at ×0.1 and ×0.3, as causes.md lists them; in proportion
-        below ×0.03.
-        """
+        """Return it stiffer: 80 and 50 Hz at ×0.1 and ×0.3, in proportion below ×0.03."""
         strengths = (0.0, 0.03, 0.1, 0.3, 1.0)
         compliances = (0.0, 0.03, (30.0 / 80.0) ** 2, (30.0 / 50.0) ** 2, 1.0)
         now, then = np.interp(
@@ -215,9 +213,7 @@ class LinkLength(Fault):
 
     @classmethod
     def full(cls, case: Case) -> Self:
-        """Return it at the longest link between moving joints: torque does not show the last
-        one's.
-        """
+        """Return it at the longest link between joints: the last one's shows in no torque."""
         joints = plan_of(case.machine.robot).joints
         between = range(1, len(joints) - 1) or range(len(joints) - 1)
 
@@ -234,9 +230,7 @@ class LinkLength(Fault):
 
 
 def _along(position: Array, machine: Machine) -> Array:
-    """Return the unit vector (3,) along a link, in its body frame, where `position` (3,) is that of
-    the next joint.
-    """
+    """Return the unit vector (3,) along a link whose next joint is at `position` (3,)."""
     length = float(np.linalg.norm(position))
     if machine.robot.convention != "urdf" or length == 0.0:
         return np.array([1.0, 0.0, 0.0])
@@ -245,8 +239,7 @@ def _along(position: Array, machine: Machine) -> Array:
 
 @dataclass(frozen=True)
 class RotorInertia(Fault):
-    """A motor that turns faster than the joint, its inertia through the gear: J on the diagonal of
-    the mass matrix.
+    """A motor behind a gear: its inertia J on the diagonal of the mass matrix.
 
     It takes no part in the motion of the links before.
     """
@@ -269,8 +262,9 @@ class RotorInertia(Fault):
 
 @dataclass(frozen=True)
 class TransmissionCoupling(Fault):
-    """A rotor geared to q_i + q_j: J (q̈_i + q̈_j) + B s + C tanh(w s), s = v_i + v_j, a load on
-    both joints.
+    """A rotor geared to q_i + q_j, a load on both joints with s = v_i + v_j:
+
+        J (q̈_i + q̈_j) + B s + C tanh(w s)
 
     The inertia is a body to MuJoCo, not a torque. causes.md gives no strength: J is 6 % of what
     joint j moves, B and C are 30 % of its own friction.
