@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import NothingMatched, UsageError
-from pipelines.importers.controller_side import controller_table, write_controller_table
 from pipelines.importers.recipe import Recipe
+from pipelines.importers.units import controller_table, write_controller_table
 from pipelines.io.atomic import write_file
 from pipelines.io.files import write_log
 from pipelines.io.model_file import read_model

@@ -1,12 +1,13 @@
 """Import recordings: CSV, JSON, MAT and NumPy files become logs, by a recipe.
 
 Reads    a recipe (TOML, `pipelines.importers.recipe`) and the recorded files its patterns match
-Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet for maps without a clock, result.json, report.html
-Source   log-format.md; transmission and torque constants as `pipelines.importers.joint_side` says
+Writes   logs/<name>.h5 or .parquet, tables/<name>.parquet (maps), result.json, report.html
+Source   log-format.md; transmission and torque constants as `pipelines.importers.units` says
 
-A log whose samples were altered (repaired, unwrapped, resampled) is a derived log. Its attribute `created` is the time of the
-recording where the recipe says it; otherwise 1970-01-01T00:00:00Z, which means "not known": the hour of the import would make
-equal inputs unequal. provenance.json has that hour.
+A log whose samples were altered (repaired, unwrapped, resampled) is a derived log. Its attribute
+`created` is the time of the recording where the recipe says it; otherwise 1970-01-01T00:00:00Z,
+which means "not known": the hour of the import would make equal inputs unequal. provenance.json has
+that hour.
 """
 
 from __future__ import annotations
@@ -18,33 +19,31 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import Check, Gathering, InputRejected, UsageError
-from pipelines.importers import filenames
 from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
+from pipelines.importers.config import REPAIR
 from pipelines.importers.guess import Draft, guess_recipe
-from pipelines.importers.joint_side import Converted, joint_side
 from pipelines.importers.make_log import ImportedTable, SourceFile, examine, import_table, make_log
+from pipelines.importers.patterns import fill, unique
 from pipelines.importers.recipe import ResampleSpec
 from pipelines.importers.repair import Limits, Recording, late_intervals, repair
-from pipelines.io.experiment import Array, ExperimentLog, Signal
-from pipelines.io.files import regular_file, write_log
+from pipelines.importers.units import Converted, joint_side
+from pipelines.io import schema
+from pipelines.io.files import write_log
+from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.option import option
+from pipelines.io.parquet import write_table
 from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import RobotDescription
-from pipelines.io.table import write_table
+from pipelines.io.sandbox import regular_file
 from pipelines.model.rigid.choose import rigid_body
 from pipelines.quality.subject import many
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.signal.resample import grid, resample
 from pipelines.stage import Inputs, Request, Stage, slug
 
-__all__ = ["STAGE", "ImportedLog", "Result", "Settings", "compute", "draft_recipe", "read", "report"]
-
-_PREVIEWS, _PREVIEW_POINTS = 3, 150
-_FINEST = 4.0  # times the recorded rate
-
 
 def draft_recipe(path: Path, robot: str | None = None) -> Draft:
-    """Return the draft of a recipe for a recording; the torques are compared with the robot's links.
+    """Return the draft of a recipe for a recording, compared with the robot's links.
 
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
@@ -54,7 +53,10 @@ def draft_recipe(path: Path, robot: str | None = None) -> Draft:
 
 
 def _link_torque(robot: RobotDescription, q: Array, dq: Array, ddq: Array) -> Array | None:
-    """Return the torques (samples, joints) [N m] of a robot's links in motion [rad], None where a link is unknown."""
+    """Return the torques (samples, joints) [N m] of a robot's links at q, dq, ddq [rad].
+
+    None where a link is unknown.
+    """
     body = rigid_body(robot)
     p = body.known_parameters()
     return None if p is None else body.torque(q, dq, ddq, p)
@@ -62,22 +64,23 @@ def _link_torque(robot: RobotDescription, q: Array, dq: Array, ddq: Array) -> Ar
 
 @dataclass(frozen=True)
 class Settings:
-    """`recipe`: a TOML file or the name of a shipped one. `source`: folder of the recordings, default the recipe's own.
-    `map`: "q_1=Joint_1", columns named differently from the recipe. `trust_units`: units are what is declared, however large
-    the numbers."""
+    """The options of `rrrid import`."""
 
     recipe: str = option("", "Recipe: a TOML file, or the name of a shipped one.", "RECIPE")
     source: Path | None = option(None, "Folder the recordings are in. [the recipe's]")
     map: tuple[str, ...] = option((), "Column to take for a signal: q_1=Joint_1. Repeatable.")
     trust_units: bool = option(False, "Units are as declared, however large the numbers.")
-    guess: Path | None = option(None, "Draft a recipe for this recording, with the evidence; print it.", option=False)
+    guess: Path | None = option(
+        None, "Draft a recipe for this recording, with the evidence; print it.", option=False
+    )
 
 
 @dataclass(frozen=True)
 class Preview:
-    """Every Nth sample of a log, for the report's figure: numbers as one short text a column.
+    """Every Nth sample of a log, for the report's figure: one short text a column.
 
-    A result.h5 for them would lie among logs of the same ending, and one line a number would make most of result.json.
+    In a result.h5 they would lie among logs of the same ending, and one line a number would make
+    most of result.json.
     """
 
     t: str  # [s]
@@ -107,7 +110,7 @@ class ImportedLog:
 
 @dataclass(frozen=True)
 class Result:
-    """What was imported."""
+    """The logs and tables of an import."""
 
     recipe: str
     robot: str
@@ -118,50 +121,70 @@ class Result:
 
 
 def read(request: Request, settings: Settings) -> Inputs:
-    """The recipe, its robot and every file it matches."""
+    """Read the recipe, its robot and every file it matches."""
     if not settings.recipe:
-        raise UsageError("C02", "no recipe", where="rrrid import", remedy="name one, or draft one with --guess FILE")
+        remedy = "name one, or draft one with --guess FILE"
+        raise UsageError("C02", "no recipe", where="rrrid import", remedy=remedy)
     material = collect(settings.recipe, settings.source, request.robot, request.tell)
     material = replace(material, assume_units=request.assume_units, ending=request.format)
-    return Inputs(sources=material.paths, hashes=material.hashes, material=material,
-                  folders=(settings.source,) if settings.source else (),
-                  label=material.folder.absolute().name, robot_name=material.robot.name)
+    return Inputs(
+        sources=material.paths,
+        hashes=material.hashes,
+        material=material,
+        folders=(settings.source,) if settings.source else (),
+        label=material.folder.absolute().name,
+        robot_name=material.robot.name,
+    )
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
     """Turn every recording of the material into one log, or several where its clock was set back.
 
     Raises:
-        InputRejected, UsageError: what cannot be repaired, by the rows S, T and D of the table of bad inputs; all files' together.
+        InputRejected, UsageError: what cannot be repaired, by the rows S, T and D of the table of
+            bad inputs; all files' together.
     """
     material: Material = inputs.material
     mapped = parse_map(settings.map, material.recipe, material.robot.n_joints)
     checks: list[Check] = list(material.robot.checks)
-    logs: list[ImportedLog] = []
+    made: list[Made] = []
     problems = Gathering()
     for source in material.sources:
         with problems.part():
-            logs += _import(source, material, mapped, settings, checks)
+            made += _import(source, material, mapped, settings, checks)
     problems.raise_all()
-    names = filenames.unique(item.name for item in logs)
-    files = filenames.unique(slug(name) for name in names)
-    logs = [replace(item, name=name, file=f"logs/{file}.{material.ending}", log=replace(item.log, name=name),
-                    preview=_preview(item.log) if i < _PREVIEWS else None)
-            for i, (item, name, file) in enumerate(zip(logs, names, files, strict=True))]
+    names = unique(log.name for log, *_ in made)
+    paths = unique(slug(name) for name in names)
+    logs = []
+    for k, (log, files, steps, altered) in enumerate(made):
+        log, path = replace(log, name=names[k]), f"logs/{paths[k]}.{material.ending}"
+        about = (log.name, path, log.experiment, log.role, log.joint, log.n_samples, log.n_joints)
+        times = (log.sample_time, float(log.t[-1] - log.t[0]))
+        preview = _preview(log) if k < REPAIR.previews else None
+        logs.append(ImportedLog(*about, *times, files, steps, altered, preview, log))
     tables = []
     for spec, groups, table in material.tables:
         checks += table.checks
-        name = filenames.fill(spec.name, groups, material.recipe.where)
+        name = fill(spec.name, groups, material.recipe.where)
         tables.append(import_table(spec, name, f"tables/{slug(name)}.parquet", table))
-    return Result(material.recipe_path.name, material.robot.name, tuple(logs), tuple(tables), material.ignored,
-                  tuple(dict.fromkeys(checks)))
+    about_recipe = (material.recipe_path.name, material.robot.name)
+    said = tuple(dict.fromkeys(checks))
+    return Result(*about_recipe, tuple(logs), tuple(tables), material.ignored, said)
 
 
-def _import(source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]) -> list[ImportedLog]:
+# A log, its files, steps of conversion, and what makes it a derived log.
+Made = tuple[ExperimentLog, tuple[SourceFile, ...], tuple[str, ...], tuple[str, ...]]
+
+
+def _import(
+    source: Source, material: Material, mapped: Map, settings: Settings, checks: list[Check]
+) -> list[Made]:
+    """Return the logs of one recording: several where its clock was set back."""
+    recipe, trust, missing = material.recipe, settings.trust_units, material.recipe.missing
     assembled = assemble(source, material, mapped, material.assume_units)
-    recipe = material.recipe
-    missing, held = recipe.missing, recipe.log.torque == "held-command"
-    limits = Limits(missing.values, recipe.time.longest_gap, recipe.resample is not None, missing.rows, held)
+    held, resampled = recipe.log.torque == "held-command", recipe.resample is not None
+    longest = recipe.time.longest_gap
+    limits = Limits(missing.values, longest, resampled, missing.rows, held)
     checks += assembled.checks
     repaired = []
     for recording in assembled.recordings:
@@ -169,65 +192,75 @@ def _import(source: Source, material: Material, mapped: Map, settings: Settings,
         checks += said
         repaired.append(parts)
     if len(repaired) > 1 and any(len(parts) > 1 for parts in repaired):
-        raise InputRejected("T04", "gaps or steps of the clock in files with clocks of their own", where=source.primary,
-                            remedy="bring the files on one clock before the import")
-    repairs = tuple(f"{c.code}: {c.message}" for c in checks if c.level == "repair"
-                    and any(c.where.startswith(t.source) for t in source.tables.values()))
+        message = "gaps or steps of the clock in files with clocks of their own"
+        remedy = "bring the files on one clock before the import"
+        raise InputRejected("T04", message, where=source.primary, remedy=remedy)
+    here = tuple(table.source for table in source.tables.values())
+    repairs = [c for c in checks if c.level == "repair" and c.where.startswith(here)]
     made = []
-    for parts in zip(*repaired, strict=True):
-        converted = [joint_side(part, recipe, assembled.units, material.robot, material.drive, settings.trust_units)
-                     for part in parts]
-        checks += [check for item in converted for check in item.checks]
-        made.append(_on_one_clock(parts, converted, recipe.resample, checks))
-    logs = []
-    for k, (t, signals, steps, altered) in enumerate(made, start=1):
-        steps, altered = (*assembled.undeclared, *steps), (*repairs, *altered)
-        log, files, altered = make_log(source, material, assembled, t, signals, steps, altered, k if len(made) > 1 else None)
-        checks += examine(log, source.primary, settings.trust_units)
-        logs.append(ImportedLog(log.name, "", log.experiment, log.role, log.joint, log.n_samples, log.n_joints, log.sample_time,
-                                float(log.t[-1] - log.t[0]), files, steps, altered, None, log))
-    return logs
+    for k, parts in enumerate(zip(*repaired, strict=True), start=1):
+        sides = [
+            joint_side(part, recipe, assembled.units, material.robot, material.drive, trust)
+            for part in parts
+        ]
+        checks += [check for side in sides for check in side.checks]
+        signals, words = _on_one_clock(parts, sides, recipe.resample, checks)
+        steps = (*assembled.undeclared, *(step for side in sides for step in side.steps))
+        altered = (*(f"{c.code}: {c.message}" for c in repairs),)
+        altered = (*altered, *(step for side in sides for step in side.altered), *words)
+        number = k if len(repaired[0]) > 1 else None
+        done = steps, altered
+        log, files, altered = make_log(source, material, assembled, signals, done, number)
+        checks += examine(log, source.primary, trust)
+        made.append((log, files, steps, altered))
+    return made
 
 
-def _on_one_clock(parts: tuple[Recording, ...], converted: list[Converted], spec: ResampleSpec | None,
-                  checks: list[Check]) -> tuple[Array, dict[str, Signal], tuple[str, ...], tuple[str, ...]]:
-    """Time and signals of a log; resampled where the recipe says so."""
-    steps = tuple(step for item in converted for step in item.steps)
-    altered = tuple(step for item in converted for step in item.altered)
+def _on_one_clock(
+    parts: tuple[Recording, ...],
+    sides: list[Converted],
+    spec: ResampleSpec | None,
+    checks: list[Check],
+) -> tuple[dict[str, Signal], tuple[str, ...]]:
+    """Return the signals of a log, its time among them; resampled where the recipe says so."""
+    about_t = schema.SIGNALS["t"][1]
     if spec is None:
-        return parts[0].t, dict(converted[0].signals), steps, altered
+        return {"t": Signal(parts[0].t, "s", about_t), **sides[0].signals}, ()
     for part in parts:
-        if (recorded := 1.0 / float(np.median(np.diff(part.t)))) * _FINEST < spec.rate:
-            raise UsageError("C02", f"resample.rate is {spec.rate:g} Hz, the recording has {recorded:.4g} Hz: "
-                             "its samples would be invented", where=part.where,
-                             remedy="choose a rate near the recorded one, or a lower one")
-    at = grid(max(float(part.t[0]) for part in parts), min(float(part.t[-1]) for part in parts), spec.rate)
-    signals: dict[str, Signal] = {}
-    for part, item in zip(parts, converted, strict=True):
-        signals |= {name: replace(s, values=resample(part.t, s.values, at, spec.method)) for name, s in item.signals.items()}
-        interval = np.diff(part.t)
-        method = "natural cubic spline" if spec.method == "spline" else "straight lines"
-        late = late_intervals(part).size
-        words = (f"resampled from {part.t.size} samples {1e3 * interval.min():.4g} to {1e3 * interval.max():.4g} ms apart (median "
-                 f"{1e3 * float(np.median(interval)):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
-                 + (f"; {late} interval{'s' if late != 1 else ''} of more than 1.5 times the median bridged" if late else ""))
-        checks.append(Check.of("T05", "warn", words, where=part.where,
-                               remedy="none needed for fits; record with an even clock where frequencies near the rate matter"))
-        altered = (*altered, words)
-    return at, signals, steps, altered
+        recorded = 1.0 / float(np.median(np.diff(part.t)))
+        if recorded * REPAIR.finest < spec.rate:
+            message = f"resample.rate is {spec.rate:g} Hz, the recording has {recorded:.4g} Hz: "
+            message += "its samples would be invented"
+            remedy = "choose a rate near the recorded one, or a lower one"
+            raise UsageError("C02", message, where=part.where, remedy=remedy)
+    begin, end = max(float(p.t[0]) for p in parts), min(float(p.t[-1]) for p in parts)
+    at = grid(begin, end, spec.rate)
+    signals, said = {"t": Signal(at, "s", about_t)}, []
+    method = "natural cubic spline" if spec.method == "spline" else "straight lines"
+    for part, side in zip(parts, sides, strict=True):
+        for name, signal in side.signals.items():
+            values = resample(part.t, signal.values, at, spec.method)
+            signals[name] = replace(signal, values=values)
+        ms = 1e3 * np.diff(part.t)
+        words = f"resampled from {part.t.size} samples {ms.min():.4g} to {ms.max():.4g} ms apart "
+        words += (
+            f"(median {float(np.median(ms)):.4g} ms) to {at.size} at {spec.rate:g} Hz, {method}"
+        )
+        if late := late_intervals(part).size:
+            words += f"; {many(late, 'interval')} of more than 1.5 times the median bridged"
+        remedy = "none needed for fits; record with an even clock where frequencies near the rate"
+        checks.append(part.check("T05", words, f"{remedy} matter", "warn"))
+        said.append(words)
+    return signals, tuple(said)
 
 
 def _preview(log: ExperimentLog) -> Preview:
-    every = max(1, -(-log.n_samples // _PREVIEW_POINTS))
+    every = max(1, -(-log.n_samples // REPAIR.preview_points))
 
     def words(values: Array, digits: int = 4) -> str:
         return " ".join(f"{x:.{digits}g}" for x in values[::every].tolist())
 
     return Preview(words(log.t, 6), tuple(map(words, log.q.T)), tuple(map(words, log.tau.T)))
-
-
-def _numbers(texts: tuple[str, ...]) -> Array:
-    return np.array([text.split() for text in texts], dtype=np.float64).T
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
@@ -240,58 +273,81 @@ def write(result: Result, folder: Path, request: Request) -> None:
 
 
 def report(result: Result) -> Report:
-    """What was written, what was done to the samples, and a look at them."""
-    n, repaired = len(result.logs), [c for c in result.checks if c.level == "repair"]
-    seconds = sum(item.duration for item in result.logs)
-    words = f"{many(n, 'log')} of robot {result.robot} imported, {seconds:.4g} s in all"
-    words += f", and {len(result.tables)} table{'s' if len(result.tables) != 1 else ''}" if result.tables else ""
-    words += f"; {many(len(repaired), 'repair')}, listed below" if repaired else "; nothing had to be repaired"
-    resampled = [item for item in result.logs if any(step.startswith("resampled ") for step in item.altered)]
+    """Report what was written, what was done to the samples, and a look at them."""
+    logs, tables, n = result.logs, result.tables, len(result.logs)
+    repaired = sum(c.level == "repair" for c in result.checks)
+    warned = sum(c.level == "warn" for c in result.checks)
+    resampled = [i for i in logs if any(step.startswith("resampled ") for step in i.altered)]
+    words = f"{many(n, 'log')} of robot {result.robot} imported, "
+    words += f"{sum(item.duration for item in logs):.4g} s in all"
+    words += f", and {many(len(tables), 'table')}" if tables else ""
+    words += f"; {many(repaired, 'repair')}, listed below" if repaired else ""
+    words += "" if repaired else "; nothing had to be repaired"
     if resampled:
         rates = ", ".join(dict.fromkeys(f"{1.0 / item.sample_time:g} Hz" for item in resampled))
-        words += f"; {'all' if len(resampled) == n > 1 else many(len(resampled), 'log')} resampled to {rates}"
-    warned = sum(c.level == "warn" for c in result.checks)
+        some = "all" if len(resampled) == n > 1 else many(len(resampled), "log")
+        words += f"; {some} resampled to {rates}"
     words += f"; {many(warned, 'warning')}, listed below." if warned else "."
-    logs = Table(("log", "experiment", "role", "joint", "samples", "rate [Hz]", "duration [s]"),
-                 tuple((i.name, i.experiment, i.role, i.joint, i.samples, 1.0 / i.sample_time, i.duration) for i in result.logs))
-    drawn = f"Drawn are the first {_PREVIEWS} of {n} logs; rrrid inspect draws more."
-    sections = [Section("Logs", (drawn,) if n > _PREVIEWS else (), tables=(logs,),
-                        figures=tuple(_figure(item, item.preview) for item in result.logs if item.preview))]
-    if result.tables:
-        rows = tuple((t.name, t.source, ", ".join(f"{c} [{t.units[c]}]" for c in t.units), t.rows) for t in result.tables)
-        sections.append(Section("Tables", ("Files without a clock are no logs; they are kept as tables in SI.",),
-                                (Table(("table", "from", "columns", "rows"), rows),)))
+    head = ("log", "experiment", "role", "joint", "samples", "rate [Hz]", "duration [s]")
+    rows: list[tuple[Any, ...]] = [
+        (i.name, i.experiment, i.role, i.joint, i.samples, 1.0 / i.sample_time, i.duration)
+        for i in logs
+    ]
+    drawn = f"Drawn are the first {REPAIR.previews} of {n} logs; rrrid inspect draws more."
+    text = (drawn,) if n > REPAIR.previews else ()
+    figures = tuple(_figure(item, item.preview) for item in logs if item.preview)
+    sections = [Section("Logs", text, tables=(Table(head, tuple(rows)),), figures=figures)]
+    if tables:
+        names = ("table", "from", "columns", "rows")
+        units = [", ".join(f"{c} [{unit}]" for c, unit in t.units.items()) for t in tables]
+        rows = [(t.name, t.source, x, t.rows) for t, x in zip(tables, units, strict=True)]
+        text = ("Files without a clock are no logs; they are kept as tables in SI.",)
+        sections.append(Section("Tables", text, (Table(names, tuple(rows)),)))
     sections.append(_treatment(result))
-    return Report("Import", words, "attention" if repaired or warned else "good", sections=tuple(sections))
+    said = repaired or warned
+    return Report("Import", words, "attention" if said else "good", sections=tuple(sections))
 
 
 def _treatment(result: Result) -> Section:
-    """What was done to the samples, and what was found on the way."""
-    done = tuple((item.name, ", ".join(s.name for s in item.sources),
-                  "; ".join((*item.steps, *item.altered)) or "taken as they are") for item in result.logs)
-    found = tuple((c.code, c.level, c.where, c.message, c.remedy) for c in result.checks if c.level != "ok")
-    tables = [Table(("log", "from", "done to the samples"), done)]
-    if found:
+    """Return the treatment of the samples, and all warnings."""
+    done = []
+    for item in result.logs:
+        steps = "; ".join((*item.steps, *item.altered)) or "taken as they are"
+        done.append((item.name, ", ".join(s.name for s in item.sources), steps))
+    tables = [Table(("log", "from", "done to the samples"), tuple(done))]
+    said = [c for c in result.checks if c.level != "ok"]
+    if found := tuple((c.code, c.level, c.where, c.message, c.remedy) for c in said):
         tables.append(Table(("code", "level", "where", "what", "remedy"), found))
     text = [f"By recipe {result.recipe}."]
-    if result.ignored:
-        more = " …" if len(result.ignored) > 8 else ""
-        text.append(f"The recipe does not speak of {many(len(result.ignored), 'file')}: {', '.join(result.ignored[:8])}{more}.")
+    if names := ", ".join(result.ignored[:8]):
+        more = " …" if result.ignored[8:] else ""
+        files = many(len(result.ignored), "file")
+        text.append(f"The recipe does not speak of {files}: {names}{more}.")
     return Section("What was done to the data", tuple(text), tuple(tables))
 
 
 def _figure(item: ImportedLog, preview: Preview) -> Figure:
+    def numbers(texts: tuple[str, ...]) -> Array:
+        return np.array([text.split() for text in texts], dtype=np.float64).T
+
     def draw(figure: Any) -> None:
         from pipelines.report.figures import draw_joint_signals, joint_axes
 
-        top, bottom = figure.subfigures(1, 2)
-        t = _numbers((preview.t,))[:, 0]
-        draw_joint_signals(joint_axes(top, item.joints), t, _numbers(preview.q), "rad", quantity="q")
-        draw_joint_signals(joint_axes(bottom, item.joints), t, _numbers(preview.tau), "N m", quantity="tau")
+        t = numbers((preview.t,))[:, 0]
+        signals = (("q", preview.q, "rad"), ("tau", preview.tau, "N m"))
+        for part, (name, texts, unit) in zip(figure.subfigures(1, 2), signals, strict=True):
+            axes = joint_axes(part, item.joints)
+            draw_joint_signals(axes, t, numbers(texts), unit, quantity=name)
 
-    return Figure(f"import-{slug(item.name)}", f"{item.name}: position and torque of each joint as they are in the log.", draw,
-                  (7.2, 0.7 + 1.1 * item.joints), f"position and torque of log {item.name} against time")
+    title = f"{item.name}: position and torque of each joint as they are in the log."
+    described = f"position and torque of log {item.name} against time"
+    size = (7.2, 0.7 + 1.1 * item.joints)
+    return Figure(f"import-{slug(item.name)}", title, draw, size, described)
 
 
-STAGE = Stage("import", "Import recordings by a recipe", Settings, compute, report, read, write,
-              checks=lambda result: result.checks)
+def _checks(result: Result) -> tuple[Check, ...]:
+    return result.checks
+
+
+_TITLE = "Import recordings by a recipe"
+STAGE = Stage("import", _TITLE, Settings, compute, report, read, write, checks=_checks)

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from pipelines.errors import NothingMatched, UsageError
-from pipelines.importers.controller_side import controller_table, write_controller_table
 from pipelines.importers.recipe import Recipe
+from pipelines.importers.units import controller_table, write_controller_table
 from pipelines.io.canonical import digest_of
 from pipelines.io.derive import derive, recording
 from pipelines.io.experiment import ExperimentLog

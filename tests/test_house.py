@@ -16,8 +16,8 @@ REPO = Path(__file__).resolve().parents[1]
 CONSTANTS = {
     "pipelines/batch": 24, "pipelines/design_excitation.py": 1,
     "pipelines/diagnose.py": 1, "pipelines/diagnosis": 11, "pipelines/estimate_bps.py": 1,
-    "pipelines/estimation": 30, "pipelines/fit": 69, "pipelines/import_log.py": 3,
-    "pipelines/importers": 65, "pipelines/installation": 1,
+    "pipelines/estimation": 30, "pipelines/fit": 69,
+    "pipelines/installation": 1,
     "pipelines/model": 458, "pipelines/recall":
     3, "pipelines/report": 64, "pipelines/signal": 41,
     "pipelines/validate_writing.py": 1,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,9 +16,9 @@ from pipelines.errors import (
     UsageError,
     did_you_mean,
 )
-from pipelines.importers import filenames
+from pipelines.importers import patterns
 from pipelines.importers.clock import time_of
-from pipelines.importers.joint_side import drive_of, si_of, unit_declared
+from pipelines.importers.config import RECIPE
 from pipelines.importers.raw import RawTable, expand
 from pipelines.importers.recipe import (
     FileSpec,
@@ -30,22 +29,17 @@ from pipelines.importers.recipe import (
     parse_recipe,
 )
 from pipelines.importers.repair import Recording
-from pipelines.importers.sources import read_table
-from pipelines.io.experiment import Array
+from pipelines.importers.tables import read_table
+from pipelines.importers.units import drive_of, si_of, unit_declared
 from pipelines.io.files import RECORDINGS
-from pipelines.io.robot import Drive, RobotDescription, parse_robot
+from pipelines.io.log import Array
+from pipelines.io.robot import Drive, RobotDescription, parse_robot, shipped, shipped_names
 from pipelines.io.robot_files import load_robot, split_tip
-from pipelines.io.shipped import shipped, shipped_names
-from pipelines.io.text import read_small_text
-
-__all__ = ["Assembled", "Map", "Material", "Source", "assemble", "collect", "parse_map"]
+from pipelines.io.sandbox import read_small_text
 
 _BESIDE_USE = ("name", "gravity", "tip_link")
 
 Map = Mapping[str, Mapping[int, str]]
-Groups = dict[str, str]  # of a file's name, by the fields of the pattern
-Hits = dict[str, tuple[FileSpec, Groups]]
-Fits = list[tuple[TableSpec, dict[str, Groups]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,40 +85,47 @@ def collect(
     folder = _folder(path, source)
     arm, described = _robot(recipe, folder, path, robot)
     drive = drive_of(recipe.drive, arm, path)
-    names = filenames.files_below(folder)
+    names = patterns.files_below(folder)
     read: dict[str, RawTable] = {}
 
     def table_of(name: str) -> RawTable:
         if name not in read:
             tell(f"reading {name}")
-            read[name] = read_table(filenames.inside(folder, name, path), recipe.format, name)
+            read[name] = read_table(patterns.inside(folder, name, path), recipe.format, name)
         return read[name]
 
-    hits, fits = _hits(recipe, names, path)
-    wanted = {n: _files_of(recipe, groups, n, path) for n, (_, groups) in hits.items()}
-    companions = {other for name, files in wanted.items() for other in files if other != name}
-    sources, problems = [], Gathering()
-    for name, (case, groups) in hits.items():
+    cases = [*recipe.file, *([FileSpec(recipe.log.match)] if recipe.log.match else [])]
+    every = [case.match for case in cases] + [spec.match for spec in recipe.table]
+    fits = patterns.matches(every, names, path)
+    hits, sources, problems = _hits(recipe, cases, fits, names), [], Gathering()
+    companions = {file for name, (_, _, files) in hits.items() for file in files if file != name}
+    for name, (case, groups, files) in hits.items():
         if name in companions:
             continue
         with problems.part():
-            files = dict.fromkeys([name, *wanted[name]])
             for other in (other for other in files if other not in names):
-                belongs = f"'{other}' is missing, which belongs to '{name}'"
-                message = f"{belongs}{did_you_mean(other, names)}"
+                message = f"'{other}' is missing, which belongs to '{name}'"
+                message += did_you_mean(other, names)
                 remedy = "copy it beside, or correct file = … in [signals]"
                 raise InputRejected("S01", message, where=path, remedy=remedy)
             sources.append(Source(case, groups, name, {file: table_of(file) for file in files}))
     problems.raise_all()
-    pairs = [(name, spec, fit) for name in names for spec, fit in fits if name in fit]
-    tables = tuple((spec, fit[name], table_of(name)) for name, spec, fit in pairs)
+    tables = tuple(
+        (spec, fit[name], table_of(name))
+        for name in names
+        for spec, fit in zip(recipe.table, fits[len(cases) :], strict=True)
+        if name in fit
+    )
+    recorded = [name for name in names if Path(name).suffix.lower() in RECORDINGS]
     if not sources and not tables:
-        match = ", ".join(pattern for case in _cases(recipe) for pattern in _each(case.match))
-        message = f"no file matches {match}; {filenames.lying_there(names, RECORDINGS)}"
+        match = ", ".join(pattern for case in cases for pattern in patterns.each(case.match))
+        there = [*recorded, *(name for name in names if name not in recorded)]
+        more = f" and {len(there) - RECIPE.named} more" if len(there) > RECIPE.named else ""
+        lie = f"there lie{'s' * (len(there) == 1)} {', '.join(there[: RECIPE.named])}{more}"
+        message = f"no file matches {match}; {lie if there else 'no file lies there'}"
         remedy = "correct match in the recipe"
         remedy += "" if source else ", or give the folder of the recordings with --source"
         raise NothingMatched("C06", message, where=folder, remedy=remedy)
-    recorded = [name for name in names if Path(name).suffix.lower() in RECORDINGS]
     return Material(
         recipe,
         path,
@@ -139,25 +140,28 @@ def collect(
     )
 
 
-def _each(match: str | tuple[str, ...]) -> tuple[str, ...]:
-    return (match,) if isinstance(match, str) else match
+def _hits(
+    recipe: Recipe,
+    cases: list[FileSpec],
+    fits: list[dict[str, dict[str, str]]],
+    names: tuple[str, ...],
+) -> dict[str, tuple[FileSpec, dict[str, str], list[str]]]:
+    """Return the first case that each file fits, its groups, and the files of its signals."""
+    hits = {}
+    for name in names:
+        first = next((k for k in range(len(cases)) if name in fits[k]), None)
+        if first is not None and not cases[first].skip:
+            groups = fits[first][name]
+            files = [_file_of(recipe, signal, groups, name) for signal in recipe.signals]
+            hits[name] = cases[first], groups, list(dict.fromkeys([name, *files]))
+    return hits
 
 
-def _cases(recipe: Recipe) -> list[FileSpec]:
-    return [*recipe.file, *([FileSpec(recipe.log.match)] if recipe.log.match else [])]
-
-
-def _hits(recipe: Recipe, names: tuple[str, ...], path: Path) -> tuple[Hits, Fits]:
-    """Return the first case that each file fits, with its groups; and what fits each [[table]]."""
-    cases = _cases(recipe)
-    patterns = [case.match for case in cases] + [spec.match for spec in recipe.table]
-    fits = filenames.matches(patterns, names, path)
-    hits: Hits = {}
-    for case, fit in zip(cases, fits, strict=False):
-        for name, groups in fit.items():
-            hits.setdefault(name, (case, groups))
-    logs = {name: hits[name] for name in names if name in hits and not hits[name][0].skip}
-    return logs, list(zip(recipe.table, fits[len(cases) :], strict=True))
+def _file_of(recipe: Recipe, signal: str, groups: Mapping[str, str], primary: str) -> str:
+    template = recipe.signals[signal].file
+    if template is None:
+        return primary
+    return (Path(primary).parent / patterns.fill(template, groups, recipe.where)).as_posix()
 
 
 def _folder(recipe: Path, source: Path | None) -> Path:
@@ -174,19 +178,6 @@ def _folder(recipe: Path, source: Path | None) -> Path:
         remedy = "give the folder of the recordings with --source"
         raise UsageError("C04", message, where=source, remedy=remedy)
     return source
-
-
-def _file_of(
-    recipe: Recipe, signal: str, groups: Mapping[str, str], primary: str, where: object
-) -> str:
-    template = recipe.signals[signal].file
-    if template is None:
-        return primary
-    return (Path(primary).parent / filenames.fill(template, groups, where)).as_posix()
-
-
-def _files_of(recipe: Recipe, groups: Mapping[str, str], primary: str, where: object) -> list[str]:
-    return [_file_of(recipe, signal, groups, primary, where) for signal in recipe.signals]
 
 
 def _robot(
@@ -207,27 +198,21 @@ def _robot(
     for key in table:
         if key not in _BESIDE_USE:
             message = f"'robot.{key}' beside 'robot.use'{did_you_mean(key, _BESIDE_USE)}"
-            can = f"beside use, {', '.join(_BESIDE_USE)} can be given"
-            remedy = f"{can}; write the rest in the description"
+            remedy = f"beside use, {', '.join(_BESIDE_USE)} can be given"
+            remedy += "; write the rest in the description"
             raise UsageError("C01", message, where=path, remedy=remedy)
-    tip = table.get("tip_link")
+    tip, gravity = table.get("tip_link"), table.get("gravity", (0.0, 0.0, 0.0))
     if not isinstance(tip, str | None):
         message, remedy = "'robot.tip_link' must name a link", 'write tip_link = "last link"'
         raise UsageError("C02", message, where=path, remedy=remedy)
     if not isinstance(use, str) or not use.strip():
         message = "'robot.use' must name a robot description, a URDF, or a shipped robot"
         raise UsageError("C02", message, where=path, remedy="fill it in")
-    robot, files = _used_robot(use, tip, folder, path)
-    if "name" in table:
-        robot = replace(robot, name=str(table["name"]))
-    if table.get("gravity") is not None:
-        robot = replace(robot, gravity=_gravity(table["gravity"], path))
-    return robot, files
-
-
-def _used_robot(
-    use: str, tip: str | None, folder: Path, path: Path
-) -> tuple[RobotDescription, tuple[Path, ...]]:
+    vector = isinstance(gravity, list | tuple) and len(gravity) == len("xyz")
+    if not vector or not all(isinstance(g, int | float) for g in gravity):
+        message = f"'robot.gravity' is {gravity}, must be three numbers [m/s^2]"
+        remedy = "write gravity = [0.0, 0.0, -9.81]"
+        raise UsageError("C02", message, where=path, remedy=remedy)
     use, after_colon = split_tip(use)
     places = dict.fromkeys((folder, path.parent))
     found = next((place / use for place in places if (place / use).is_file()), None)
@@ -235,20 +220,14 @@ def _used_robot(
         nowhere = " nor ".join(f"in {place}" for place in places)
         lies = f"lies neither {nowhere}" if folder != path.parent else f"does not lie {nowhere}"
         message = f"the robot '{use}' that the recipe names {lies}"
-        copy = "copy it to the recordings, give their folder with --source"
-        remedy = f"{copy}, or another robot with --robot"
-        raise UsageError("C04", message, where=path, remedy=remedy)
+        remedy = "copy it to the recordings, give their folder with --source, or another robot"
+        raise UsageError("C04", message, where=path, remedy=f"{remedy} with --robot")
     robot = load_robot(found if found is not None else use, tip or after_colon)
+    robot = replace(robot, name=str(table.get("name", robot.name)))
+    if "gravity" in table:
+        x, y, z = map(float, gravity)
+        robot = replace(robot, gravity=(x, y, z))
     return robot, () if found is None else (found,)
-
-
-def _gravity(value: Any, path: Path) -> tuple[float, float, float]:
-    vector = isinstance(value, list | tuple) and len(value) == 3
-    if not vector or not all(isinstance(g, int | float) for g in value):
-        message = f"'robot.gravity' is {value}, must be three numbers [m/s^2]"
-        remedy = "write gravity = [0.0, 0.0, -9.81]"
-        raise UsageError("C02", message, where=path, remedy=remedy)
-    return float(value[0]), float(value[1]), float(value[2])
 
 
 def parse_map(entries: tuple[str, ...], recipe: Recipe, joints: int) -> Map:
@@ -304,8 +283,8 @@ def assemble(
     recordings: list[Recording] = []
     undeclared: list[str] = []
     problems = Gathering()
-    primary, where = source.primary, recipe.where
-    files = {s: _file_of(recipe, s, source.groups, primary, where) for s in recipe.signals}
+    primary = source.primary
+    files = {s: _file_of(recipe, s, source.groups, primary) for s in recipe.signals}
     for file, table in source.tables.items():
         here = [signal for signal in recipe.signals if files[signal] == file]
         for signal in here:
@@ -313,9 +292,10 @@ def assemble(
                 spec, instead = recipe.signals[signal], mapped.get(signal)
                 names = expand(table, spec.where or 1, material.robot.n_joints, signal, instead)
                 columns[signal] = names
-                units[signal] = unit_declared(
-                    signal, spec, table, names, material.robot, assume_units, checks
+                units[signal], said = unit_declared(
+                    signal, spec, table, names, material.robot, assume_units
                 )
+                checks += said
                 if spec.unit is None:
                     header = any(name in table.units for name in names)
                     origin = "from the header" if header else "assumed, as --assume-units says"
@@ -323,69 +303,49 @@ def assemble(
                     undeclared.append(f"{signal}: unit {listed} {origin}")
         if not here and file != primary:
             continue
-        has_clock = all(isinstance(c, int) or c in table.columns for c, _ in time.parts)
-        clock = time if file == primary or has_clock else None
+        own = file == primary or all(
+            isinstance(c, int) or c in table.columns for c, _ in time.parts
+        )
+        clocked, t = own and time.column is not None, np.full(table.rows.size, np.nan)
         with problems.part():
-            t = _time(table, clock, assume_units, undeclared, checks)
-        if not problems.found:
-            si = {s: si_of(units[s], recipe.signals[s]) for s in here}
-            of_file = {s: columns[s] for s in here}
-            recordings.append(_recording(table, t, of_file, si, clock))
+            if own:
+                t = _time(table, time, assume_units, undeclared, checks)
+        if problems.found:
+            continue
+        x = {s: np.column_stack([table.columns[name] for name in columns[s]]) for s in here}
+        of_file = {s: columns[s] for s in here}
+        si = {s: si_of(units[s], recipe.signals[s]) for s in here}
+        places, word = (table.rows + 1, "row") if table.lines is None else (table.lines, "line")
+        part = Recording(t, x, of_file, places, table.source, clocked, word, table.breaks, si)
+        recordings.append(part)
     problems.raise_all()
-    begin = recipe.log.begin
-    if source.case is not None and source.case.begin is not None:
-        begin = source.case.begin
-    clocked = time.column is not None
-    joined = _joined(recordings, list(source.tables.values()), clocked, checks)
-    joined = tuple(_begun(part, begin, checks) for part in joined)
-    if len(joined) > 1 and recipe.resample is None:
+    parts = _joined(recordings, list(source.tables.values()), time.column is not None, checks)
+    own_begin = source.case.begin if source.case is not None else None
+    begin = recipe.log.begin if own_begin is None else own_begin
+    parts = tuple(_begun(part, begin, checks) for part in parts) if begin else parts
+    if len(parts) > 1 and recipe.resample is None:
         message, where = "the files have different time stamps", ", ".join(source.tables)
         remedy = "add [resample] rate = … to bring them on one clock"
         raise InputRejected("T06", message, where=where, remedy=remedy)
-    return Assembled(joined, units, columns, tuple(checks), tuple(undeclared))
+    return Assembled(parts, units, columns, tuple(checks), tuple(undeclared))
 
 
 def _time(
-    table: RawTable,
-    clock: TimeSpec | None,
-    assume: bool,
-    undeclared: list[str],
-    checks: list[Check],
+    table: RawTable, spec: TimeSpec, assume: bool, undeclared: list[str], checks: list[Check]
 ) -> Array:
-    """Return the time stamps [s]; NaN where the file has no clock of its own."""
-    if clock is None:
-        return np.full(table.rows.size, np.nan)
-    if clock.unit is None and len(clock.parts) == 1:
-        header = table.units.get(table.name_of(clock.parts[0][0], "t"))
+    """Return the time stamps [s] of a file, and note where their unit comes from."""
+    if spec.unit is None and len(spec.parts) == 1:
+        header = table.units.get(table.name_of(spec.parts[0][0], "t"))
         undeclared += [f"t: unit {header} from the header"] if header else []
-    t, said = time_of(table, clock, assume)
+    t, said = time_of(table, spec, assume)
     checks += said
     return t
 
 
-def _recording(
-    table: RawTable,
-    t: Array,
-    columns: Mapping[str, tuple[str, ...]],
-    si: Mapping[str, float],
-    clock: TimeSpec | None,
-) -> Recording:
-    matrices = {}
-    for signal, names in columns.items():
-        matrices[signal] = np.column_stack([table.columns[name] for name in names])
-    places, word = (table.rows + 1, "row") if table.lines is None else (table.lines, "line")
-    clocked = clock is not None and clock.column is not None
-    breaks = table.breaks
-    return Recording(t, matrices, columns, places, table.source, clocked, word, breaks, si)
-
-
-def _begun(part: Recording, begin: float | None, checks: list[Check]) -> Recording:
+def _begun(part: Recording, begin: float, checks: list[Check]) -> Recording:
     """Leave out what was recorded before `begin` [s], as the recipe asks."""
-    if not begin:
-        return part
     kept = ~(part.t < float(np.nanmin(part.t)) + begin)
-    first = f"the first {begin:g} s, {int(np.sum(~kept))} samples"
-    message = f"{first}, left out as the recipe says"
+    message = f"the first {begin:g} s, {int(np.sum(~kept))} samples, left out as the recipe says"
     checks.append(Check.of("T04", "ok", message, where=part.where))
     return part.take(kept)
 
@@ -393,40 +353,38 @@ def _begun(part: Recording, begin: float | None, checks: list[Check]) -> Recordi
 def _joined(
     recordings: list[Recording], tables: list[RawTable], clocked: bool, checks: list[Check]
 ) -> tuple[Recording, ...]:
-    """Return one recording of files whose rows belong together; others keep their own clocks."""
+    """Return one recording of files whose rows belong together; others keep their own clocks.
+
+    Raises:
+        InputRejected: S16, files without clocks of their own are not of one length.
+    """
     first, rows = recordings[0], tables[0].rows
     separate: list[Recording] = []
     for other, table in zip(recordings[1:], tables[1:], strict=True):
         if clocked and other.clocked and not np.array_equal(other.t, first.t, equal_nan=True):
             separate.append(other)
             continue
-        lasts = int(rows[-1]), int(table.rows[-1])
-        _refuse_unequal(first, other, *lasts, clocked and not other.clocked, checks)
-        rows, a, b = np.intersect1d(rows, table.rows, assume_unique=True, return_indices=True)
-        signals = {name: values[a] for name, values in first.signals.items()}
-        signals |= {name: values[b] for name, values in other.signals.items()}
+        a, b = int(rows[-1]), int(table.rows[-1])
+        where, counts = f"{first.where}, {other.where}", f"{a + 1} and {b + 1} samples"
+        few = max(1, 1e-3 * max(a, b))
+        if a != b and ((clocked and not other.clocked) or abs(a - b) > few):
+            remedy = "give files of the same run, or files with time stamps of their own and"
+            message = f"{counts}: not of one recording"
+            raise InputRejected("S16", message, where=where, remedy=f"{remedy} [resample]")
+        if a != b:
+            message = f"{counts}; the rows both have are used, counted from the start"
+            remedy = "begin and end both recordings together"
+            checks.append(Check.of("T06", "warn", message, where=where, remedy=remedy))
+        rows, at, of = np.intersect1d(rows, table.rows, assume_unique=True, return_indices=True)
+        signals = {name: values[at] for name, values in first.signals.items()}
+        signals |= {name: values[of] for name, values in other.signals.items()}
         first = replace(
             first,
-            t=first.t[a],
-            places=first.places[a],
+            t=first.t[at],
+            places=first.places[at],
             columns={**first.columns, **other.columns},
             breaks=tuple((np.flatnonzero(np.diff(rows) > 1) + 1).tolist()),
             si={**first.si, **other.si},
             signals=signals,
         )
     return tuple(part for part in (first, *separate) if part.signals)
-
-
-def _refuse_unequal(
-    first: Recording, other: Recording, a: int, b: int, one_clock: bool, checks: list[Check]
-) -> None:
-    """S16: files without clocks of their own belong together row by row: of one length."""
-    if a == b:
-        return
-    where, counts = f"{first.where}, {other.where}", f"{a + 1} and {b + 1} samples"
-    if one_clock or abs(a - b) > max(1, 1e-3 * max(a, b)):
-        remedy = "give files of the same run, or files with time stamps of their own and [resample]"
-        raise InputRejected("S16", f"{counts}: not of one recording", where=where, remedy=remedy)
-    message = f"{counts}; the rows both have are used, counted from the start"
-    remedy = "begin and end both recordings together"
-    checks.append(Check.of("T06", "warn", message, where=where, remedy=remedy))

@@ -17,27 +17,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import Check, InputRejected
-from pipelines.importers.column_groups import Group, unit_of_group
-from pipelines.importers.column_names import read_name, words_of
-from pipelines.importers.evidence import Guess, Slope
+from pipelines.importers.config import CLOCK
+from pipelines.importers.evidence import Guess, Slope, units_of_ratio
+from pipelines.importers.groups import Group, unit_of_group
+from pipelines.importers.names import quantity_of, read_name, words_of
+from pipelines.importers.notes import Statement, stated_scale, stated_unit
 from pipelines.importers.raw import RawTable
 from pipelines.importers.recipe import TimeSpec
-from pipelines.importers.stated import Statement, stated_scale, stated_unit
-from pipelines.importers.unit_guess import units_of_ratio
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.units import UNITS, canonical_unit, to_si
-
-__all__ = ["SECONDS", "Clock", "clock_as_stated", "counted_on", "find_clock", "median_step",
-           "rate_as_stated", "round_rate", "time_of"]  # fmt: skip
 
 _COMMON = ("s", "ms", "us", "ns")
 SECONDS = {unit: UNITS[unit].factor for unit in (*_COMMON, "100 ns", "min", "d")}
 _INDEX = ("sample", "samples", "index")
-_NEAR = 0.2  # a rate within a fifth of the declared one is the declared one
-_FASTEST, _SLOWEST = 1e5, 1.0  # [Hz] what robots are recorded at
-_RATES = (1.0, 2e4)  # [Hz] of recordings whose time has no unit
-_PACE = (0.02, 50.0)  # [1/s] fastest speed over range of motion; the unit of angle cancels
-_THIS_CENTURY = (1e9, 4e9)  # [s] since 1970: the years 2001 to 2096
 # Unit, year in which it begins to count, [s] from there to 1970: Unix, LabVIEW, .NET, Windows,
 # spreadsheets, MATLAB.
 _EPOCHS = (
@@ -45,12 +37,15 @@ _EPOCHS = (
     ("100 ns", "1", 62135596800.0), ("100 ns", "1601", 11644473600.0),
     ("d", "1900", 25569 * 86400.0), ("d", "0", 719529 * 86400.0),
 )  # fmt: skip
-_RISING = 0.9  # of all steps of a clock; some stamps come twice, some clocks are set back
-_EVEN = 0.3  # standard deviation over mean of the steps of a clock without a name
-_RATIO_TOLERANCE = 0.02
 # Ranges of counters: of so many bits, some in s; and of a day.
 _BITS = (2.0**bits * unit for bits in (16, 24, 32) for unit in (1.0, 1e-3, 1e-6))
-_FULL = (*_BITS, *(86400.0 * unit for unit in (1.0, 1e3, 1e6, 1e9)))
+_RANGES = (*_BITS, *(86400.0 * unit for unit in (1.0, 1e3, 1e6, 1e9)))
+
+
+def median_step(values: Array) -> float:
+    """Return the median of the steps forward; 1 without any."""
+    steps = np.diff(values)
+    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
 
 
 def counted_on(stamps: Array) -> tuple[Array, float]:
@@ -62,8 +57,8 @@ def counted_on(stamps: Array) -> tuple[Array, float]:
     falls, rises = steps[steps < 0], steps[steps > 0]
     if not falls.size or not rises.size or np.nanmin(stamps) < 0.0:
         return stamps, 0.0
-    near, highest = 3.0 * float(np.median(rises)), np.nanmax(stamps)
-    fits = (x for x in _FULL if highest < x and ((falls + x > 0.0) & (falls + x <= near)).all())
+    near, highest = CLOCK.few_steps * float(np.median(rises)), np.nanmax(stamps)
+    fits = (x for x in _RANGES if highest < x and ((falls > -x) & (falls + x <= near)).all())
     full = next(fits, 0.0)
     return stamps + full * np.concatenate([[0.0], np.cumsum(steps < 0)]), full
 
@@ -81,7 +76,7 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     if spec.column is None:  # the recipe was checked: then there is a rate
         return table.rows * np.float64(step or math.nan), []
     if len(spec.parts) > 1:
-        return _summed(table, spec, step)
+        return _summed(table, spec, step), []
     column, declared = spec.parts[0]
     name = table.name_of(column, "t")
     where = f"{table.source}, column '{name}'"
@@ -89,13 +84,11 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
     known = np.isfinite(stamps)
     stamps[known], full = counted_on(stamps[known])
     finite = stamps[known]
-    steps = np.diff(finite)
-    steps = steps[steps > 0]
-    if finite.size < 2 or steps.size == 0:
+    if finite.size <= 1 or not (np.diff(finite) > 0).any():
         count = f"{finite.size} time stamp{'s' if finite.size != 1 else ''}"
         message = f"{count}, none later than another"
         raise InputRejected("T08", message, where=where, remedy="record again")
-    median = float(np.median(steps))
+    median = median_step(finite)
     header = table.units.get(name)
     unit = declared or header
     checks: list[Check] = []
@@ -105,52 +98,51 @@ def time_of(table: RawTable, spec: TimeSpec, assume: bool = False) -> tuple[Arra
         checks.append(Check.of("S08", "warn", message, where=where, remedy=remedy))
     if unit is None:
         unit = _detected(median, step, where, assume, checks)
-    elif declared and header and _contradict(header, declared):
-        message = f"the header says '{header}', the recipe says '{declared}'"
-        remedy = "correct one of them: the unit in [time], or the header"
-        raise InputRejected("S08", message, where=where, remedy=remedy)
     elif not declared:
         message = f"unit '{unit}' of time taken from the header"
         checks.append(Check.of("S06", "ok", message, where=where))
+    elif header and _contradict(header, declared):
+        message = f"the header says '{header}', the recipe says '{declared}'"
+        remedy = "correct one of them: the unit in [time], or the header"
+        raise InputRejected("S08", message, where=where, remedy=remedy)
     if unit in _INDEX and step is None:
         message = "time is a sample index, but no rate is declared"
         raise InputRejected("S08", message, where=where, remedy="add rate = … [Hz] to [time]")
     factor = step if unit in _INDEX and step else to_si(unit, "time", where=where).factor
-    _plausible(median, factor, unit, step, where)
+    _refuse_implausible(median, factor, unit, step, where)
     # An epoch: seconds since 1970 cost digits.
-    origin = finite[0] if abs(finite[0]) > 1e6 * median * finite.size else 0.0
+    origin = finite[0] if abs(finite[0]) > CLOCK.epoch * median * finite.size else 0.0
     if origin:
         message = f"time starts at {finite[0]:.16g} {unit}; counted from there"
         checks.append(Check.of("S08", "ok", message, where=where))
     return (stamps - origin) * factor, checks
 
 
-def _summed(table: RawTable, spec: TimeSpec, step: float | None) -> tuple[Array, list[Check]]:
+def _summed(table: RawTable, spec: TimeSpec, step: float | None) -> Array:
     """Return the sum of columns [s], large ones from their first stamp: no digit is lost."""
     total = np.zeros(table.rows.size)
     for column, unit in spec.parts:
         name = table.name_of(column, "t")
         stamps, where = table.columns[name], f"{table.source}, column '{name}'"
         finite = stamps[np.isfinite(stamps)]
-        if unit is None or finite.size < 2:
+        if unit is None or finite.size <= 1:
             message = "no unit" if unit is None else "no time stamps"
             remedy = 'give [time] one unit a column: unit = ["s", "ns"]'
             raise InputRejected("S08", message, where=where, remedy=remedy)
         factor = to_si(unit, "time", where=where).factor
-        total += (stamps - (finite[0] if abs(finite[0]) * factor > 1e6 else 0.0)) * factor
+        total += (stamps - (finite[0] if abs(finite[0]) * factor > CLOCK.epoch else 0.0)) * factor
     where = f"{table.source}, columns {', '.join(str(column) for column, _ in spec.parts)}"
-    steps = np.diff(total[np.isfinite(total)])
-    if not (steps > 0).any():
+    if not (np.diff(total[np.isfinite(total)]) > 0).any():
         message, remedy = "no time stamp is later than another", "choose other columns of time"
         raise InputRejected("T08", message, where=where, remedy=remedy)
-    _plausible(float(np.median(steps[steps > 0])), 1.0, "s", step, where)
-    return total, []
+    _refuse_implausible(median_step(total[np.isfinite(total)]), 1.0, "s", step, where)
+    return total
 
 
 def _contradict(header: str, declared: str) -> bool:
     """Return whether two units of time differ; a header without any of them says nothing."""
     header, declared = canonical_unit(header), canonical_unit(declared)
-    known = header in UNITS and UNITS[header].quantity == "time"
+    known = quantity_of(header) == "time"
     if declared in _INDEX:
         return known
     return known and declared in UNITS and UNITS[header] != UNITS[declared]
@@ -159,12 +151,13 @@ def _contradict(header: str, declared: str) -> bool:
 def _plausible_units(median: float) -> list[str]:
     """Return the units in which a median step gives a rate that robots are recorded at."""
     rates = {unit: 1.0 / (median * SECONDS[unit]) for unit in _COMMON}
-    return [unit for unit, rate in rates.items() if _SLOWEST <= rate <= _FASTEST]
+    return [unit for unit, rate in rates.items() if CLOCK.slowest <= rate <= CLOCK.fastest]
 
 
 def _fitting(median: float, step: float) -> list[str]:
-    fits = [unit for unit in _COMMON if abs(median * SECONDS[unit] / step - 1.0) < _NEAR]
-    return fits or (["sample"] if abs(median - 1.0) < 1e-9 else [])
+    """Return the units in which a median step is the declared one [s]."""
+    fits = [unit for unit in _COMMON if abs(median * SECONDS[unit] / step - 1.0) < CLOCK.near]
+    return fits or (["sample"] if median == 1.0 else [])
 
 
 def _detected(
@@ -173,8 +166,9 @@ def _detected(
     """S08: return the unit of time stamps without a declaration, where only one is possible."""
     fits = _fitting(median, step) if step is not None else []
     if step is not None and len(fits) == 1:
-        rate = f"the declared rate of {1 / step:.6g} Hz"
-        message = f"unit of time not declared; {fits[0]} fits {rate}"
+        message = (
+            f"unit of time not declared; {fits[0]} fits the declared rate of {1 / step:.6g} Hz"
+        )
         remedy = f'add unit = "{fits[0]}" to [time]'
         checks.append(Check.of("S08", "warn", message, where=where, remedy=remedy))
         return fits[0]
@@ -189,16 +183,17 @@ def _detected(
     raise InputRejected("S08", message, where=where, remedy="add unit or rate to [time]")
 
 
-def _plausible(median: float, factor: float, unit: str, step: float | None, where: str) -> None:
+def _refuse_implausible(
+    median: float, factor: float, unit: str, step: float | None, where: str
+) -> None:
     found = 1.0 / (median * factor)
-    if step is not None and abs(median * factor / step - 1.0) >= _NEAR:
+    if step is not None and abs(median * factor / step - 1.0) >= CLOCK.near:
         fits = _fitting(median, step)
         hint = f"; in {fits[0]} it would fit" if fits else ""
-        declared = f"{1 / step:.6g} Hz is declared{hint}"
-        message = f"time in {unit} makes {found:.6g} Hz, but {declared}"
-        remedy = "correct unit or rate"
-        raise InputRejected("S08", message, where=where, remedy=f"{remedy} in [time]")
-    if step is None and not _SLOWEST / 10 <= found <= 10 * _FASTEST:
+        message = f"time in {unit} makes {found:.6g} Hz, but {1 / step:.6g} Hz is declared{hint}"
+        remedy = "correct unit or rate in [time]"
+        raise InputRejected("S08", message, where=where, remedy=remedy)
+    if step is None and not CLOCK.slowest / 10 <= found <= 10 * CLOCK.fastest:
         right = " or ".join(_plausible_units(median)) or "a sample index"
         message = f"time in {unit} makes {found:.6g} Hz; {right} looks right"
         remedy = "correct the unit in [time], or add the rate to confirm it"
@@ -215,7 +210,7 @@ class Clock:
 
     @property
     def paired(self) -> bool:
-        return len(self.columns) == 2
+        return len(self.columns) > 1
 
 
 def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
@@ -225,61 +220,58 @@ def find_clock(table: RawTable, groups: Sequence[Group]) -> Clock | None:
         InputRejected: T01, the only column of time runs backwards.
     """
     of = {column: group.quantity for group in groups for column in group.columns}
-    times = [c for c in table.columns if of.get(c) == "time"]
-    plain = [c for c in table.columns if of.get(c) == ""]
+    times, plain, counters = (
+        [c for c in table.columns if of.get(c) == kind] for kind in ("time", "", "index")
+    )
+
+    def single(column: str) -> Clock:
+        unit = unit_of_group([column], table)[0] or ""
+        return Clock((column,), (unit,), counted_on(table.columns[column])[0])
+
+    def unevenness(values: Array) -> float:
+        steps = np.diff(values)
+        return float(np.std(steps) / max(abs(float(np.mean(steps))), 1e-300))
+
     pairs = [_pair(table, *pair, named=True) for pair in itertools.pairwise(times)]
     found = [clock for clock in pairs if clock]
-    found += [_single(table, c) for c in times if _rises(table.columns[c])]
+    found += [single(c) for c in times if _rises(table.columns[c])]
     if not found and (backwards := [c for c in times if _rises(-table.columns[c])]):
         message = "falls from row to row: the newest row is first"
         where = f"{table.source}, column '{backwards[0]}'"
         remedy = "sort the rows by it, the oldest first"
         raise InputRejected("T01", message, where=where, remedy=remedy)
     if found:
-        uneven = [_unevenness(clock.values) for clock in found]
-        best = min(uneven)
-        return next(c for c, u in zip(found, uneven, strict=True) if u <= 2.0 * best + 1e-6)
-    if len(plain) > 2 and (clock := _pair(table, plain[0], plain[1], named=False)):
+        uneven = [unevenness(clock.values) for clock in found]
+        best = 2.0 * min(uneven) + CLOCK.rounding
+        return next(c for c, u in zip(found, uneven, strict=True) if u <= best)
+    if plain[2:] and (clock := _pair(table, plain[0], plain[1], named=False)):
         return clock
-    even = [c for c in plain[:2] if len(table.columns) > 2 and _rises_evenly(table.columns[c])]
-    counting = [c for c in even if _counts(table.columns[c])]
-    for column in [*(c for c in even if c not in counting), *counting]:
-        return _single(table, column)
-    counters = [c for c in table.columns if of.get(c) == "index"]
+    even = [
+        c
+        for c in (plain[:2] if [*table.columns][2:] else [])
+        if (np.diff(table.columns[c]) > 0).all() and unevenness(table.columns[c]) < CLOCK.even
+    ]
+    if even:
+        return single(min(even, key=lambda c: _counts(table.columns[c])))
     counted = [c for c in counters if _rises(table.columns[c])]
     if not counted:
         return None
     values = table.columns[counted[0]]
-    single = np.median(np.diff(values)) == 1.0  # KUKA's IPOC counts ms, in steps of its cycle
-    return Clock((counted[0],), ("sample" if single else "",), values)
-
-
-def _single(table: RawTable, column: str) -> Clock:
-    unit = unit_of_group([column], table)[0] or ""
-    return Clock((column,), (unit,), counted_on(table.columns[column])[0])
+    by_one = np.median(np.diff(values)) == 1.0  # KUKA's IPOC counts ms, in steps of its cycle
+    return Clock((counted[0],), ("sample" if by_one else "",), values)
 
 
 def _rises(values: Array) -> bool:
     """Return whether a column rises like a clock, unlike a fraction of a second."""
     steps = np.diff(values)
     fall = float(-steps.min()) if steps.size and steps.min() < 0 else math.nan
-    again = any(abs(fall / full - 1.0) < 0.1 for full in (1e3, 1e6, 1e9))
-    return float(np.mean(steps > 0)) > _RISING and not (again and values.min() >= 0.0)
-
-
-def _rises_evenly(values: Array) -> bool:
-    steps = np.diff(values)
-    return bool((steps > 0).all() and np.std(steps) < _EVEN * np.mean(steps))
+    again = any(abs(fall / full - 1.0) < CLOCK.again for full in (1e3, 1e6, 1e9))
+    return float(np.mean(steps > 0)) > CLOCK.rising and not (again and values.min() >= 0.0)
 
 
 def _counts(values: Array) -> bool:
     """Return whether a column is 0, 1, 2, … or 1, 2, 3, …"""
-    return values[0] in (0.0, 1.0) and float(np.mean(np.diff(values) == 1.0)) > _RISING
-
-
-def _unevenness(values: Array) -> float:
-    steps = np.diff(values)
-    return float(np.std(steps) / max(abs(float(np.mean(steps))), 1e-300))
+    return values[0] in (0.0, 1.0) and float(np.mean(np.diff(values) == 1.0)) > CLOCK.rising
 
 
 def _pair(table: RawTable, whole: str, fraction: str, named: bool) -> Clock | None:
@@ -294,75 +286,12 @@ def _pair(table: RawTable, whole: str, fraction: str, named: bool) -> Clock | No
     unit = read_name(fraction).unit if named else ""
     for candidate in (unit,) if unit in _COMMON[1:] else ("ns", "us", "ms"):
         full = 1.0 / SECONDS[candidate]
-        if b.max() >= full or (not unit and b.max() < 0.5 * full):
+        if b.max() >= full or (not unit and 2.0 * b.max() < full):
             continue
         values = (a - a[0]) + b * SECONDS[candidate]
         if _rises(values):
             return Clock((whole, fraction), ("s", candidate), values)
     return None
-
-
-def median_step(values: Array) -> float:
-    """Return the median of the steps forward; 1 without any."""
-    steps = np.diff(values)
-    return float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-
-
-def _unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[str, Guess]:
-    """Return the unit, "" where it stays open, and the reason.
-
-    Args:
-        q: (samples, joints) positions in any unit.
-        slope: relation of a recorded velocity to the positions, per recorded unit of time.
-    """
-    median, named = median_step(clock.values), clock.units[0]
-    if clock.paired:
-        rise = f"rise by {median:.4g} s, {1 / median:.4g} Hz"
-        return "s", Guess("s", "sure", f"whole seconds and {clock.units[1]} together {rise}")
-    if named == "sample":
-        return "sample", Guess("sample", "likely", "named a counter: the rate is not in the file")
-    if named and named not in SECONDS:
-        return "", Guess("", "unsure", f"its name or header says '{named}': s, ms, us or ns?")
-    rates = {unit: 1.0 / (median * f) for unit, f in SECONDS.items()}
-    ratios = {unit: slope.factor / SECONDS[unit] for unit in _COMMON} if slope else {}
-    by_velocity = [unit for unit, r in ratios.items() if units_of_ratio(r, _RATIO_TOLERANCE)]
-    if named and 0.1 * _RATES[0] <= rates[named] <= 10.0 * _RATES[1]:
-        if problem := _contradicts(named, rates, by_velocity, clock.values, q):
-            why = f"its name or header says '{named}', but {problem}"
-            return "", Guess("", "unsure", why)
-        why = f"named so, and a median step of {median:.4g} makes {rates[named]:.4g} Hz"
-        return named, Guess(named, "sure", why)
-    plausible = [unit for unit, rate in rates.items() if _RATES[0] <= rate <= _RATES[1]]
-    unit, years = _since(clock.values[0], plausible)
-    if unit:
-        why = f"counted since the year {years}, and a median step of {median:.4g} makes"
-        return unit, Guess(unit, "sure", f"{why} {rates[unit]:.4g} Hz")
-    fits = [unit for unit in plausible if unit in _COMMON]
-    would = " or ".join(f"{rates[unit]:.4g} Hz in {unit}" for unit in fits)
-    reasons = [f"a median step of {median:.4g} would be {would or 'no plausible rate'}"]
-    if q is not None:
-        paced = _paced(fits, clock.values, q)
-        if len(paced) < len(fits):
-            reasons.append("the pace of the motion leaves " + (" or ".join(paced) or "none"))
-        fits = paced
-    why = "; ".join(reasons)
-    agreeing = [unit for unit in fits if unit in by_velocity]
-    if len(agreeing) == 1:
-        return agreeing[0], Guess(agreeing[0], "likely", f"{why}; the recorded velocity agrees")
-    counts = _counts(clock.values)
-    if len(fits) == 1 and not counts:
-        return fits[0], Guess(fits[0], "likely", why)
-    also = '; 0, 1, 2, … may also count samples: then unit = "sample" and rate = … [Hz]'
-    return "", Guess("", "unsure", why + also * counts)
-
-
-def rate_as_stated(stated: Statement | None, slope: Slope | None) -> tuple[float, Guess]:
-    """Return the rate [Hz] that the file states; nan where none, or a velocity contradicts it."""
-    if stated is None:
-        return math.nan, Guess("", "unsure", "")
-    agrees = slope is None or units_of_ratio(slope.factor * stated.number) is not None
-    rate = stated.number if math.isfinite(stated.number) and agrees else math.nan
-    return rate, Guess(f"{rate:g} Hz", "likely", f"the file states {stated.words}")
 
 
 def clock_as_stated(
@@ -372,7 +301,14 @@ def clock_as_stated(
     notes: Sequence[str],
     stated: Statement | None,
 ) -> tuple[str, Guess]:
-    """Return the unit of a clock, with what the file states of it (`notes`) and of the rate."""
+    """Return the unit of a clock, "" where it stays open, and the reason.
+
+    Args:
+        q: (samples, joints) positions in any unit.
+        slope: relation of a recorded velocity to the positions, per recorded unit of time.
+        notes: lines of the file, that may state the unit.
+        stated: the rate that the file states.
+    """
     own = clock.units[0]
     said = stated_unit(notes, "time") if not clock.paired and not own else None
     if said is not None and said.value:
@@ -385,11 +321,10 @@ def clock_as_stated(
         return "", Guess("", "unsure", f"the file states '{ticks[0].words}'")
     if stated is None or clock.paired or guess.confidence == "sure" or unit == "sample":
         return unit, guess
-    steps = np.diff(clock.values)
-    step = float(np.median(steps[steps > 0]))
+    step = median_step(clock.values)
     words = f"a median step of {step:.4g}, and the file states {stated.words}"
     periods = {other: step * size * stated.number for other, size in SECONDS.items()}
-    fits = [other for other, x in periods.items() if abs(x - 1.0) < _RATIO_TOLERANCE]
+    fits = [other for other, x in periods.items() if abs(x - 1.0) < CLOCK.same_rate]
     if len(fits) == 1 and unit in ("", fits[0]):
         return fits[0], Guess(fits[0], "likely", words)
     if step == 1.0 and not unit and math.isfinite(stated.number):
@@ -397,24 +332,56 @@ def clock_as_stated(
     return "", Guess("", "unsure", f"{guess.why}; but {words}" if unit else guess.why)
 
 
-def _since(first: float, units: Sequence[str]) -> tuple[str, str]:
-    """Return the only unit in which a clock counts to this century, and since which year; or ""."""
-    low, high = _THIS_CENTURY
-    epochs = [(unit, year, offset) for unit, year, offset in _EPOCHS if unit in units]
-    found = [(u, year) for u, year, offset in epochs if low < first * SECONDS[u] - offset < high]
-    if len({unit for unit, _ in found}) != 1:
-        return "", ""
-    return found[0][0], " or ".join(year for _, year in found)
-
-
-def _contradicts(
-    named: str, rates: dict[str, float], by_velocity: Sequence[str], t: Array, q: Array | None
-) -> str:
-    """Return what contradicts a named unit of time: a velocity, or rate and pace; else ""."""
-    if by_velocity and named not in by_velocity:
-        return f"the recorded velocity is the slope of the position in {' or '.join(by_velocity)}"
-    slow = rates[named] < _RATES[0] and q is not None and not _paced([named], t, q)
-    return f"that makes {rates[named]:.4g} Hz, and a motion too slow for a robot" if slow else ""
+def _unit_of_clock(clock: Clock, q: Array | None, slope: Slope | None) -> tuple[str, Guess]:
+    """Return the unit that names and numbers show, "" where it stays open, and the reason."""
+    median, named = median_step(clock.values), clock.units[0]
+    if clock.paired:
+        rise = f"rise by {median:.4g} s, {1 / median:.4g} Hz"
+        return "s", Guess("s", "sure", f"whole seconds and {clock.units[1]} together {rise}")
+    if named == "sample":
+        return "sample", Guess("sample", "likely", "named a counter: the rate is not in the file")
+    if named and named not in SECONDS:
+        return "", Guess("", "unsure", f"its name or header says '{named}': s, ms, us or ns?")
+    rates = {unit: 1.0 / (median * f) for unit, f in SECONDS.items()}
+    ratios = {unit: slope.factor / SECONDS[unit] for unit in _COMMON} if slope else {}
+    by_velocity = [unit for unit, r in ratios.items() if units_of_ratio(r, CLOCK.same_rate)]
+    low, high = CLOCK.unnamed_slowest, CLOCK.unnamed_fastest
+    if named and 0.1 * low <= rates[named] <= 10.0 * high:
+        problem = ""
+        if by_velocity and named not in by_velocity:
+            others = " or ".join(by_velocity)
+            problem = f"the recorded velocity is the slope of the position in {others}"
+        elif rates[named] < low and q is not None and not _paced([named], clock.values, q):
+            problem = f"that makes {rates[named]:.4g} Hz, and a motion too slow for a robot"
+        if problem:
+            return "", Guess("", "unsure", f"its name or header says '{named}', but {problem}")
+        why = f"named so, and a median step of {median:.4g} makes {rates[named]:.4g} Hz"
+        return named, Guess(named, "sure", why)
+    plausible = [unit for unit, rate in rates.items() if low <= rate <= high]
+    since = [
+        (unit, year)
+        for unit, year, offset in _EPOCHS
+        if unit in plausible
+        and CLOCK.from_2001 < clock.values[0] * SECONDS[unit] - offset < CLOCK.to_2096
+    ]
+    if len({unit for unit, _ in since}) == 1:
+        unit, years = since[0][0], " or ".join(year for _, year in since)
+        why = f"counted since the year {years}, and a median step of {median:.4g} makes"
+        return unit, Guess(unit, "sure", f"{why} {rates[unit]:.4g} Hz")
+    fits = [unit for unit in plausible if unit in _COMMON]
+    would = " or ".join(f"{rates[unit]:.4g} Hz in {unit}" for unit in fits)
+    why = f"a median step of {median:.4g} would be {would or 'no plausible rate'}"
+    paced = fits if q is None else _paced(fits, clock.values, q)
+    if len(paced) < len(fits):
+        why += "; the pace of the motion leaves " + (" or ".join(paced) or "none")
+    agreeing = [unit for unit in paced if unit in by_velocity]
+    if len(agreeing) == 1:
+        return agreeing[0], Guess(agreeing[0], "likely", f"{why}; the recorded velocity agrees")
+    counts = _counts(clock.values)
+    if len(paced) == 1 and not counts:
+        return paced[0], Guess(paced[0], "likely", why)
+    also = '; 0, 1, 2, … may also count samples: then unit = "sample" and rate = … [Hz]'
+    return "", Guess("", "unsure", why + also * counts)
 
 
 def _paced(units: Sequence[str], t: Array, q: Array) -> list[str]:
@@ -427,7 +394,8 @@ def _paced(units: Sequence[str], t: Array, q: Array) -> list[str]:
     if span == 0.0:
         return list(units)
     pace = float((moved[good] / elapsed[good]).max()) / span if good.any() else 0.0
-    return [unit for unit in units if _PACE[0] <= pace / SECONDS[unit] <= _PACE[1]]
+    low, high = CLOCK.slowest_pace, CLOCK.fastest_pace
+    return [unit for unit in units if low <= pace / SECONDS[unit] <= high]
 
 
 def round_rate(rate: float) -> float:

@@ -13,30 +13,26 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.io.experiment import Array
+from pipelines.importers.config import EVIDENCE, LINKS
 from pipelines.io.limits import FEWEST
-
-__all__ = ["RESOLUTIONS", "Confidence", "Guess", "LinkFit", "Slope", "TorqueModel", "best_unit",
-           "crossed", "fits_by_unit", "held", "quarter_turns", "rollover", "sign_of", "slope_of",
-           "unlike_links"]  # fmt: skip
+from pipelines.io.log import Array
 
 Confidence = Literal["sure", "likely", "unsure"]
+# Slope of the position over the velocity, by their units: q in the first, dq in the second.
+_ANGULAR_RATIOS = {
+    1.0: ("", ""), 180.0 / math.pi: ("deg", "rad/s"), math.pi / 180.0: ("rad", "deg/s"),
+    1.0 / 60.0: ("rev", "rpm"), 6.0: ("deg", "rpm"), math.pi / 30.0: ("rad", "rpm"),
+}  # fmt: skip
 # (samples, joints) q, dq, ddq [rad] -> torque [N m]; None where links are unknown
 TorqueModel = Callable[[Array, Array, Array], Array | None]
-
-# Counts of encoders in one turn.
-RESOLUTIONS = (4096, 8192, 16384, 2048, 1024, 65536, 131072, 262144, 1048576, 4000, 10000, 20000)
-_STRETCHES = (200, 60, 20)  # parts of a recording over which a velocity is summed
-_LIKE = 0.95  # correlation over which one block is the slope of another
-_SAME_RATIO = 0.1  # scatter of the ratio over the joints
-_FALSE_SIGN = 1e-3  # chance that a recording without friction is given a sign
+Motion = tuple[Array, Array, Array]  # q, dq, ddq
 
 
 @dataclass(frozen=True)
@@ -63,33 +59,29 @@ def slope_of(q: Array, dq: Array, t: Array | None, every: bool = False) -> Slope
     amplify the steps of an encoder as a difference of neighbours does. With `every`, columns that
     hardly move beside the others must agree as well: they may be something else.
     """
-    if q.shape != dq.shape or len(q) < 50:
+    if q.shape != dq.shape or len(q) < EVIDENCE.fewest:
         return None
     steps = np.diff(np.arange(len(q), dtype=np.float64) if t is None else t)
     areas = np.cumsum(0.5 * (dq[1:] + dq[:-1]) * steps[:, None], axis=0)
     summed = np.concatenate([np.zeros((1, q.shape[1])), areas])
-    least = 0.0 if every else 1e-3
+    least = 0.0 if every else EVIDENCE.hardly_moves
     moving = (np.ptp(q, axis=0) > least * np.ptp(q)) & (np.ptp(dq, axis=0) > least * np.ptp(dq))
     if not moving.any():
         return None
-    widths = sorted({max(2, len(q) // share) for share in _STRETCHES})
-    found = (_slope_over(q[:, moving], summed[:, moving], width) for width in widths)
-    return next((slope for slope in found if slope is not None), None)
-
-
-def _slope_over(q: Array, summed: Array, width: int) -> Slope | None:
-    """Return the relation over stretches of `width` samples; `summed` integrates the velocity."""
-    moved, expected = q[width:] - q[:-width], summed[width:] - summed[:-width]
-    power = (expected**2).sum(axis=0)
-    inner = (moved * expected).sum(axis=0)
-    size = np.sqrt(power * (moved**2).sum(axis=0))
-    if not (size > 0).all():
-        return None
-    correlation, factors = inner / size, inner / power
-    factor = float(inner.sum() / power.sum())
-    if correlation.min() < _LIKE or np.abs(factors / factor - 1.0).max() > _SAME_RATIO:
-        return None
-    return Slope(factor, float(correlation.min()))
+    q, summed = q[:, moving], summed[:, moving]
+    for width in sorted({max(2, len(q) // share) for share in EVIDENCE.stretches}):
+        moved, expected = q[width:] - q[:-width], summed[width:] - summed[:-width]
+        power = (expected**2).sum(axis=0)
+        inner = (moved * expected).sum(axis=0)
+        size = np.sqrt(power * (moved**2).sum(axis=0))
+        if not (size > 0).all():
+            continue
+        correlation, factors = float((inner / size).min()), inner / power
+        factor = float(inner.sum() / power.sum())
+        scatter = np.abs(factors / factor - 1.0).max()
+        if correlation >= EVIDENCE.like and scatter <= EVIDENCE.same_ratio:
+            return Slope(factor, correlation)
+    return None
 
 
 def crossed(q: Array, dq: Array, t: Array | None) -> bool:
@@ -105,18 +97,19 @@ def rollover(values: Array) -> float | None:
     """Return the size of the jumps where a counter starts again: equal, larger than any step."""
     steps = np.diff(values, axis=0)
     size = float(np.ptp(values))
-    large = np.abs(steps) > 0.8 * size
+    large = np.abs(steps) > EVIDENCE.jump * size
     jumps = np.abs(steps[large]) if size > 0 else np.empty(0)
     others = np.abs(steps[~large])
-    if not jumps.size or (others.size and others.max() > 0.2 * size):
+    if not jumps.size or (others.size and others.max() > EVIDENCE.small_step * size):
         return None
-    if np.ptp(jumps) > 0.1 * jumps.mean():
+    if np.ptp(jumps) > EVIDENCE.same_ratio * jumps.mean():
         return None
-    if (np.abs(steps[1:] + steps[:-1])[np.abs(steps[1:]) > 0.8 * size] < 0.2 * size).any():
+    back = np.abs(steps[1:] + steps[:-1])[np.abs(steps[1:]) > EVIDENCE.jump * size]
+    if (back < EVIDENCE.small_step * size).any():
         return None  # there and back again: numbers that mark a lost sample
-    candidates = (360.0, 2 * math.pi, 1.0, *map(float, RESOLUTIONS))
+    candidates = (360.0, 2 * math.pi, 1.0, *map(float, EVIDENCE.resolutions))
     near = min(candidates, key=lambda c: abs(jumps.max() - c) / c)
-    return near if abs(jumps.max() - near) / near < 0.1 else float(jumps.max())
+    return near if abs(jumps.max() / near - 1.0) < EVIDENCE.same_ratio else float(jumps.max())
 
 
 def quarter_turns(q: Array) -> dict[int, int]:
@@ -125,9 +118,9 @@ def quarter_turns(q: Array) -> dict[int, int]:
     Robots rest at right angles: a motor then stands at its gear ratio times quarter turns, in rad.
     Empty where one is at no quarter turn, or only one joint is, as by chance.
     """
-    far = np.flatnonzero(np.abs(q[0]) > 4.0 * math.pi)
+    far = np.flatnonzero(np.abs(q[0]) > EVIDENCE.far_start)
     start = q[0][far] / (0.5 * math.pi)
-    if start.size < 2 or np.abs(start - np.round(start)).max() > 2e-3:
+    if start.size <= 1 or np.abs(start - np.round(start)).max() > EVIDENCE.quarter_turn:
         return {}
     return {int(j): int(x) for j, x in zip(far, np.round(start), strict=True)}
 
@@ -138,7 +131,7 @@ def held(tau: Array, q: Array) -> Guess:
     if tau.shape == q.shape:
         steps = steps[np.abs(np.diff(q, axis=0)) > 0]
     share = float(np.mean(steps == 0)) if steps.size else 0.0
-    if share > 0.4 and np.unique(tau).size > 50:
+    if share > EVIDENCE.still and np.unique(tau).size > EVIDENCE.fewest:
         still = (
             f"{100 * share:.0f} % of the steps between samples are zero while the position moves"
         )
@@ -155,12 +148,12 @@ def sign_of(q: Array, tau: Array, links: Array | None = None) -> Guess:
     Dry friction turns with the speed: where a joint reverses, its torque jumps the same way, and
     all else is smooth. About each reversal, tau = a + b k + c k² + d k³ + F sign(dq); F is positive
     (Coulomb's law; Armstrong-Hélouvry 1991). Student's test of the mean F of a joint's reversals,
-    at `_FALSE_SIGN` over all joints. A jump that fits better elsewhere than at the reversal is no
+    at a small chance over all joints. A jump that fits better elsewhere than at the reversal is no
     friction at it: the position leads or lags the torque.
     """
     from scipy.special import stdtr
 
-    half = max(6, len(q) // 200)
+    half = max(EVIDENCE.least_half, len(q) // EVIDENCE.windows)
     step = max(1, half // 10)
     shifts = step * np.arange(-(half // 2 // step), half // 2 // step + 1)
     smooth = np.ones(max(3, half // 2)) / max(3, half // 2)
@@ -168,12 +161,12 @@ def sign_of(q: Array, tau: Array, links: Array | None = None) -> Guess:
     for j in range(q.shape[1]):
         speed = np.gradient(np.convolve(q[:, j], smooth, mode="same"))
         jumps, residuals = _jumps(speed, tau[:, j], half, shifts)
-        if len(jumps) < 3 or shifts[np.argmin(residuals)] != 0:
+        if len(jumps) < EVIDENCE.fewest_turns or shifts[np.argmin(residuals)] != 0:
             continue
         mean = float(np.mean(jumps))
         error = float(np.std(jumps, ddof=1)) / math.sqrt(len(jumps))
         chance = 2.0 * stdtr(len(jumps) - 1, -abs(mean) / max(error, 1e-300))
-        claims[j] = np.sign(mean) if chance < _FALSE_SIGN / q.shape[1] else 0.0
+        claims[j] = np.sign(mean) if chance < EVIDENCE.false_sign / q.shape[1] else 0.0
     weight = np.zeros(q.shape[1]) if links is None else links
     signs = np.where(weight != 0.0, weight, claims)
     wrong = ", ".join(str(j + 1) for j in np.flatnonzero(signs < 0))
@@ -221,27 +214,16 @@ def _jumps(
     return np.array(jumps), residuals
 
 
-@dataclass(frozen=True)
-class Config:
-    """The comparison of a torque with that of the robot's own links."""
+def units_of_ratio(factor: float, tolerance: float = EVIDENCE.same_ratio) -> tuple[str, str] | None:
+    """Return the units of position and velocity that are a factor apart, ("", "") where equal.
 
-    window: float = 0.1  # [s] of the local cubic (Savitzky & Golay 1964): moves take longer
-    fewest: int = 5  # samples in it: a cubic has four coefficients
-    changes: float = 0.1  # of the links' torque over the motion: else friction and noise dominate
-    explained: float = 0.5  # of the power that friction leaves, or the torque does not follow
-    most: float = 0.8  # of the links' torque is at joints they explain: not at a light wrist
-    slow: float = 0.01  # of a joint's fastest speed: below, it may rest and noise gives it a sign
-    alone: float = 0.99  # of the torque with its friction, a hundredth or more in any drive
-    gain: float = 3.0  # a payload as heavy as the links, whose masses are roughly known
-    unnamed_gain: float = 1.5  # without a unit: a share of a rated torque may be near it by chance
-    better: float = 0.5  # of the residual of one unit or order is that of another that fits better
-    proof: float = 0.1  # of the torque may be unexplained under the unit that is proved
-    friction: float = 0.3  # correlation of the rest with the direction of motion
-    samples: int = 4000  # of a recording that are compared: ten seconds of a fast one
-    samples_of_orders: int = 600  # of these, for each exchange of two joints
-
-
-_DEFAULT = Config()
+    A power of ten is of a wrong unit of time, not of angles: 0.1 is not the 0.105 of rad and rpm.
+    """
+    nearest = min(_ANGULAR_RATIOS, key=lambda ratio: abs(factor / ratio - 1.0))
+    off = abs(factor / nearest - 1.0)
+    if factor > 0 and off > abs(factor / 10.0 ** round(math.log10(factor)) - 1.0):
+        return None
+    return _ANGULAR_RATIOS[nearest] if off <= tolerance else None
 
 
 @dataclass(frozen=True)
@@ -265,7 +247,7 @@ def fits_by_unit(
     found: dict[str, LinkFit] = {}
     if len(torque) < FEWEST:
         return found  # the steps of time are too uneven
-    every = max(1, len(torque) // _DEFAULT.samples_of_orders)
+    every = max(1, len(torque) // LINKS.samples_of_orders)
     for unit, factor in factors.items():
         q_si, dq, ddq = _smooth(np.unwrap(q * factor, axis=0), t)
         links = model(q_si, dq, ddq)
@@ -277,43 +259,44 @@ def fits_by_unit(
     return found
 
 
-def best_unit(fits: Mapping[str, LinkFit], config: Config = _DEFAULT) -> tuple[str, bool]:
-    """Return the unit that explains the torque far better than any other, and whether it is proved.
+def best_unit(fits: Mapping[str, LinkFit], proved: bool = True) -> str:
+    """Return the unit that explains the torque far better than any other; "" where none does.
 
     Gears near 57 make radians of a motor look like degrees of a joint: proved is a unit in which
     torques are N m as well.
     """
     by_fit = sorted(fits, key=lambda unit: fits[unit].left)
     if not by_fit:
-        return "", False
+        return ""
     best = fits[by_fit[0]]
-    if len(by_fit) > 1 and best.left > config.better * fits[by_fit[1]].left:
-        return "", False
+    if len(by_fit) > 1 and best.left > LINKS.better * fits[by_fit[1]].left:
+        return ""
     logs = np.abs(np.log(np.abs(best.gains[np.isfinite(best.gains)])))
-    nearly_one = bool((logs < math.log(config.unnamed_gain)).all())
-    return by_fit[0], best.followed and best.varies and best.left < config.proof and nearly_one
+    sure = best.followed and best.varies and best.left < LINKS.proof
+    sure = sure and bool((logs < math.log(LINKS.unnamed_gain)).all())
+    return by_fit[0] if sure or not proved else ""
 
 
-def _fit_of_links(tau: Array, model: Array, dq: Array, config: Config = _DEFAULT) -> LinkFit:
+def _fit_of_links(tau: Array, model: Array, dq: Array) -> LinkFit:
     """Fit the recorded torque by that of the links' model and by friction.
 
     The model explains a joint's torque where it takes most of what friction leaves.
     """
     rest, links = _without_friction(tau, dq), _without_friction(model, dq)
     inner, power = (rest * links).sum(axis=0), (links**2).sum(axis=0)
-    explains = inner**2 > config.explained * (rest**2).sum(axis=0) * power
+    explains = inner**2 > LINKS.explained * (rest**2).sum(axis=0) * power
     gains = np.where(explains, inner / np.where(power > 0.0, power, 1.0), math.nan)
     # Not at rest, or one joint at even speeds:
-    varies = bool(power.sum() >= config.changes**2 * float(np.sum(model**2)))
-    followed = float(power[explains].sum()) > config.most * float(power.sum())
+    varies = bool(power.sum() >= LINKS.changes**2 * float(np.sum(model**2)))
+    followed = float(power[explains].sum()) > LINKS.most * float(power.sum())
     residual = tau - np.nan_to_num(gains) * model
     unexplained = np.var(residual, axis=0).sum()
-    alone = bool(unexplained < (1.0 - config.alone) * np.var(tau, axis=0).sum())
+    alone = bool(unexplained < (1.0 - LINKS.alone) * np.var(tau, axis=0).sum())
     signs = np.sign(np.nan_to_num(gains))
     x, y = (v - v.mean(axis=0) for v in (residual, np.sign(dq)))
     size = np.sqrt((x**2).sum(axis=0) * (y**2).sum(axis=0))
     friction = (x * y).sum(axis=0) / np.where(size > 0.0, size, 1.0)
-    signs = np.where(signs * friction > config.friction, signs, 0.0)
+    signs = np.where(signs * friction > LINKS.friction, signs, 0.0)
     return LinkFit(gains, followed, alone, varies, _left(rest, links, tau), signs)
 
 
@@ -321,7 +304,7 @@ def _without_friction(values: Array, dq: Array) -> Array:
     """Return the residual of sign(dq), dq and 1, joint by joint; friction at rest may be any."""
     rest = np.empty_like(values)
     for j in range(values.shape[1]):
-        slow = max(_DEFAULT.slow * float(np.abs(dq[:, j]).max()), 1e-300)
+        slow = max(LINKS.slow * float(np.abs(dq[:, j]).max()), 1e-300)
         columns = [np.clip(dq[:, j] / slow, -1.0, 1.0), dq[:, j], np.ones(len(dq))]
         friction = np.column_stack(columns)
         numbers = np.linalg.lstsq(friction, values[:, j], rcond=None)[0]
@@ -338,58 +321,45 @@ def _left(rest: Array, links: Array, tau: Array) -> float:
     return float(np.mean(((rest - gain * links) ** 2).mean(axis=0) / size))
 
 
-Motion = tuple[Array, Array, Array]  # q, dq, ddq
-# Words, and pairs of a torque, the links' torque, and a speed (samples, joints).
-Meanings = Iterator[tuple[str, list[Motion]]]
+def _left_of(tau: Array, links: Array, dq: Array) -> float:
+    return _left(_without_friction(tau, dq), _without_friction(links, dq), tau)
 
 
 def _otherwise(model: TorqueModel, motion: Motion, tau: Array) -> str:
-    """Return under which other meaning of the joints the links explain the torque far better."""
-    links = model(*motion)
+    """Return under which other meaning q' = N^-1 q the links explain the torque far better.
+
+    Two joints the other way round, in the torque alone or in the motion as well; or a joint counted
+    from the link before the last, with either sign of that. The torque is then the joints' or,
+    where a drive turns it by such a rod, N^T times the drives'.
+    """
+    links, n = model(*motion), tau.shape[1]
     if links is None:
         return ""
-    best, found = _DEFAULT.better * _left_of(tau, links, motion[1]), ""
-    meanings = itertools.chain(_exchanged(model, motion, links, tau), _coupled(model, motion, tau))
-    for words, candidates in meanings:
-        left = min((_left_of(*candidate) for candidate in candidates), default=math.inf)
+    changes: list[tuple[str, Array, bool]] = []
+    for a, b in itertools.combinations(range(n), 2):
+        exchange = np.eye(n)
+        exchange[[a, b]] = exchange[[b, a]]
+        words = f"joints {a + 1} and {b + 1} exchanged: in which order are they?"
+        changes.append((words, exchange, True))
+    for a, sign in itertools.product(range(n - 1), (1.0, -1.0)):
+        back = np.eye(n)  # N^-1
+        back[a + 1, a] = -sign
+        words = f"joint {a + 2} counted from link {a}, not from link {a + 1}"
+        changes.append((f"{words}: is it, or are two drives coupled?", back, False))
+    best, found = LINKS.better * _left_of(tau, links, motion[1]), ""
+    for words, change, exchanged in changes:
+        q, dq, ddq = (x @ change.T for x in motion)
+        other = model(q, dq, ddq)
+        left = _left_of(tau @ change.T, links, motion[1]) if exchanged else math.inf
+        if other is not None:
+            left = min(left, _left_of(tau, other @ change, motion[1]))
+            left = left if exchanged else min(left, _left_of(tau, other, dq))
         if left < best:
             best, found = left, words
     return found
 
 
-def _exchanged(model: TorqueModel, motion: Motion, links: Array, tau: Array) -> Meanings:
-    """Yield each two joints the other way round, in the torque alone or in the motion as well."""
-    for a, b in itertools.combinations(range(tau.shape[1]), 2):
-        order = np.arange(tau.shape[1])
-        order[[a, b]] = b, a
-        q, dq, ddq = (x[:, order] for x in motion)
-        other = model(q, dq, ddq)
-        both = [] if other is None else [(tau[:, order], other, dq)]
-        words = f"joints {a + 1} and {b + 1} exchanged: in which order are they?"
-        yield words, [(tau[:, order], links, motion[1]), *both]
-
-
-def _coupled(model: TorqueModel, motion: Motion, tau: Array) -> Meanings:
-    """Yield each joint counted from the link before the last, with either sign of that: q' = N q.
-
-    The torque is the joints' or, where a drive turns it by such a rod, N^T times the drives'.
-    """
-    for a, sign in itertools.product(range(tau.shape[1] - 1), (1.0, -1.0)):
-        back = np.eye(tau.shape[1])  # N^-1
-        back[a + 1, a] = -sign
-        q, dq, ddq = (x @ back.T for x in motion)
-        links = model(q, dq, ddq)
-        counted = f"joint {a + 2} counted from link {a}, not from link {a + 1}"
-        if links is not None:
-            words = f"{counted}: is it, or are two drives coupled?"
-            yield words, [(tau, links, dq), (tau, links @ back, motion[1])]
-
-
-def _left_of(tau: Array, links: Array, dq: Array) -> float:
-    return _left(_without_friction(tau, dq), _without_friction(links, dq), tau)
-
-
-def unlike_links(fit: LinkFit, factor: float, named: bool, config: Config = _DEFAULT) -> str:
+def unlike_links(fit: LinkFit, factor: float, named: bool) -> str:
     """Return how torques differ from those of the robot's links; `factor` is their unit in SI."""
     known = factor * fit.gains[np.isfinite(fit.gains)]
     if not (fit.followed or named):
@@ -398,22 +368,22 @@ def unlike_links(fit: LinkFit, factor: float, named: bool, config: Config = _DEF
     if not known.size:
         return ""
     off = float(known[np.argmax(np.abs(np.log(np.abs(known))))])
-    most = config.gain if named else config.unnamed_gain
+    most = LINKS.gain if named else LINKS.unnamed_gain
     if 1.0 / most <= abs(off) <= most:
         return ""
     times = f"{off:.3g} times what weight and inertia of the robot's own links ask for at one joint"
     return f"{times}: a share of a rated torque, or the motor's side?"
 
 
-def _smooth(q: Array, t: Array, config: Config = _DEFAULT) -> Motion:
+def _smooth(q: Array, t: Array) -> Motion:
     """Return values and two derivatives (samples, joints) by local cubics, where no gap is near."""
     from scipy.signal import savgol_filter
 
     step = float(np.median(np.diff(t)))
-    width = max(config.fewest, min(round(config.window / step), (len(q) - 1) // 2) | 1)
+    width = max(LINKS.fewest, min(round(LINKS.window / step), (len(q) - 1) // 2) | 1)
     half = width // 2
     lasts = t[2 * half :] - t[: -2 * half]  # a window over a gap lasts longer
     some = half + np.flatnonzero(np.abs(lasts - (width - 1) * step) < 0.5 * width * step)
-    some = some[:: max(1, len(some) // config.samples)]
+    some = some[:: max(1, len(some) // LINKS.samples)]
     q, dq, ddq = (savgol_filter(q, width, 3, deriv=k, delta=step, axis=0)[some] for k in range(3))
     return q, dq, ddq

@@ -12,45 +12,30 @@ import json
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from pipelines.errors import InputRejected, clean
+from pipelines.errors import clean
 from pipelines.importers.clock import median_step, round_rate
-from pipelines.importers.column_groups import (
-    Choice,
-    Group,
-    lost_numbers,
-    sound_samples,
-    texts_of,
-    unit_of_group,
-    without_lost_rows,
-)
+from pipelines.importers.config import CHOICE, EVIDENCE, NOTES
 from pipelines.importers.evidence import Guess, held
+from pipelines.importers.groups import Choice, Group, texts_of, unit_of_group
 from pipelines.importers.inference import Inference, Model, unit_of_joint
+from pipelines.importers.notes import stated_gear, stated_of_some_joints, stated_scale
 from pipelines.importers.raw import RawTable
-from pipelines.importers.reading import (
-    arm_beside,
-    files_beside,
-    read_recording,
-    with_companion,
-)
-from pipelines.importers.recipe import BLANK
-from pipelines.importers.sources import read_table
-from pipelines.importers.stated import stated_gear, stated_of_some_joints, stated_scale
-from pipelines.importers.unit_guess import velocity_unit, whole
+from pipelines.importers.recipe import BLANK, blanks_of
+from pipelines.importers.recording import read_recording
+from pipelines.importers.units_of_draft import velocity_unit, whole
+from pipelines.io.sandbox import parse_toml
 from pipelines.io.units import UNITS
 
-__all__ = ["Draft", "guess_recipe"]
-
-_MOST_COLUMNS = 2000
-_ONE_JOINT = """[robot]                                 # check: one joint, about the z axis
+_ONE_JOINT = f"""[robot]                                 # check: one joint, about the z axis
 name = "one-joint"
 # gravity: [0.0, 0.0, -9.81] on a vertical axis, where it does no work; \
 [0.0, -9.81, 0.0] on a horizontal one
-gravity = "FILL IN"
+gravity = "{BLANK}"
 
 [robot.kinematics]
 convention = "dh"
@@ -73,7 +58,13 @@ class Draft:
 
     text: str
     evidence: tuple[str, ...]
-    blanks: tuple[str, ...]  # what must be filled in before it runs
+
+    @property
+    def blanks(self) -> tuple[str, ...]:
+        """Return what must be filled in before it runs: "robot.use", "signals.q", …"""
+        places = (re.sub(r"\.columns?$|\[\d+\]$", "", x) for x in blanks_of(parse_toml(self.text)))
+        whole = tuple(dict.fromkeys(places))
+        return tuple(x for x in whole if x.removesuffix(".unit") not in set(whole) - {x})
 
 
 def guess_recipe(path: Path, robot: str | None = None, model: Model | None = None) -> Draft:
@@ -87,33 +78,15 @@ def guess_recipe(path: Path, robot: str | None = None, model: Model | None = Non
     Raises:
         InputRejected: the file cannot be read as a table of numbers.
     """
-    table = read_table(path)
-    if len(table.columns) > _MOST_COLUMNS:
-        message = f"{len(table.columns)} columns: too many to guess what each is"
-        remedy = "export the joints' signals alone, or write the recipe"
-        raise InputRejected("F16", message, where=path, remedy=remedy)
-    table, count = without_lost_rows(table)
-    lost_rows = f"{count} of {table.rows.size} rows" if count else ""
-    lost = lost_numbers(table)
-    table = sound_samples(table, lost)
-    reading = read_recording(path, table, arm_beside(path.parent, robot))
-    companion, beside = files_beside(reading)
-    reading = replace(reading, beside=beside)
-    if companion is not None:
-        companion = sound_samples(without_lost_rows(companion)[0], lost)
-        same = np.array_equal(companion.rows, table.rows)
-        reading = with_companion(reading, companion if same else None)
-    return _Drafting(Inference(reading, model), lost, lost_rows).draft()
+    return _Drafting(Inference(read_recording(path, robot), model)).draft()
 
 
 class _Drafting:
-    """The lines of a draft. Not frozen: it collects evidence and blanks on the way."""
+    """The lines of a draft. Not frozen: it collects evidence on the way."""
 
-    def __init__(self, found: Inference, lost: Sequence[float], lost_rows: str) -> None:
+    def __init__(self, found: Inference) -> None:
         self.found, self.reading = found, found.reading
-        self.lost, self.lost_rows = lost, lost_rows
         self.evidence: list[str] = []
-        self.blanks: list[str] = []
         self.current = found.current
 
     def note(self, what: str, guess: Guess) -> str:
@@ -122,66 +95,58 @@ class _Drafting:
         self.evidence.append(f"{what}: {guess.value or 'open'} ({guess.confidence}: {why})")
         return f"# {'check: ' if guess.confidence != 'sure' else ''}{guess.confidence}, {why}"
 
-    def blank(self, what: str) -> str:
-        self.blanks.append(what)
-        return BLANK
-
     def draft(self) -> Draft:
-        table = self.reading.table
-        name = clean(self.reading.path.name, 80)
+        table, name = self.reading.table, clean(self.reading.path.name, 80)
         columns = ", ".join(clean(c, 40) for c in table.columns)
         size = f"{table.rows.size} samples, columns {columns}"
-        run = "rrrid import RECIPE.toml --source FOLDER"
         lines = [
             f"# Drafted by `rrrid import --guess {name}`: {size}.",
             *(f"# {clean(c.message, 200)}." for c in table.checks if c.level != "ok"),
-            f'# Go through every "check:" and fill in what says {BLANK}; then: {run}',
-            *("", *self._robot(), *self._log(), *self._time(), "[signals]", *self._remarks()),
-            *(*self._position(), *self._velocity(), *self._torque(), "", *self._drive()),
-            *(*self._missing(), *self._resample()),
+            f'# Go through every "check:" and fill in what says {BLANK}; then: '
+            "rrrid import RECIPE.toml --source FOLDER",
+            *("", *self._robot(), "[log]"),
+            f"match = {_quoted(self.reading.path.name)}      "
+            '# a pattern such as "run_{number}.csv" takes many files',
+            'experiment = "free"                     '
+            "# check: friction | excitation | writing | frf | hold | free",
+            'role = "identify"                       # check: identify | validate | reference',
+            *(self._held(), "", "[time]", *self._time(), "", *self._map_hint(), "[signals]"),
+            *(*self._sentences(), *self._position(), *self._velocity(), *self._torque()),
+            *("", *self._drive(), "", *self._missing(), *self._resample()),
         ]
-        return Draft("\n".join(lines) + "\n", tuple(self.evidence), tuple(self.blanks))
+        return Draft("\n".join(lines) + "\n", tuple(self.evidence))
 
     def _robot(self) -> list[str]:
         arm, n = self.reading.arm, self.found.n
         if len(arm.files) == 1:
-            beside = "check: likely, the robot beside the recording"
-            why = "as --robot says" if arm.named else beside
+            why = (
+                "as --robot says" if arm.named else "check: likely, the robot beside the recording"
+            )
             lines = ["[robot]", f"use = {_quoted(arm.files[0])}   # {why}"]
             if arm.problem:
                 self.evidence.append(f"robot: {clean(arm.problem, 300)}")
                 lines.append(f"# {clean(arm.problem, 300)}")
-                if "tip_link" in arm.problem:
-                    lines.append(f'tip_link = "{self.blank("robot.tip_link")}"')
+                lines += [f'tip_link = "{BLANK}"'] if "tip_link" in arm.problem else []
             return [*lines, ""]
         known = self.reading.q.group or self.reading.tau.group
         if not arm.files and known and n == 1 and not self.reading.sisters:
-            self.blanks.append("robot.gravity")
             return _ONE_JOINT.split("\n")
         which = "robot.toml, a URDF, or a shipped name"
         if arm.files:
             which = f"one of {', '.join(clean(file, 40) for file in arm.files)}"
         joints = f" of {n} joints" if known and n > 1 else ""
-        use = f'use = "{self.blank("robot.use")}"   # the robot{joints}: {which}'
-        return ["[robot]", use, *self._sister_lines(), ""]
+        return ["[robot]", f'use = "{BLANK}"   # the robot{joints}: {which}', *self._sisters(), ""]
 
-    def _log(self) -> list[str]:
-        pattern = '# a pattern such as "run_{number}.csv" takes many files'
-        return [
-            "[log]",
-            f"match = {_quoted(self.reading.path.name)}      {pattern}",
-            'experiment = "free"                     '
-            "# check: friction | excitation | writing | frf | hold | free",
-            'role = "identify"                       # check: identify | validate | reference',
-            self._held(),
-            "",
-        ]
+    def _sisters(self) -> list[str]:
+        files = ", ".join(clean(name, 40) for name in self.reading.sisters[:8])
+        line = f"    # one file a joint? beside this one are {files}: join them, one column a joint"
+        return [line] if files else []
 
     def _held(self) -> str:
         """Return `torque = …`: by the name of its columns, else by whether it is held."""
-        group = self.reading.tau.group
+        group, tau, q = self.reading.tau.group, self.found.tau, self.found.q
         column = f"column '{clean(group.columns[0], 40)}'" if group else ""
-        if group is None:
+        if group is None or tau is None:
             why = 'the torque is open; "held-command" where the drive was commanded'
             guess = Guess("measured", "unsure", why)
         elif group.origin == "commanded":
@@ -191,47 +156,36 @@ class _Drafting:
         elif group.origin == "measured":
             guess = Guess("measured", "sure", f"{column} is named a measurement")
         else:
-            tau, q = self.found.tau, self.found.q
-            assert tau is not None
             guess = held(tau, q if q is not None else tau)
         return f'torque = "{guess.value}"   {self.note("torque", guess)}'
 
     def _time(self) -> list[str]:
+        """Return [time]: a column, or the rate that the file states or a velocity shows."""
         clock, found = self.reading.clock, self.found
+        known = math.isfinite(found.rate)
+        rate = f"rate = {found.rate:g}   {self.note('rate', found.rate_guess)}" if known else ""
         if clock is None:
-            return self._rate()
+            self.evidence += [] if known else ["rate: no column of time"]
+            why = found.rate_guess.why or "no column rises steadily, so only you know it"
+            blank = f'rate = "{BLANK}"                        # Hz; {clean(why, 200)}'
+            return [rate or blank]
         if clock.paired:
-            columns = f"column = [{', '.join(map(_quoted, clock.columns))}]"
-            units = f'unit = ["{clock.units[0]}", "{clock.units[1]}"]'
-            return ["[time]", columns, f"{units}   {self.note('time unit', found.clock_guess)}", ""]
-        unit = found.clock_unit or self.blank("time.unit")
-        lines = ["[time]", f"column = {_quoted(clock.columns[0])}"]
+            columns, units = (", ".join(map(_quoted, x)) for x in (clock.columns, clock.units))
+            note = self.note("time unit", found.clock_guess)
+            return [f"column = [{columns}]", f"unit = [{units}]   {note}"]
+        unit = found.clock_unit or BLANK
+        lines = [f"column = {_quoted(clock.columns[0])}"]
         lines.append(f'unit = "{unit}"   {self.note("time unit", found.clock_guess)}')
-        if found.clock_unit == "sample" and math.isfinite(found.rate):
-            lines.append(f"rate = {found.rate:g}   {self.note('rate', found.rate_guess)}")
-        elif found.clock_unit == "sample":
-            lines.append(f'rate = "{self.blank("time.rate")}"   # Hz')
-        return [*lines, ""]
-
-    def _rate(self) -> list[str]:
-        """Return [time] without a column: the rate that the file states, or a velocity shows."""
-        rate, guess = self.found.rate, self.found.rate_guess
-        if math.isfinite(rate):
-            return ["[time]", f"rate = {rate:g}   {self.note('rate', guess)}", ""]
-        self.evidence.append("rate: no column of time")
-        self.blanks.append("time.rate")
-        why = clean(guess.why or "no column rises steadily, so only you know it", 200)
-        blank = f'rate = "{BLANK}"                        # Hz; {why}'
-        return ["[time]", blank, *self._map_hint(), ""]
+        return [*lines, rate or f'rate = "{BLANK}"   # Hz'] if unit == "sample" else lines
 
     def _map_hint(self) -> list[str]:
         """Return a hint where positions rise in even steps without a clock: no motion, a map."""
         group, q = self.reading.q.group, self.found.q
-        steps = np.diff(q[:, 0]) if q is not None and q.shape[1] == 1 else np.zeros(0)
-        even = (steps > 0).all() or (steps < 0).all()
-        if group is None or steps.size < 10 or not even:
+        if self.reading.clock is not None or math.isfinite(self.found.rate):
             return []
-        if np.std(steps) > 0.2 * abs(np.mean(steps)):
+        steps = np.diff(q[:, 0]) if q is not None and q.shape[1] == 1 else np.zeros(0)
+        rising = steps.size >= EVIDENCE.map_least and ((steps > 0).all() or (steps < 0).all())
+        if group is None or not rising or np.std(steps) > EVIDENCE.map_even * abs(np.mean(steps)):
             return []
         self.evidence.append("positions rise in even steps without a clock: a map")
         name, file = clean(group.columns[0], 40), _quoted(self.reading.path.name)
@@ -243,10 +197,13 @@ class _Drafting:
             f"#     [[table]] match = {file}, {columns}",
         ]
 
-    def _remarks(self) -> list[str]:
+    def _sentences(self) -> list[str]:
         """Return the file's sentences about some joints alone: a zero, a sign, a coupling."""
-        notes = stated_of_some_joints(self.reading.table.notes, self.found.n)[:3]
-        said = [f"the file says '{clean(line, 200)}'" for line in notes]
+        notes = self.reading.table.notes
+        said = [
+            f"the file says '{clean(line, 200)}'"
+            for line in stated_of_some_joints(notes, self.found.n)[: NOTES.most_sentences]
+        ]
         self.evidence += [f"joints: {words}" for words in said]
         return [f"# check: {words}: do the numbers below need it?" for words in said]
 
@@ -256,10 +213,8 @@ class _Drafting:
         if choice.group is None or q is None or doubt is not None:
             return self._open("q", choice, doubt)
         units, further, why = self.found.position_units(choice.group)
-        if BLANK in further:
-            self.blanks.append("signals.q.counts_per_rev")
-        columns, unit = _columns(choice.group.columns, table), self._units("q", units)
-        lines = [f"q = {{ {columns}, unit = {unit}{further} }}"]
+        columns = _columns(choice.group.columns, table)
+        lines = [f"q = {{ {columns}, unit = {_units(units)}{further} }}"]
         lines += [f"    {self.note('q unit', guess)}" for guess in why]
         lines += self._as_stated(choice.group, table) + _order(choice.group)
         if still := [str(j + 1) for j in np.flatnonzero(np.ptp(q, axis=0) == 0.0)]:
@@ -268,42 +223,35 @@ class _Drafting:
 
     def _as_stated(self, group: Group, table: RawTable) -> list[str]:
         """Return a comment with the file's words that state a unit, or contradict each other."""
-        said = self.found.statement(group.quantity, False, group.motor, table)
+        said = self.found.statement(group, False, table)
         if said is None or None not in unit_of_group(group.columns, table):
             return []
         words = f"the file states {clean(said.words, 200)}"
         self.evidence.append(f"{group.quantity}: {words}")
         return [f"    # check: {'' if said.value else 'contradictory, '}{words}"]
 
-    def _units(self, signal: str, units: Sequence[str]) -> str:
-        """Return the unit in TOML: one text, or one a joint; FILL IN where one is open."""
-        if "" in units:
-            self.blanks.append(f"signals.{signal}.unit")
-        words = [unit or BLANK for unit in units]
-        return f'"{words[0]}"' if len(set(words)) == 1 else f"[{', '.join(map(_quoted, words))}]"
-
     def _velocity(self) -> list[str]:
         """Return the line of a velocity that is the slope of the position; else a comment."""
         group, slope, table = self.reading.dq.group, self.found.slope, self.reading.table
-        position = self.reading.q.group
+        position, found = self.reading.q.group, self.found
         if group is None:
             return []
-        left_out = [f"    # left out: {group.words} (velocity), {_columns(group.columns, table)}"]
-        if slope is None or self.found.t is None or position is None:
-            return left_out
-        if any(joint.type != "revolute" for joint in self.found.joints):
-            return left_out
-        doubt = self.found.doubt("q", position, self.reading.tau.group)
-        if self.found.out_of_order(group) or position.order != group.order or doubt is not None:
-            return left_out
-        named = self.found.named(group, table)[0]
-        unit = velocity_unit(slope, self.found.position_units(position)[0][0])
-        if not unit or UNITS.get(named or unit) != UNITS[unit]:
-            return left_out
+        unit = ""
+        if slope is not None and found.t is not None and position is not None:
+            open_order = found.out_of_order(group) or position.order != group.order
+            doubt = found.doubt("q", position, self.reading.tau.group)
+            turns = all(joint.type == "revolute" for joint in found.joints)
+            if turns and not open_order and doubt is None:
+                unit = velocity_unit(slope, found.position_units(position)[0][0])
+                named = found.named(group, table)[0]
+                unit = unit if UNITS.get(named or unit) == UNITS.get(unit) else ""
+        columns = _columns(group.columns, table)
+        if not unit or slope is None:
+            return [f"    # left out: {group.words} (velocity), {columns}"]
         why = f"the position's slope is {slope.factor:.4g} times it"
-        why += "; remove the line where it was not measured"
-        line = f"dq = {{ {_columns(group.columns, table)}, unit = {_quoted(unit)} }}"
-        return [line, f"    {self.note('dq unit', Guess(unit, 'likely', why))}"]
+        guess = Guess(unit, "likely", f"{why}; remove the line where it was not measured")
+        line = f"dq = {{ {columns}, unit = {_quoted(unit)} }}"
+        return [line, f"    {self.note('dq unit', guess)}"]
 
     def _torque(self) -> list[str]:
         choice, table = self.reading.tau, self.reading.torque_table
@@ -331,22 +279,21 @@ class _Drafting:
             self.evidence.append(f"tau scale: the file states {clean(scale.words, 200)}")
         sign = found.sign
         if sign.value.endswith("?"):
-            further += f', sign = "{self.blank("signals.tau.sign")}"'
+            further += f', sign = "{BLANK}"'
         elif sign.value != "as recorded":
             further += f", sign = {sign.value}"
-        columns, unit = _columns(group.columns, table), self._units("tau", units)
-        lines = [f"tau = {{ {columns}, unit = {unit}{further} }}"]
+        columns = _columns(group.columns, table)
+        lines = [f"tau = {{ {columns}, unit = {_units(units)}{further} }}"]
         lines += [f"    {self.note('tau unit', guess)}", *_order(group)]
         lines += self._as_stated(group, table)
-        if sign.why:
-            lines.append(f"    {self.note('sign', sign)}")
+        lines += [f"    {self.note('sign', sign)}"] if sign.why else []
         return [*lines, *_also(choice, table)]
 
     def _open(self, signal: str, choice: Choice, doubt: str | None = None) -> list[str]:
         """Return a blank line with the candidates, and why none of them was taken."""
         table = self.reading.torque_table if signal == "tau" else self.reading.table
-        line = f'{signal} = {{ columns = "{self.blank(f"signals.{signal}")}", unit = "{BLANK}" }}'
-        found = [*([choice.group] if choice.group else []), *choice.others]
+        line = f'{signal} = {{ columns = "{BLANK}", unit = "{BLANK}" }}'
+        found = choice.left_open.others
         if not found:
             items = list(table.text.items())[:5]
             left = ", ".join(f"{clean(name, 40)} ({clean(text, 80)})" for name, text in items)
@@ -361,12 +308,11 @@ class _Drafting:
         named = texts_of(table, ()) if found[0].order == "text" else ()
         texts = ", ".join(clean(text, 40) for text in named)
         order = f"these are {texts}" if texts else "in the order of the file"
-        ask = f"{order}; write them from the base to the tip"
         first = choice.group if not doubt else None
-        lines += self._sister_lines()
+        lines += self._sisters()
         for group in found[:8]:
-            what = ask if group is first else "candidate"
-            lines.append(f"    # {what}: {_columns(group.columns, table)}{self._file(table)}")
+            ask = f"{order}; write them from the base to the tip" if group is first else "candidate"
+            lines.append(f"    # {ask}: {_columns(group.columns, table)}{self._file(table)}")
         if beside := [f"file = {_quoted(name)}" for name in self.reading.beside[:8]]:
             lines.append(f"    # as many columns and rows: {', '.join(beside)}")
         return [*lines, *(self._other_files() if signal == "tau" and not beside else ())]
@@ -378,70 +324,57 @@ class _Drafting:
         """Return a comment with files of this folder whose names differ in more than numbers."""
         path = self.reading.path
         alike = re.sub(r"\d+", "#", path.name)
-        near = sorted(path.parent.glob(f"*{glob.escape(path.suffix)}"))[:200]
-        names = [p.name for p in near if p.suffix == path.suffix and p.name[0] != "." and p.is_file()]
+        near = sorted(path.parent.glob(f"*{glob.escape(path.suffix)}"))[: CHOICE.most_files]
+        names = [
+            p.name for p in near if p.suffix == path.suffix and p.name[0] != "." and p.is_file()
+        ]
         others = [_quoted(name) for name in names if re.sub(r"\d+", "#", name) != alike]
         files = " or ".join(others[:4])
         return [f"    # if the torques are in another file: file = {files}"] if others else []
 
-    def _sister_lines(self) -> list[str]:
-        sisters = self.reading.sisters
-        files = ", ".join(clean(name, 40) for name in sisters[:8])
-        line = f"    # one file a joint? beside this one are {files}: join them, one column a joint"
-        return [line] if sisters else []
-
     def _drive(self) -> list[str]:
-        """Return [drive]: a blank where positions are the motors', else a comment."""
-        gear = self._stated_gear()
+        """Return [drive]: a blank where positions are the motors', else a comment.
+
+        Stated gear ratios and torque constants are quoted for a person to confirm.
+        """
+        notes, n = self.reading.table.notes, self.found.n
+        gear, lines = stated_gear(notes), []
+        if gear is not None:
+            listed = ", ".join([f"{gear.number:g}"] * n)
+            ratios = f": transmission = [{listed}]" if gear.value else ""
+            said = f"the file states '{clean(gear.words.strip(chr(39)), 200)}'"
+            lines = [f"# {said}{ratios}, + where motor and joint turn alike"]
         if self.found.of_motors:
-            ratio = (
-                f'transmission = "{self.blank("drive.transmission")}"   # gear ratio of each joint'
-            )
+            ratio = f'transmission = "{BLANK}"   # gear ratio of each joint; '
             lines = [
                 f"[drive]                  # of motors, by name, note or start: {_MOTORS}",
-                f"{ratio}; remove [drive] where they are the joints'",
-                *gear,
+                f"{ratio}remove [drive] where they are the joints'",
+                *lines,
             ]
         else:
-            example = f"# transmission = [{', '.join(['100.0'] * self.found.n)}]"
             mark = "" if self.current else "# "
             lines = [
                 f"{mark}[drive]                # where numbers are motor side: {_MOTORS}",
-                *(gear or [example]),
+                *(lines or [f"# transmission = [{', '.join(['100.0'] * n)}]"]),
             ]
         if self.current:
-            lines += self._stated_constants()
-            constant = f'torque_constant = "{self.blank("drive.torque_constant")}"'
+            said_of = [note.strip("# ") for note in notes if _TORQUE_CONSTANT.search(note)][:3]
+            lines += [f"# the file states '{clean(line, 200)}'" for line in said_of]
+            constant = f'torque_constant = "{BLANK}"'
             lines.append(f"{constant}             # N m/A, motor side: from the data sheet")
-        return [*lines, ""]
-
-    def _stated_gear(self) -> list[str]:
-        """Return the stated gear ratios, for a person to confirm with their signs."""
-        gear = stated_gear(self.reading.table.notes)
-        if gear is None:
-            return []
-        listed = ", ".join([f"{gear.number:g}"] * self.found.n)
-        ratios = f": transmission = [{listed}]" if gear.value else ""
-        said = f"the file states '{clean(gear.words.strip(chr(39)), 200)}'"
-        return [f"# {said}{ratios}, + where motor and joint turn alike"]
-
-    def _stated_constants(self) -> list[str]:
-        """Return comments with the file's lines about torque constants."""
-        notes = self.reading.table.notes
-        said = [note.strip("# ") for note in notes if _TORQUE_CONSTANT.search(note)][:3]
-        return [f"# the file states '{clean(line, 200)}'" for line in said]
+        return lines
 
     def _missing(self) -> list[str]:
         """Return [missing] with what marks a lost sample: numbers, rows of zeros; or nothing."""
-        lines = []
-        if self.lost:
+        lines, lost, rows = [], list(self.reading.lost), self.reading.lost_rows
+        if lost:
             why = "far from all other numbers of its column, in several cells: a lost sample"
-            guess = Guess(str(self.lost), "likely", why)
-            lines.append(f"values = {self.lost}   {self.note('missing', guess)}")
-        if self.lost_rows:
-            why = f"{self.lost_rows} are zero in all that was measured, far from those around"
-            guess = Guess("rows of zeros", "likely", why)
-            lines.append(f"rows = [0.0]   {self.note('missing', guess)}")
+            note = self.note("missing", Guess(str(lost), "likely", why))
+            lines.append(f"values = {lost}   {note}")
+        if rows:
+            why = f"{rows} are zero in all that was measured, far from those around"
+            note = self.note("missing", Guess("rows of zeros", "likely", why))
+            lines.append(f"rows = [0.0]   {note}")
         return ["[missing]", *lines, ""] if lines else []
 
     def _resample(self) -> list[str]:
@@ -449,7 +382,7 @@ class _Drafting:
             return []
         steps, median = np.diff(self.found.t), median_step(self.found.t)
         uneven = float(np.percentile(np.abs(steps - median), 95)) / median
-        if uneven < 0.05:
+        if uneven < EVIDENCE.even:
             even = f"time is even within {100 * uneven:.2g} %"
             self.evidence.append(even)
             return [f"# {even}, every {1e3 * median:.6g} ms: nothing to resample"]
@@ -458,6 +391,12 @@ class _Drafting:
         why += f"{1e3 * median:.4g} ms: the next round rate below, so that no sample is invented"
         note = self.note("resample", Guess(f"{rate:g} Hz", "likely", why))
         return ["[resample]", f"rate = {rate:g}   {note}", 'method = "spline"']
+
+
+def _units(units: Sequence[str]) -> str:
+    """Return the unit in TOML: one text, or one a joint; FILL IN where one is open."""
+    words = [_quoted(unit or BLANK) for unit in units]
+    return words[0] if len(set(words)) == 1 else f"[{', '.join(words)}]"
 
 
 def _order(group: Group) -> list[str]:
@@ -486,11 +425,9 @@ def _columns(names: Sequence[str], table: RawTable) -> str:
     if len(names) == 1:
         return f"column = {_quoted(names[0])}"
     before, one, after = names[0].rpartition("1")
-    pattern = f"{before}{{j}}{after}" if one else names[0]
-    counted = [pattern.replace("{j}", str(j)) for j in range(1, len(names) + 2)]
-    complete = counted[:-1] == list(names) and counted[-1] not in table.columns
-    if "{j}" in pattern and complete:
-        return f"columns = {_quoted(pattern)}"
+    counted = [f"{before}{j}{after}" for j in range(1, len(names) + 2)]
+    if one and counted[:-1] == list(names) and counted[-1] not in table.columns:
+        return f"columns = {_quoted(f'{before}{{j}}{after}')}"
     return f"columns = [{', '.join(map(_quoted, names))}]"
 
 

@@ -2,7 +2,7 @@
 
 Names, lines of the file, numbers and the robot's links are the evidence. Each finding is a value
 with its confidence and reasons; where these contradict each other, or say nothing, the value is ""
-and the draft has a blank. `guess` writes the findings as a recipe.
+and the draft has a blank. `units_of_draft` judges numbers, `guess` writes the findings as a recipe.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from functools import cached_property, partial
 import numpy as np
 
 from pipelines.errors import clean
-from pipelines.importers.clock import SECONDS, clock_as_stated, rate_as_stated, round_rate
-from pipelines.importers.column_groups import Group, unit_of_group
+from pipelines.importers.clock import SECONDS, clock_as_stated, round_rate
+from pipelines.importers.config import EVIDENCE
 from pipelines.importers.evidence import (
     Guess,
     LinkFit,
@@ -25,29 +25,29 @@ from pipelines.importers.evidence import (
     fits_by_unit,
     quarter_turns,
     sign_of,
+    units_of_ratio,
     unlike_links,
 )
-from pipelines.importers.raw import RawTable
-from pipelines.importers.reading import BY_FILE, WITHOUT_NAME, Reading, matrix
-from pipelines.importers.stated import (
+from pipelines.importers.groups import Group, unit_of_group
+from pipelines.importers.notes import (
     Statement,
     stated_counts,
     stated_gear,
     stated_rate,
     stated_unit,
 )
-from pipelines.importers.unit_guess import (
+from pipelines.importers.raw import RawTable
+from pipelines.importers.recording import BY_FILE, WITHOUT_NAME, Reading, matrix
+from pipelines.importers.units_of_draft import (
     PositionEvidence,
     is_share,
     position_unit,
     slide_unit,
     torque_unit,
 )
-from pipelines.io.experiment import Array
+from pipelines.io.log import Array
 from pipelines.io.robot import Joint, RobotDescription
 from pipelines.io.units import UNITS
-
-__all__ = ["Inference", "Model", "unit_of_joint"]
 
 # Parts of an arm.
 _BASE_TO_TIP = ("base", "torso", "waist", "shoulder", "elbow", "forearm", "wrist", "hand")
@@ -80,7 +80,7 @@ class Inference:
         stated, self.counts = stated_rate(notes), stated_counts(notes)
         # Of q against dq, per second (or sample).
         self.slope = reading.slope if clock is None else None
-        self.rate, self.rate_guess = rate_as_stated(stated, self.slope)
+        self.rate, self.rate_guess = self._rate(stated)
         if clock is not None:
             found = clock_as_stated(clock, self.q, reading.slope, notes, stated)
             self.clock_unit, self.clock_guess = found
@@ -91,31 +91,34 @@ class Inference:
                 self.t = clock.values * factor
                 slope = reading.slope
                 self.slope = slope and Slope(slope.factor / factor, slope.correlation)
-        elif not math.isfinite(self.rate) and stated is None:
-            self.rate, self.rate_guess = self._rate_of_velocity()
         self.fits: dict[str, LinkFit] = {}  # by the unit of the positions
         self.fits = self._fits()
 
-    def _rate_of_velocity(self) -> tuple[float, Guess]:
-        """Return the round rate [Hz] that a recorded velocity shows; nan where none does."""
-        slope = self.reading.slope if self._one_unit_of_angle() else None
-        if slope is not None and slope.factor > 0:
-            rate = 1.0 / slope.factor
-            near = round_rate(1.005 * rate)
-            if abs(rate / near - 1.0) < 5e-3:
-                step = "that often the step of the position from sample to sample"
-                why = f"the recorded velocity is {step}, if both are in one unit of angle"
-                return near, Guess(f"{near:g} Hz", "likely", why)
-        return math.nan, Guess("", "unsure", "")
+    def _rate(self, stated: Statement | None) -> tuple[float, Guess]:
+        """Return the rate [Hz] that the file states or, without a clock, a velocity shows.
+
+        It is nan where none does, or a velocity contradicts it.
+        """
+        slope, unknown = self.slope, (math.nan, Guess("", "unsure", ""))
+        if stated is not None:
+            agrees = slope is None or units_of_ratio(slope.factor * stated.number) is not None
+            rate = stated.number if math.isfinite(stated.number) and agrees else math.nan
+            return rate, Guess(f"{rate:g} Hz", "likely", f"the file states {stated.words}")
+        if self.reading.clock is not None or slope is None or slope.factor <= 0:
+            return unknown
+        rate = 1.0 / slope.factor
+        near = round_rate((1.0 + EVIDENCE.near_rate) * rate)
+        if not self._one_unit_of_angle() or abs(rate / near - 1.0) >= EVIDENCE.near_rate:
+            return unknown
+        why = "the recorded velocity is that often the step of the position from sample to sample"
+        return near, Guess(f"{near:g} Hz", "likely", f"{why}, if both are in one unit of angle")
 
     def _one_unit_of_angle(self) -> bool:
         """Return whether a velocity without a clock is in the positions' unit.
 
         Both name it, or are called q and dq.
         """
-        q, dq, tau = (
-            choice.group for choice in (self.reading.q, self.reading.dq, self.reading.tau)
-        )
+        q, dq, tau = (c.group for c in (self.reading.q, self.reading.dq, self.reading.tau))
         if q is None or dq is None:
             return False
         position, speed = (self.named(group, self.reading.table)[0] for group in (q, dq))
@@ -130,17 +133,15 @@ class Inference:
         units = []
         for j, own in enumerate(unit_of_group(group.columns, table)):
             linear = j < len(self.joints) and not self.joints[j].revolute
-            said = None if own else self.statement(group.quantity, linear, group.motor, table)
+            said = None if own else self.statement(group, linear, table)
             units.append(own or (said.value or None if said else None))
         return tuple(units)
 
-    def statement(
-        self, quantity: str, linear: bool, motor: bool, table: RawTable
-    ) -> Statement | None:
+    def statement(self, group: Group, linear: bool, table: RawTable) -> Statement | None:
         """Return what the file states of a unit; counts are one where it states their size."""
-        if quantity == "position" and self.counts is not None and not linear:
+        if group.quantity == "position" and self.counts is not None and not linear:
             return Statement("counts", self.counts.words)
-        return stated_unit(table.notes, quantity, linear, motor)
+        return stated_unit(table.notes, group.quantity, linear, group.motor)
 
     def position_units(self, group: Group) -> tuple[list[str], str, list[Guess]]:
         """Return the unit of each joint, further keys of the recipe, and the reasons."""
@@ -150,9 +151,8 @@ class Inference:
         turning = [j for j in range(self.n) if not self.joints or self.joints[j].revolute]
         units, why, further = [""] * self.n, [], ""
         if turning:
-            first, own_first = next(
-                ((named[j], own[j]) for j in turning if named[j] is not None), (None, None)
-            )
+            known = ((named[j], own[j]) for j in turning if named[j] is not None)
+            first, own_first = next(known, (None, None))
             evidence = PositionEvidence(
                 # It decides the unit of angle once that of time is known.
                 self.slope if self.t is not None else None,
@@ -161,7 +161,7 @@ class Inference:
                 self.fits,
                 self.reading.message,
                 self.named(dq, table)[min(turning[0], len(dq.columns) - 1)] if dq else None,
-                self._counts_of_turn,
+                self.counts.number if self.counts else None,
             )
             guess, further = position_unit(self.q[:, turning], first, evidence)
             for j in turning:
@@ -179,13 +179,6 @@ class Inference:
             why.append(Guess("", "unsure", f"{near}: {asked}"))
         return units, further, why
 
-    @property
-    def _counts_of_turn(self) -> float:
-        """Return the stated counts of a turn; nan where none are, 0 where several numbers are."""
-        if self.counts is None:
-            return math.nan
-        return self.counts.number if math.isfinite(self.counts.number) else 0.0
-
     def shares(self, own: Sequence[str | None]) -> list[int]:
         """Return the joints that move like a share of a range, of no robot and without a unit."""
         if self.q is None or self.joints:
@@ -195,28 +188,23 @@ class Inference:
 
     def torque_unit(self, tau: Array, group: Group, named: str | None) -> Guess:
         """Return the unit of the torques, "" where columns, file or positions leave it open."""
-        own = unit_of_group(group.columns, self.reading.torque_table)[0]
-        return _as_said(self._torque_unit(tau, group, named), own)
-
-    def _torque_unit(self, tau: Array, group: Group, named: str | None) -> Guess:
-        q = self.reading.q.group
+        table, q = self.reading.torque_table, self.reading.q.group
         guess = torque_unit(tau, named, self.current, self.links, self.reading.message)
         peak = f"up to {np.abs(tau).max():.4g}"
         if group.words == WITHOUT_NAME and named is None:
             asked = "neither position nor velocity: a torque in N m, or a current in A?"
             return Guess("", "unsure", f"{peak}, {asked}")
         if guess.confidence == "sure":
-            of_motor = group.motor and not self.current and not self.followed
-            if self.noted_motor or of_motor:
+            if self.noted_motor or (group.motor and not self.current and not self.followed):
                 why = f"{guess.why}: at the joint, or on the motor's shaft?"
                 return replace(guess, confidence="unsure", why=why)
-            return guess
+            return _as_said(guess, unit_of_group(group.columns, table)[0])
         outside = q is not None and self.joints and "" in self.position_units(q)[0]
         if guess.value == "N m" and outside:  # of the limits
             asked = "N m of the joint, or of the motor's shaft, as the positions may be?"
             return Guess("", "unsure", f"{peak}: {asked}")
         if group.words == BY_FILE:
-            file = clean(self.reading.torque_table.source, 60)
+            file = clean(table.source, 60)
             asked = f"of a file named '{file}': a torque in N m, or a current in A?"
             return Guess("", "unsure", f"{peak}, {asked}")
         return guess
@@ -230,15 +218,14 @@ class Inference:
         turning = all(joint.revolute for joint in robot.joints)
         if not turning or self.tau.shape != q.shape or not np.median(np.diff(t)) > 0.0:
             return {}
-        named = self.position_units(group)[0]
         units = {unit: [unit] * self.n for unit in _ANGLES}
         sizes = {unit: known.factor for unit, known in UNITS.items()}
-        if self._counts_of_turn > 0.0:
-            sizes["counts"] = 2.0 * math.pi / self._counts_of_turn
+        if self.counts and self.counts.number > 0.0:
+            sizes["counts"] = 2.0 * math.pi / self.counts.number
         if any(self.named(group, self.reading.table)):
-            if not set(named) <= sizes.keys():
+            units[_NAMED] = self.position_units(group)[0]
+            if not set(units[_NAMED]) <= sizes.keys():
                 return {}
-            units |= {_NAMED: named}
         factors = {key: np.array([sizes[unit] for unit in each]) for key, each in units.items()}
         return fits_by_unit(partial(self.model, robot), q, self.tau, t, factors)
 
@@ -259,7 +246,7 @@ class Inference:
 
     def out_of_order(self, group: Group) -> bool:
         """Return whether the joints' order is open: foreign words, in no order from the base."""
-        if group.order != "file" or len(group.columns) < 2 or self.reading.by_evidence:
+        if group.order != "file" or len(group.columns) == 1 or self.reading.by_evidence:
             return group.order == "text"
         lower = [column.lower() for column in group.columns]
         parts = list(enumerate(_BASE_TO_TIP))
@@ -279,17 +266,17 @@ class Inference:
         words = group.unknown - (other.unknown if other else frozenset())
         if words and not (signal == "tau" and confirmed):
             return f"what does '{clean(min(words), 40)}' say of it?"
-        named = any(self.named(group, self.reading.torque_table))
-        best = self.fits.get(_NAMED) or min(
-            self.fits.values(), key=lambda fit: fit.left, default=None
-        )
-        for fit in (links, best):
+        best = min(self.fits.values(), key=lambda fit: fit.left, default=None)
+        for fit in (links, self.fits.get(_NAMED, best)):
             if fit is not None and fit.otherwise:
                 return f"the robot's own links agree far better with {fit.otherwise}"
-        if links is not None and not links.followed and (signal == "q" or not named):
+        if links is None:
+            return None
+        named = any(self.named(group, self.reading.torque_table))
+        if not links.followed and (signal == "q" or not named):
             disagree = "torque and motion do not agree by the robot's own links"
             return f"{disagree}: other torques, or the order, unit or zero of the joints?"
-        if links is not None and links.alone and signal == "tau" and group.origin == "plain":
+        if links.alone and signal == "tau" and group.origin == "plain":
             asked = "without friction: computed, or simulated?"
             return f"it is what the robot's own links ask for, {asked}"
         return None

@@ -15,29 +15,23 @@ from typing import Any
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
-from pipelines.importers import filenames
 from pipelines.importers.assemble import Assembled, Material, Source
+from pipelines.importers.patterns import fill
 from pipelines.importers.raw import RawTable
-from pipelines.importers.recipe import ColumnSpec, LogSpec, Recipe, TableSpec
+from pipelines.importers.recipe import LogSpec, Recipe, TableSpec
 from pipelines.io import schema
-from pipelines.io.derive import created
-from pipelines.io.experiment import Array, Controller, Derived, ExperimentLog, Signal
+from pipelines.io.files import refuse_unlike_format
 from pipelines.io.limits import FEWEST, recorded_span, shorter_than_period
+from pipelines.io.log import Array, Controller, Derived, ExperimentLog, Signal, created
 from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import format_robot
-from pipelines.io.structure import refuse_unlike_format
 from pipelines.io.units import UNITS
 from pipelines.quality.checks import check_log
 from pipelines.quality.units import TRUSTED, degrees_or_motor
 
-__all__ = ["ImportedTable", "SourceFile", "examine", "import_table", "make_log"]
-
-# A glitch was recorded as it is: what to do with it is for the user of the log to decide.
-_KEPT = "RRID-D06"
-_TIME = "RRID-S08"  # a recipe's unit of time can be wrong by a thousand and contradict nothing
 # What to do about it is in the recipe, and not in a file that is not written yet.
 _IN_RECIPE = {
-    "RRID-S05": "declare the unit of tau that its numbers are in, such as unit = \"N mm\", or "
+    "RRID-S05": 'declare the unit of tau that its numbers are in, such as unit = "N mm", or '
     "correct the torque limits of the robot",
     "RRID-S07": degrees_or_motor(np.inf, (-np.inf, np.inf)),
 }
@@ -60,13 +54,15 @@ def make_log(
     source: Source,
     material: Material,
     assembled: Assembled,
-    t: Array,
     signals: Mapping[str, Signal],
-    steps: tuple[str, ...],
-    altered: tuple[str, ...],
+    done: tuple[tuple[str, ...], tuple[str, ...]],
     number: int | None,
 ) -> tuple[ExperimentLog, tuple[SourceFile, ...], tuple[str, ...]]:
-    """Return one log of converted signals, its files, and `altered` with what was done here.
+    """Return one log of converted signals with its time, its files, and what altered it in words.
+
+    Args:
+        done: steps of conversion, and alterations that make a log a derived one.
+        number: of a log that had to be split.
 
     Raises:
         InputRejected: T07 shorter than a period, T08 hardly a sample, S01 an frf log without
@@ -74,10 +70,14 @@ def make_log(
         UsageError: C02, name, experiment, role or joint cannot be read from the recipe and the
             file's name.
     """
-    recipe, robot = material.recipe, material.robot
-    about = _about(recipe.log, source, recipe.where)
-    name = clean(filenames.fill(about.name, source.groups, recipe.where), 200) or "log"
-    files = _files(source, assembled)
+    recipe, robot, (steps, altered) = material.recipe, material.robot, done
+    about, t = _about(recipe.log, source, recipe.where), signals["t"].values
+    name = clean(fill(about.name, source.groups, recipe.where), 200) or "log"
+    used = [column for columns in assembled.columns.values() for column in columns]
+    files = tuple(
+        SourceFile(file, table.sha256, tuple(c for c in used if c in table.columns))
+        for file, table in source.tables.items()
+    )
     step = _sample_time(recipe, t)
     if t.size < FEWEST:
         message = f"{t.size} samples at {1 / step:g} Hz; a log needs {FEWEST}"
@@ -93,8 +93,6 @@ def make_log(
     if about.experiment == "frf" and "v" not in signals:
         message = "an frf log without its excitation v"
         raise InputRejected("S01", message, where=source.primary, remedy="map signals.v")
-    ordered = {"t": Signal(t, "s", schema.SIGNALS["t"][1])}
-    ordered |= {key: signals[key] for key in schema.SIGNALS if key in signals}
     log = ExperimentLog(
         name=f"{name}-{number}" if number else name,
         experiment=about.experiment,
@@ -104,7 +102,7 @@ def make_log(
         robot_name=robot.name,
         sample_time=step,
         robot_text=format_robot(robot),
-        signals=ordered,
+        signals={key: signals[key] for key in schema.SIGNALS if key in signals},
         recorded=about.recorded,
         joint=about.joint,
         period=about.period,
@@ -113,14 +111,6 @@ def make_log(
         derived=_derived(files, material, steps, altered, about.recorded) if altered else None,
     )
     return log, files, altered
-
-
-def _files(source: Source, assembled: Assembled) -> tuple[SourceFile, ...]:
-    used = [column for columns in assembled.columns.values() for column in columns]
-    return tuple(
-        SourceFile(file, table.sha256, tuple(c for c in used if c in table.columns))
-        for file, table in source.tables.items()
-    )
 
 
 def _sample_time(recipe: Recipe, t: Array) -> float:
@@ -137,10 +127,9 @@ def _about(base: LogSpec, source: Source, where: str) -> LogSpec:
     found: dict[str, Any] = {}
     for key, known in (("experiment", schema.EXPERIMENTS), ("role", schema.ROLES)):
         if groups.get(key, known[0]) not in known:
-            gives = f"'{source.primary}' gives {key} '{groups[key]}'"
-            message = f"{gives}, must be one of {', '.join(known)}"
+            message = f"'{source.primary}' gives {key} '{groups[key]}', must be one of "
             remedy = f"rename the file, or write {key} = … in a [[file]] case before it"
-            raise UsageError("C02", message, where=where, remedy=remedy)
+            raise UsageError("C02", message + ", ".join(known), where=where, remedy=remedy)
         found |= {key: groups[key]} if key in groups else {}
     if "joint" in groups:
         if not groups["joint"].isdigit():
@@ -200,7 +189,8 @@ def _derived(
 def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Check, ...]:
     """Return the warnings of the doctor about a new log, so that `inspect` passes on it.
 
-    They are glitches, which stay, and time in another unit; the import has said the others.
+    They are glitches (D06), which stay for the user of the log to decide, and time in another unit
+    (S08), which can be wrong by a thousand and contradict nothing; the import has said the others.
 
     Raises:
         InputRejected: S20 unlike the format, and what the doctor would reject or repair before
@@ -209,11 +199,11 @@ def examine(log: ExperimentLog, recording: str, trust_units: bool) -> tuple[Chec
     refuse_unlike_format(log)  # the doctor judges a log whose joint and gains are the robot's
     found = []
     for check in check_log(replace(log, source=recording), TRUSTED if trust_units else ()):
-        kept = check.code == _KEPT and check.level == "repair"
+        kept = (check.code, check.level) == ("RRID-D06", "repair")
         if check.level in ("reject", "repair") and not kept:
             remedy = _IN_RECIPE.get(check.code, check.remedy)
             raise replace(check, remedy=remedy).as_error()
-        if check.code == _TIME and check.level == "warn":
+        if (check.code, check.level) == ("RRID-S08", "warn"):
             found.append(check)
         if kept:
             words = check.message.removesuffix("; left out")
@@ -245,34 +235,28 @@ def import_table(spec: TableSpec, name: str, file: str, table: RawTable) -> Impo
     units: dict[str, str] = {}
     for key, column in spec.columns.items():
         source = table.name_of(column.column)
-        where, header = f"{table.source}, column '{source}'", table.units.get(source)
-        values, units[key] = _column_in_si(table.columns[source], column, header, where)
-        if not np.isfinite(values).all():
-            row = table.place(int(np.flatnonzero(~np.isfinite(values))[0]))
-            message = f"no number in {row}"
-            raise InputRejected("D01", message, where=where, remedy="remove that row")
-        data[key] = values
-    return ImportedTable(name, file, table.source, table.sha256, table.rows.size, units, data)
-
-
-def _column_in_si(
-    values: Array, column: ColumnSpec, header: str | None, where: str
-) -> tuple[Array, str]:
-    unit = column.unit or header
-    if unit is None:
-        remedy = 'add unit = … to the column ("1" where it has none)'
-        raise InputRejected("S04", "no unit", where=where, remedy=remedy)
-    values = values * column.scale
-    if unit == "1":
-        return values, "1"
-    if unit == "counts":
-        if column.counts_per_rev is None:
+        where = f"{table.source}, column '{source}'"
+        unit = column.unit or table.units.get(source)
+        factor, offset, units[key] = 1.0, 0.0, "1"
+        if unit is None:
+            remedy = 'add unit = … to the column ("1" where it has none)'
+            raise InputRejected("S04", "no unit", where=where, remedy=remedy)
+        if unit == "counts" and column.counts_per_rev is None:
             message, remedy = "counts without counts_per_rev", "add counts_per_rev"
             raise InputRejected("S05", message, where=where, remedy=remedy)
-        return values * (2.0 * math.pi / column.counts_per_rev), "rad"
-    known = UNITS.get(unit)
-    if known is None:
-        hint = f"{did_you_mean(unit, UNITS)}; known are {', '.join(UNITS)}"
-        message = f"unknown unit '{unit}'{hint}"
-        raise InputRejected("S05", message, where=where, remedy="declare its unit")
-    return known.factor * values + known.offset, _METRES.get(unit) or _SI[known.quantity]
+        if unit == "counts":
+            factor, units[key] = 2.0 * math.pi / (column.counts_per_rev or 1.0), "rad"
+        elif unit in UNITS:
+            known = UNITS[unit]
+            factor, offset = known.factor, known.offset
+            units[key] = _METRES.get(unit) or _SI[known.quantity]
+        elif unit != "1":
+            message = f"unknown unit '{unit}'{did_you_mean(unit, UNITS)}; known are "
+            message += ", ".join(UNITS)
+            raise InputRejected("S05", message, where=where, remedy="declare its unit")
+        data[key] = values = table.columns[source] * column.scale * factor + offset
+        if not np.isfinite(values).all():
+            row = table.place(int(np.flatnonzero(~np.isfinite(values))[0]))
+            message, remedy = f"no number in {row}", "remove that row"
+            raise InputRejected("D01", message, where=where, remedy=remedy)
+    return ImportedTable(name, file, table.source, table.sha256, table.rows.size, units, data)

@@ -1,8 +1,11 @@
-"""Hold a recording as it was read: named columns of numbers, and where they are in the file."""
+"""Hold a recording as it was read: named columns of numbers, and where they are in the file.
+
+Arrays and nested documents become such a table here: time is the side that most arrays share, and a
+table of one row a joint becomes one of one row a sample.
+"""
 
 from __future__ import annotations
 
-import difflib
 import itertools
 import re
 from collections import Counter
@@ -14,21 +17,16 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected, UsageError, clean, did_you_mean
-from pipelines.importers.column_names import read_name, signal_of
-from pipelines.importers.text_format import split_unit
-from pipelines.io.experiment import Array
+from pipelines.importers.config import ARRAYS
+from pipelines.importers.header import split_unit
+from pipelines.importers.names import read_name
 from pipelines.io.limits import FEWEST
+from pipelines.io.log import Array
 
-__all__ = ["Arrays", "RawTable", "columns_of_arrays", "described", "distinct", "expand", "unit_in",
-           "unstacked"]  # fmt: skip
-
-Arrays = Mapping[str, npt.NDArray[np.generic]]
-
-_PART = re.compile(r"_\d+$|\[\d+\]$")  # of an array
-_MOST_KEYS = 32  # joints, servos or environments in turn
-_SEPARATE = 0.5  # mean step from key to key over that from row to row: 1 for noise
-_ROUNDED = 1e-3  # of a clock's step: what rounding may take
-_WIDEST_MATRIX = 64  # more joints than any arm: what is wider is not "one column a joint"
+Anything = npt.NDArray[Any]
+Columns = str | int | tuple[str | int, ...]
+# Entries of a record that the names of its series hold.
+_SAID = ("name", "label", "unit", "units", "einheit")
 _NOT_REAL = {"c": "complex numbers", "O": "objects or cells", "U": "text", "S": "text"}
 
 
@@ -61,41 +59,30 @@ class RawTable:
         Raises:
             InputRejected: S01, it does not exist; S12, it does not hold numbers.
         """
+        names, where = [*self.columns], self.source
         if isinstance(column, int):
-            ordered = list(self.columns)
-            if 1 <= column <= len(ordered):
-                return ordered[column - 1]
-            message = f"no column {column}; the file has {len(ordered)} columns of numbers"
+            if 1 <= column <= len(names):
+                return names[column - 1]
+            message = f"no column {column}; the file has {len(names)} columns of numbers"
             remedy = "columns count from 1; correct the recipe"
-            raise InputRejected("S01", message, where=self.source, remedy=remedy)
-        names = [*self.columns, *self.text]
-        whole = column if column in names else _PART.sub("", column)  # an array without columns
+            raise InputRejected("S01", message, where=where, remedy=remedy)
+        array = re.sub(r"_\d+$|\[\d+\]$", "", column)  # that has no columns
+        whole = column if column in names or column in self.text else array
         if whole in self.text:
             message = f"column '{whole}' holds no numbers but '{self.text[whole]}'"
             remedy = "export it as numbers, one row a sample, or choose another column"
-            raise InputRejected("S12", message, where=self.source, remedy=remedy)
-        if column not in self.columns:
-            there = f"{did_you_mean(column, names)}; there are {', '.join(names[:40])}"
-            message, remedy = f"no column '{column}'{there}", self._remedy(column, wanted)
-            raise InputRejected("S01", message, where=self.source, remedy=remedy)
-        return column
-
-    def _remedy(self, column: str, wanted: str) -> str:
-        """Return which columns could be meant: by their names, those of the signal `wanted`."""
-        if not wanted:
-            return "correct the recipe"
-        signal = wanted.rpartition("_")[0] or wanted
-        fitting = [name for name in self.columns if signal_of(name) == signal]
-        near = difflib.get_close_matches(column, fitting or list(self.columns), n=1) or fitting[:1]
-        option = f"correct the recipe, or pass --map {wanted}="
-        if not near:
-            return f"{option}'…' with the column of {wanted}"
-        others = [name for name in fitting if name != near[0]]
-        also = f" (or {', '.join(others[:8])})" if others else ""
-        return f"{option}'{near[0]}'{also}"
-
-
-Columns = str | int | tuple[str | int, ...]
+            raise InputRejected("S12", message, where=where, remedy=remedy)
+        if column in self.columns:
+            return column
+        every, remedy = [*names, *self.text], "correct the recipe"
+        there = ", ".join(every[: ARRAYS.listed])
+        message = f"no column '{column}'{did_you_mean(column, every)}; there are {there}"
+        if wanted:
+            kind = read_name(wanted).quantity
+            alike = [name for name in names if read_name(name).quantity == kind]
+            near = did_you_mean(column, alike or names)[16:-2] or [*alike, "…"][0]
+            remedy += f", or pass --map {wanted}='{near}'"
+        raise InputRejected("S01", message, where=where, remedy=remedy)
 
 
 def expand(
@@ -109,50 +96,89 @@ def expand(
         InputRejected: S01 a column is missing, S02 there are not `n` of them, S12 no numbers.
         UsageError: C02, one column for two joints.
     """
+    why = ""
     if isinstance(columns, str) and "{j}" in columns:
-        pattern = columns
-        if (further := pattern.replace("{j}", str(n + 1))) in table.columns:
-            counted = itertools.count(n + 1)
-            have = next(
-                j for j in counted if pattern.replace("{j}", str(j + 1)) not in table.columns
-            )
-            _wrong_count(table, signal, have, n, f"'{further}' is there as well")
-        columns = tuple(pattern.replace("{j}", str(j)) for j in range(1, n + 1))
+        counted = itertools.count(n + 1)
+        name = columns.replace
+        have = next(j - 1 for j in counted if name("{j}", str(j)) not in table.columns)
+        why = f"'{name('{j}', str(n + 1))}' is there as well"
+        columns = tuple(name("{j}", str(j)) for j in range(1, have + 1))
     elif isinstance(columns, str) and columns not in table.columns and columns in table.groups:
         columns = table.groups[columns]
     chosen = (columns,) if isinstance(columns, str | int) else columns
     if len(chosen) != n:
-        why = "the recipe names " + ", ".join(str(c) for c in chosen)
-        _wrong_count(table, signal, len(chosen), n, why)
+        why = why or "the recipe names " + ", ".join(str(c) for c in chosen)
+        message = f"{len(chosen)} columns for {signal}, but the robot has {n} joints ({why})"
+        remedy = "name the robot this was recorded on, or list the columns of its joints"
+        raise InputRejected("S02", message, where=table.source, remedy=remedy)
     chosen = tuple((instead or {}).get(j, column) for j, column in enumerate(chosen, start=1))
     names = tuple(table.name_of(c, f"{signal}_{j}") for j, c in enumerate(chosen, start=1))
-    for j, name in enumerate(names, start=1):
-        if (first := names.index(name) + 1) < j:
-            message = f"column '{name}' serves {signal} of joint {first} and of joint {j}"
-            remedy = (
-                f"give each joint its own column in signals.{signal}, or by --map {signal}_{j}=…"
-            )
+    for j, name_j in enumerate(names, start=1):
+        if (first := names.index(name_j) + 1) < j:
+            message = f"column '{name_j}' serves {signal} of joint {first} and of joint {j}"
+            remedy = f"give each joint its own column in signals.{signal}"
+            remedy += f", or by --map {signal}_{j}=…"
             raise UsageError("C02", message, where=table.source, remedy=remedy)
     return names
 
 
-def _wrong_count(table: RawTable, signal: str, have: int, n: int, why: str) -> None:
-    message = f"{have} columns for {signal}, but the robot has {n} joints ({why})"
-    remedy = "name the robot this was recorded on, or list the columns of its joints"
-    raise InputRejected("S02", message, where=table.source, remedy=remedy)
+def flatten(
+    document: Any, path: str = "", depth: int = ARRAYS.deepest
+) -> Iterator[tuple[str, Any]]:
+    """Yield (path, value) of all in nested objects and lists of objects that is neither.
+
+    A record that names itself gives that name to its samples: {"name": "hip", "unit": "rad",
+    "values": […]} is "hip [rad]", and with several series "hip.values" and so on.
+    """
+    items: list[tuple[str, Any]] = []
+    if isinstance(document, Mapping):
+        own = _own_name(document)
+        series = [key for key, value in document.items() if own and _is_series(value)]
+        signals = [key for key in series if read_name(key).quantity != "time"]
+        for key, value in document.items():
+            if series and str(key).lower() in _SAID:
+                continue
+            stem = own.partition(" [")[0] if key in series else path
+            items.append((own if signals == [key] else f"{stem}.{key}".lstrip("."), value))
+    elif isinstance(document, list) and document and all(isinstance(x, Mapping) for x in document):
+        items = [(f"{path}[{k}]", item) for k, item in enumerate(document)]
+    else:
+        yield path or "column", document
+    for inner, value in items if depth else ():
+        yield from flatten(value, inner, depth - 1)
 
 
-def columns_of_arrays(arrays: Arrays, source: str) -> RawTable:
-    """Return a table of named arrays of one or two dimensions (NPY, MAT).
+def _own_name(record: Mapping[str, Any]) -> str:
+    """Return "hip_angle [rad]" of a record that names its samples and their unit; "" otherwise."""
+    texts = {str(key).lower(): value for key, value in record.items() if isinstance(value, str)}
+    name = texts.get("name") or texts.get("label") or ""
+    return name[: ARRAYS.longest_text] + unit_in(texts) if name else ""
 
-    The samples are the side that most arrays share.
+
+def unit_in(record: Mapping[str, Any]) -> str:
+    """Return " [rad]" of a record, or of an array's attributes, with an entry for the unit."""
+    units = (v for key, v in record.items() if key.lower() in _SAID[2:])
+    unit = next(units, "")
+    return f" [{unit}]" if isinstance(unit, str) and 0 < len(unit) <= ARRAYS.longest_unit else ""
+
+
+def _is_series(value: Any) -> bool:
+    if isinstance(value, np.ndarray):
+        return value.dtype.kind in "fiu" and value.size > 1
+    return isinstance(value, list) and len(value) > 1 and not isinstance(value[0], str | Mapping)
+
+
+def columns_of_arrays(arrays: Mapping[str, Anything], source: str) -> RawTable:
+    """Return a table of named arrays of one or two dimensions (JSON, NPY, MAT).
+
+    The samples are the side that most arrays share; texts and single numbers are notes.
 
     Raises:
         InputRejected: S11 where arrays can be read both ways, S12 where none holds real numbers.
     """
     # MATLAB's timeseries of a vector is (n, 1, samples).
-    arrays = {k: array.squeeze() if array.ndim > 2 else array for k, array in arrays.items()}
-    problems = {name: _not_real(array) for name, array in arrays.items()}
+    arrays = {k: array.squeeze() if array.shape[2:] else array for k, array in arrays.items()}
+    problems = {name: _not_real(array) for name, array in arrays.items() if array.size != 1}
     text = {name: problem for name, problem in problems.items() if problem}
     usable = {k: array for k, array in arrays.items() if k not in text and array.size > 1}
     samples = _samples_of(usable, source)
@@ -167,22 +193,21 @@ def columns_of_arrays(arrays: Arrays, source: str) -> RawTable:
         if samples not in matrix.shape or rows == wide:
             why = "square" if rows == wide else f"not of {samples} samples"
             text[name] = f"an array of shape {array.shape}, {why}"
-            if samples not in matrix.shape and max(matrix.shape) >= FEWEST:
-                others.append(f"'{clean(name, 40)}'")
+            long = samples not in matrix.shape and max(matrix.shape) >= FEWEST
+            others += [f"'{clean(name, 40)}'"] if long else []
             continue
-        if (wide if rows == samples else rows) > _WIDEST_MATRIX:
+        matrix = matrix if rows == samples else matrix.T
+        if matrix.shape[1] > ARRAYS.widest:
             continue
-        if rows != samples and rows > 1:
-            stored = f"'{name}' is stored as {matrix.shape}, read as {(wide, rows)}"
+        if rows not in (samples, 1):
+            stored = f"'{name}' is stored as {(rows, wide)}, read as {matrix.shape}"
             message, remedy = f"{stored}: time along the long side", "store one row a sample"
             checks.append(Check.of("S11", "warn", message, where=source, remedy=remedy))
-        matrix = matrix if rows == samples else matrix.T
         short, unit = split_unit(name)
         several = tuple(f"{short}_{j + 1}" for j in range(matrix.shape[1]))
         groups[short] = names = several if len(several) > 1 else (short,)
         units |= dict.fromkeys(names, unit) if unit else {}
-        for j, key in enumerate(names):
-            columns[key] = np.ascontiguousarray(matrix[:, j], dtype=np.float64)
+        columns |= zip(names, np.ascontiguousarray(matrix.T, dtype=np.float64), strict=True)
     if others:
         message = f"left out, not of {samples} samples: {', '.join(others[:8])}"
         remedy = "save another motion as a file of its own"
@@ -192,39 +217,27 @@ def columns_of_arrays(arrays: Arrays, source: str) -> RawTable:
         message = f"no array of real numbers; there is {found}"
         remedy = "save plain numeric arrays, one row a sample"
         raise InputRejected("S12", message, where=source, remedy=remedy)
-    return RawTable(
-        source,
-        columns,
-        np.arange(samples),
-        units=units,
-        groups=groups,
-        text=text,
-        checks=tuple(checks),
-        notes=(*_texts(arrays, text), *_constants(arrays)),
-    )
+    return RawTable(source, columns, np.arange(samples), units, groups, text,
+                    checks=tuple(checks), notes=notes_of(arrays))  # fmt: skip
 
 
-def _texts(arrays: Arrays, text: Mapping[str, str]) -> Iterator[str]:
-    """Yield the texts of arrays of text; the attributes of a file ("@rate") have their names."""
+def notes_of(arrays: Mapping[str, Anything]) -> tuple[str, ...]:
+    """Return "physics_dt = 0.005" of texts and single numbers, whose names may be paths."""
+    found = []
     for name, array in arrays.items():
-        if name in text and array.dtype.kind == "U" and array.size <= _MOST_KEYS:
-            label = f"{name} = " if name[:1] != "@" else ""
-            yield label + " ".join(map(str, array.flat))
+        text = array.dtype.kind == "U" and array.size <= ARRAYS.most_keys
+        if text or (array.size == 1 and array.dtype.kind in "fiub"):
+            found.append(f"{name} = {' '.join(map(str, array.flat))[: ARRAYS.longest_text]}")
+    return tuple(found[: ARRAYS.most_notes])
 
 
-def _constants(arrays: Arrays) -> Iterator[str]:
-    for name, array in arrays.items():
-        if array.size == 1 and array.dtype.kind in "fiub":
-            yield f"{name} = {array.flat[0]}"
-
-
-def _samples_of(arrays: Arrays, source: str) -> int:
+def _samples_of(arrays: Mapping[str, Anything], source: str) -> int:
     """Return the number of samples: the side of most arrays, the longer one of two shared alike."""
     shared: Counter[int] = Counter()
     for array in arrays.values():
         rows, wide = (array.shape[0], 1) if array.ndim == 1 else array.shape
         sides = ((rows, wide), (wide, rows))
-        shared.update({n for n, other in sides if n > 1 and other <= _WIDEST_MATRIX})
+        shared.update({n for n, other in sides if n > 1 and other <= ARRAYS.widest})
     enough = {n: count for n, count in shared.items() if n >= FEWEST} or dict(shared)
     samples = max(enough, key=lambda n: (enough[n], n), default=0)
     alike = [name for name, array in arrays.items() if array.shape == (samples, samples)]
@@ -244,54 +257,27 @@ def _samples_of(arrays: Arrays, source: str) -> int:
     return samples
 
 
-def described(record: Mapping[str, Any]) -> str:
-    """Return "hip_angle [rad]" of a record that names its samples and their unit; "" otherwise."""
-    names = (v for k, v in record.items() if k.lower() in ("name", "label") and isinstance(v, str))
-    name = next(names, "")
-    return name[:200] + unit_in(record) if name else ""
-
-
-def distinct(name: str, found: Mapping[str, object], source: str) -> str:
-    """Return a name that is not yet among those found.
-
-    Raises:
-        InputRejected: S03, it is.
-    """
-    if name in found:
-        message = f"two series are both named '{clean(name, 80)}'"
-        raise InputRejected("S03", message, where=source, remedy="rename one of them in the file")
-    return name
-
-
-def unit_in(record: Mapping[str, Any]) -> str:
-    """Return " [rad]" of a record, or of an array's attributes, with an entry for the unit."""
-    units = (v for key, v in record.items() if key.lower() in ("unit", "units", "einheit"))
-    unit = next(units, "")
-    return f" [{unit}]" if isinstance(unit, str) and 0 < len(unit) <= 20 else ""
-
-
-def _not_real(array: npt.NDArray[np.generic]) -> str:
+def _not_real(array: Anything) -> str:
     """Return why an array is not a signal, in words; "" where it is one."""
     kind = array.dtype.kind
     if kind not in "fiub":
         return _NOT_REAL.get(kind, str(array.dtype))
-    if kind in "iu" and array.size > 1 and not _exact(array.astype(np.float64).ravel()):
-        return f"{array.dtype} beyond 2^53, which a real number of 64 bit cannot hold exactly"
-    return f"an array of {array.ndim} dimensions" if array.ndim > 2 or array.ndim == 0 else ""
+    if kind in "iu" and array.size > 1:
+        # Whole numbers are below 2^53, or rounding takes little of their steps.
+        values = array.astype(np.float64).ravel()
+        rounding = float(np.spacing(np.abs(values).max()))
+        if rounding > max(1.0, ARRAYS.rounded * float(np.median(np.abs(np.diff(values))))):
+            return f"{array.dtype} beyond 2^53, which a real number of 64 bit cannot hold exactly"
+    return f"an array of {array.ndim} dimensions" if array.shape[2:] or not array.shape else ""
 
 
-def _exact(values: Array) -> bool:
-    """Return whether whole numbers are below 2^53, or rounding takes little of their steps."""
-    rounding = float(np.spacing(np.abs(values).max()))
-    return rounding <= 1.0 or bool(np.median(np.abs(np.diff(values))) > rounding / _ROUNDED)
-
-
-def _either_way(array: npt.NDArray[np.generic]) -> bool:
+def _either_way(array: Anything) -> bool:
     """Return whether neither side of a matrix is clearly longer."""
-    if array.ndim < 2 or array.size <= 1 or 1 in array.shape:
+    if array.ndim == 1 or 1 in array.shape:
         return False
     rows, wide = array.shape
-    return not (rows >= 4 * wide or (rows > wide and wide <= 3) or wide >= 4 * rows)
+    long = ARRAYS.clearly_longer
+    return not (rows >= long * wide or (rows > wide and wide < long) or wide >= long * rows)
 
 
 def unstacked(table: RawTable) -> RawTable:
@@ -305,56 +291,53 @@ def unstacked(table: RawTable) -> RawTable:
     Raises:
         InputRejected: S11, the rows of a key come below those of another.
     """
-    keys = (*table.cycles.items(), *itertools.islice(_numbers_in_turn(table), _MOST_KEYS))
+    keys = (*table.cycles.items(), *itertools.islice(_numbers_in_turn(table), ARRAYS.most_keys))
     for key, words in keys:
-        k = len(words)
-        interleaved = any(_interleaved(values, k) for values in table.columns.values())
-        if len(set(words)) == k and interleaved:
+        if len(set(words)) == len(words) and any(
+            _interleaved(values, len(words)) for values in table.columns.values()
+        ):
             return _by_key(table, key, words)
-    for name, values in table.columns.items():
-        if read_name(name).quantity == "time":
-            _refuse_stacked(table, name, values)
+    for name, stamps in table.columns.items():
+        # A date comes again and the stamps rise from it again. Runs of one experiment do so too,
+        # but their clock starts from zero or goes on.
+        falls = np.flatnonzero(np.diff(stamps) < 0) + 1
+        if (
+            read_name(name).quantity == "time"
+            and falls.size
+            and (stamps[falls] == stamps[0]).all()
+            and stamps[0] > np.ptp(stamps)
+        ):
+            message = f"the same times come {falls.size + 1} times: series below each other"
+            where = f"{table.source}, column '{name}', {table.place(int(falls[0]))}"
+            remedy = "put them side by side, one row a sample: pivot in pandas or in the data base"
+            raise InputRejected("S11", message, where=where, remedy=remedy)
     return table
-
-
-def _refuse_stacked(table: RawTable, name: str, stamps: Array) -> None:
-    """S11: refuse series below each other: a date comes again and the stamps rise from it again.
-
-    Runs of one experiment do so too, but their clock starts from zero or goes on.
-    """
-    falls = np.flatnonzero(np.diff(stamps) < 0) + 1
-    if not falls.size or (stamps[falls] != stamps[0]).any() or stamps[0] <= np.ptp(stamps):
-        return
-    message = f"the same times come {falls.size + 1} times: series below each other"
-    where = f"{table.source}, column '{name}', {table.place(int(falls[0]))}"
-    remedy = "put them side by side, one row a sample: pivot in pandas or in the data base"
-    raise InputRejected("S11", message, where=where, remedy=remedy)
 
 
 def _by_key(table: RawTable, key: str, words: tuple[str, ...]) -> RawTable:
     """Return the table with the rows of every sample side by side."""
     k = len(words)
     samples = table.rows.size // k
+    message = f"{k} rows a sample, one for each '{clean(key, 40)}': put beside each other"
     columns: dict[str, Array] = {}
-    groups = {}
+    groups: dict[str, tuple[str, ...]] = {}
+    units: dict[str, str] = {}
     for name, values in table.columns.items():
         rows = values[: samples * k].reshape(samples, k)
+        members: tuple[str, ...] = (name,)
         if np.array_equal(rows, np.broadcast_to(rows[:, :1], rows.shape), equal_nan=True):
             columns[name] = rows[:, 0].copy()
         elif not np.array_equal(rows[1:], rows[:-1]):  # the numbers of the keys themselves
-            groups[name] = tuple(f"{name}[{word}]" for word in words)
-            columns |= zip(groups[name], map(np.ascontiguousarray, rows.T), strict=True)
-    message = f"{k} rows a sample, one for each '{clean(key, 40)}': put beside each other"
-    for name in (name for name in groups if read_name(name).quantity == "time"):
-        times = np.column_stack([columns[member] for member in groups[name]])
-        apart = np.median(np.nan_to_num(abs(times - times[:, :1])), axis=0).max()
-        message += f"; '{clean(name, 40)}' differs by {apart:.3g} in its own unit among them, the log has one time"
-    remedy = "export one row a sample"
-    check = Check.of("S11", "warn", message, where=table.source, remedy=remedy)
-    units = {name: unit for name, unit in table.units.items() if name in columns}
-    for name, members in groups.items():
+            groups[name] = members = tuple(f"{name}[{word}]" for word in words)
+            columns |= zip(members, np.ascontiguousarray(rows.T), strict=True)
+            if read_name(name).quantity == "time":
+                apart = np.median(np.nan_to_num(abs(rows - rows[:, :1])), axis=0).max()
+                message += f"; '{clean(name, 40)}' differs by {apart:.3g} in its own unit among"
+                message += " them, the log has one time"
         if name in table.units:
             units |= dict.fromkeys(members, table.units[name])
+    remedy = "export one row a sample"
+    check = Check.of("S11", "warn", message, where=table.source, remedy=remedy)
     first = slice(0, samples * k, k)
     return replace(
         table,
@@ -372,9 +355,9 @@ def _by_key(table: RawTable, key: str, words: tuple[str, ...]) -> RawTable:
 def _numbers_in_turn(table: RawTable) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Yield columns of whole numbers that repeat, and the numbers they go through."""
     for name, values in table.columns.items():
-        again = np.flatnonzero(values[1 : _MOST_KEYS + 1] == values[:1]) + 1
+        again = np.flatnonzero(values[1 : ARRAYS.most_keys + 1] == values[:1]) + 1
         k = int(again[0]) if again.size else 0
-        if k < 2 or values.size < 2 * k or not np.array_equal(values[k:], values[:-k]):
+        if k <= 1 or values.size < 2 * k or not np.array_equal(values[k:], values[:-k]):
             continue
         if (values[:k] == np.round(values[:k])).all():
             yield name, tuple(f"{value:.0f}" for value in values[:k])
@@ -387,4 +370,4 @@ def _interleaved(values: Array, k: int) -> bool:
     if not known.any() or not from_key[known].any():
         return False
     neighbours = np.abs(from_row[np.isfinite(from_row)]).mean()
-    return bool(np.abs(from_key[known]).mean() < _SEPARATE * neighbours)
+    return bool(np.abs(from_key[known]).mean() < ARRAYS.separate * neighbours)

@@ -35,13 +35,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from pipelines.errors import Gathering, InputRejected, UsageError, did_you_mean
+from pipelines.importers.config import RECIPE
 from pipelines.io import schema
-from pipelines.io.shipped import shipped
-from pipelines.io.toml_text import parse_toml
-
-__all__ = ["BLANK", "ColumnSpec", "DriveSpec", "FileSpec", "LogSpec", "Numbers", "Recipe",
-           "ResampleSpec", "SignalSpec", "TableSpec", "TextFormat", "TimeSpec", "find_recipe",
-           "parse_recipe"]  # fmt: skip
+from pipelines.io.robot import shipped
+from pipelines.io.sandbox import parse_toml
 
 Numbers = float | tuple[float, ...]  # one for all joints, or one a joint
 Columns = str | int | tuple[str | int, ...]
@@ -233,7 +230,6 @@ _SECTIONS: dict[str, type] = {
     "controller": ControllerSpec, "table": TableSpec,
 }  # fmt: skip
 _DRAFT = "rrrid import --guess FILE drafts a recipe"
-_LARGEST = 1e12
 # Numbers above zero.
 _POSITIVE = ("rate", "sample_time", "longest_gap", "counts_per_rev", "wrap", "period",
              "torque_constant")  # fmt: skip
@@ -262,7 +258,11 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
         message = f"the recipe is not valid TOML: {problem}"
         remedy = "correct that line; strings need quotes, tables [ ]"
         raise UsageError("C01", message, where=where, remedy=remedy) from None
-    _refuse_blanks(table, where)
+    if blanks := blanks_of(table):
+        more = f" and at {', '.join(blanks[1:6])}" if len(blanks) > 1 else ""
+        remedy = f"replace the blank marked {BLANK} at {blanks[0]}{more}; the draft says what"
+        message = f"'{blanks[0]}' is still marked {BLANK}"
+        raise UsageError("C02", message, where=where, remedy=f"{remedy} belongs there")
     if "where" in table:
         raise UsageError("C01", "'where' is not a key of a recipe", where=where, remedy="remove it")
     try:
@@ -285,53 +285,49 @@ def parse_recipe(text: str, where: object = "") -> Recipe:
     return recipe
 
 
-def _refuse_blanks(table: dict[str, Any], where: object) -> None:
-    """C02: refuse what --guess could not know and is not yet filled in."""
-    if blanks := [place for place, text in _texts(table, "") if BLANK in text.upper()]:
-        more = f" and at {', '.join(blanks[1:6])}" if len(blanks) > 1 else ""
-        marked = f"replace the blank marked {BLANK} at {blanks[0]}{more}"
-        remedy = f"{marked}; the draft says what belongs there"
-        raise UsageError(
-            "C02", f"'{blanks[0]}' is still marked {BLANK}", where=where, remedy=remedy
-        )
+def blanks_of(table: dict[str, Any]) -> list[str]:
+    """Return the places of what --guess could not know and is not yet filled in."""
+    return [path for path, _, x in _leaves(table) if isinstance(x, str) and BLANK in x.upper()]
 
 
-def _texts(value: Any, path: str) -> Iterator[tuple[str, str]]:
-    """Yield (place, text) of every text in the recipe."""
+def _leaves(value: object, path: str = "", key: str = "") -> Iterator[tuple[str, str, object]]:
+    """Yield (place, key, value) of all that is no table, list or section in the recipe."""
+    if is_dataclass(value):
+        value = {item.name: getattr(value, item.name) for item in fields(value)}
     if isinstance(value, dict):
-        for key, item in value.items():
-            yield from _texts(item, f"{path}.{key}".lstrip("."))
-    elif isinstance(value, list):
-        for i, item in enumerate(value, start=1):
-            yield from _texts(item, f"{path}[{i}]")
-    elif isinstance(value, str):
-        yield path, value
+        for name, inner in value.items():
+            yield from _leaves(inner, f"{path}.{name}".lstrip("."), str(name))
+    elif isinstance(value, list | tuple):
+        for i, inner in enumerate(value, start=1):
+            yield from _leaves(inner, f"{path}[{i}]", key)
+    else:
+        yield path, key, value
 
 
 def _date(table: dict[str, Any], where: object) -> None:
-    """Write `recorded` of [log] and of every [[file]] as UTC, in text."""
+    """Write `recorded` of [log] and of every [[file]] as UTC, in text.
+
+    Raises:
+        UsageError: C02, a time without its offset, which is another hour in every country.
+    """
     cases = table["file"] if isinstance(table.get("file"), list) else []
     owners = [("log", table.get("log"))]
     owners += [(f"file[{i}]", case) for i, case in enumerate(cases, start=1)]
-    for place, owner in owners:
-        if isinstance(owner, dict) and "recorded" in owner:
-            owner["recorded"] = _utc(owner["recorded"], f"'{place}.recorded'", where)
-
-
-def _utc(value: object, what: str, where: object) -> str:
-    """Return a time as UTC. One without its offset is another hour in every country."""
     example = "write it with its offset from UTC, 2024-05-17T11:30:00+02:00, or with Z"
-    remedy = f"{example}, or leave it out"
-    try:
-        time = value if isinstance(value, datetime.datetime) else None
-        time = time or datetime.datetime.fromisoformat(str(value))
-    except ValueError:
-        message = f"{what} is '{value}', not a date and time of ISO 8601"
-        raise UsageError("C02", message, where=where, remedy=remedy) from None
-    if time.tzinfo is None:
-        message = f"{what} is {value}: the offset from UTC is missing"
-        raise UsageError("C02", message, where=where, remedy=remedy)
-    return time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
+    for place, owner in owners:
+        if not isinstance(owner, dict) or "recorded" not in owner:
+            continue
+        value = owner["recorded"]
+        problem = f"{value}: the offset from UTC is missing"
+        try:
+            time = value if isinstance(value, datetime.datetime) else None
+            time = time or datetime.datetime.fromisoformat(str(value))
+        except ValueError:
+            time, problem = None, f"'{value}', not a date and time of ISO 8601"
+        if time is None or time.tzinfo is None:
+            message, remedy = f"'{place}.recorded' is {problem}", f"{example}, or leave it out"
+            raise UsageError("C02", message, where=where, remedy=remedy)
+        owner["recorded"] = time.astimezone(datetime.UTC).isoformat().replace("+00:00", "Z")
 
 
 def _place(error: Any) -> list[Any]:
@@ -348,10 +344,8 @@ def _explain(error: Any, where: object) -> UsageError:
     if error["type"] in ("extra_forbidden", "unexpected_keyword_argument"):
         kind = ColumnSpec if "columns" in path[:-1] else _SECTIONS.get(str(path[0]), Recipe)
         known = [f.name for f in fields(Recipe if len(path) == 1 else kind) if f.name != "where"]
-        hint = did_you_mean(str(path[-1]), known)
-        message = f"'{place}' is not a key of a recipe{hint}"
-        remedy = f"known here: {', '.join(known)}"
-        return UsageError("C01", message, where=where, remedy=remedy)
+        message = f"'{place}' is not a key of a recipe{did_you_mean(str(path[-1]), known)}"
+        return UsageError("C01", message, where=where, remedy=f"known here: {', '.join(known)}")
     if error["type"] in ("missing", "missing_argument"):
         return UsageError("C02", f"'{place}' is missing", where=where, remedy=_DRAFT)
     message = f"'{place}': {error['msg']}, not {error['input']!r}"
@@ -362,63 +356,46 @@ def _explain(error: Any, where: object) -> UsageError:
 Problems = Iterator[tuple[str, str, str]]  # code, message, remedy; the first one is raised
 
 
-def _numbers(value: object, path: str, key: str = "") -> Iterator[tuple[str, str, float]]:
-    """Yield (place, key, number) of every number in the recipe, also in lists."""
-    if isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _numbers(inner, f"{path}.{name}", str(name))
-    elif isinstance(value, tuple):
-        for i, inner in enumerate(value, start=1):
-            yield from _numbers(inner, f"{path}[{i}]", key)
-    elif is_dataclass(value):
-        for item in fields(value):
-            yield from _numbers(
-                getattr(value, item.name), f"{path}.{item.name}".lstrip("."), item.name
-            )
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        try:
-            yield path, key, float(value)
-        except OverflowError:  # an integer of hundreds of digits
-            yield path, key, math.inf
-
-
 def _bounds(recipe: Recipe) -> Problems:
     """C02: every number is finite and inside its bounds."""
-    for path, key, number in _numbers(recipe, ""):
-        said = f"'{path}' is {number}, must"
-        if path.startswith(("robot.", "missing.")):
+    for path, key, value in _leaves(recipe):
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not number or path.startswith(("robot.", "missing.")):
             continue
-        if not math.isfinite(number):
+        try:
+            x = float(value)  # type: ignore[arg-type]
+        except OverflowError:  # an integer of hundreds of digits
+            x = math.inf
+        said = f"'{path}' is {x}, must"
+        if not math.isfinite(x):
             yield "C02", f"{said} be a finite number", "correct the number"
-        if abs(number) > _LARGEST:
-            remedy = "correct the number, or use another unit"
-            yield "C02", f"{said} lie within ±{_LARGEST:g}", remedy
-        if key in _POSITIVE and number <= 0.0:
+        if abs(x) > RECIPE.largest:
+            yield "C02", f"{said} lie within ±{RECIPE.largest:g}", "correct it, or its unit"
+        if key in _POSITIVE and x <= 0.0:
             yield "C02", f"{said} be above 0", "correct the number"
-        if key == "sign" and abs(number) != 1.0:
+        if key == "sign" and abs(x) != 1.0:
             yield "C02", f"{said} be 1 or -1", "use scale for other factors"
-        if key in ("joint", "column", "columns") and (number < 1 or number != int(number)):
+        if key in ("joint", "column", "columns") and (x < 1 or x != int(x)):
             yield "C02", f"{said} be 1 or more", "joints and columns count from 1"
 
 
 def _format(recipe: Recipe) -> Problems:
     """C02: delimiter, decimal sign, encoding and comment are such that a text can have."""
     form = recipe.format
-    delimiter, comment = form.delimiter or ",", form.comment
+    delimiter, comment, encoding = form.delimiter or ",", form.comment, form.encoding
+    wrong = []
     if len(delimiter) != 1 or delimiter in "\0\r\n.\"'" or delimiter.isalnum():
-        yield _wrong("delimiter", form.delimiter, "one character: , ; tab or blank")
+        wrong.append(("delimiter", form.delimiter, "one character: , ; tab or blank"))
     if form.decimal not in (None, ".", ","):
-        yield _wrong("decimal", form.decimal, "'.' or ','")
+        wrong.append(("decimal", form.decimal, "'.' or ','"))
     try:
-        "0".encode("utf-8" if form.encoding is None else form.encoding)
+        "0".encode("utf-8" if encoding is None else encoding)
     except (LookupError, ValueError, TypeError):
-        yield _wrong("encoding", form.encoding, "for example utf-8 or latin-1")
+        wrong.append(("encoding", encoding, "for example utf-8 or latin-1"))
     if comment is not None and (not comment or any(c in comment for c in "\0\r\n")):
-        yield _wrong("comment", comment, "the characters that begin a comment")
-
-
-def _wrong(key: str, value: object, remedy: str) -> tuple[str, str, str]:
-    return "C02", f"'format.{key}' is {value!r}", f"give {remedy}"
+        wrong.append(("comment", comment, "the characters that begin a comment"))
+    for key, value, remedy in wrong:
+        yield "C02", f"'format.{key}' is {value!r}", f"give {remedy}"
 
 
 def _signals(recipe: Recipe) -> Problems:
@@ -437,7 +414,7 @@ def _signals(recipe: Recipe) -> Problems:
             message = f"'signals.{name}' is in counts: counts_per_rev is missing"
             yield "C02", message, "add counts_per_rev"
     references = [name for name in ("q_ref", "dq_ref", "ddq_ref") if name in recipe.signals]
-    if len(references) not in (0, 3):
+    if len(references) not in (0, len(("q_ref", "dq_ref", "ddq_ref"))):
         message = f"{', '.join(references)} alone: q_ref, dq_ref and ddq_ref come together"
         yield "C02", message, "map all three, or none"
     for name in () if _maps_alone(recipe) else ("q", "tau"):

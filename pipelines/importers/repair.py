@@ -12,25 +12,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import Check, Gathering, InputRejected
+from pipelines.errors import Check, Gathering, InputRejected, Level
+from pipelines.importers.config import REPAIR
 from pipelines.io import limits as common
-from pipelines.io.experiment import Array
-from pipelines.io.limits import (
-    ABSURD,
-    FEWEST,
-    GAP_LIMIT,
-    GAP_TICKS,
-    LARGEST_JITTER,
-    MOST_STEPS,
-    percent,
-    sentinels,
-)
+from pipelines.io.limits import FEWEST, percent
+from pipelines.io.log import Array
 from pipelines.quality.subject import many
 
-__all__ = ["Limits", "Recording", "late_intervals", "repair"]
-
-_SHORTEST_PART = 0.1  # of all samples
-_MOST_MISSING = 0.2
 _MEASURED = ("q", "dq", "tau", "current")
 _NO_SAMPLE = "if it means 'no sample', add [missing] values = [{}]; else the recording is damaged"
 
@@ -52,6 +40,7 @@ class Recording:
     si: Mapping[str, float] = field(default_factory=dict)  # name -> SI of one recorded unit, or 1
 
     def take(self, chosen: slice | npt.NDArray[np.bool_]) -> Recording:
+        """Return the recording of some samples."""
         kept = np.arange(self.t.size)[chosen]
         breaks = {int(np.searchsorted(kept, b)) for b in self.breaks} - {0, kept.size}
         return replace(
@@ -65,11 +54,18 @@ class Recording:
     def listed(self, which: Index) -> str:
         """Return lines or rows in words, the first few."""
         shown = ", ".join(str(self.places[i]) for i in which[:5])
-        more = " …" if which.size > 5 else ""
+        more = " …" if which[5:].size else ""
         return f"{self.word}{'s' if which.size != 1 else ''} {shown}{more}"
 
     def column(self, name: str, joint: int) -> str:
         return f"{self.where}, column '{self.columns[name][joint]}'"
+
+    def check(self, code: str, message: str, remedy: str, level: Level = "repair") -> Check:
+        """Return a check of what was done to the recording, or is left as it is."""
+        return Check.of(code, level, message, where=self.where, remedy=remedy)
+
+    def refused(self, code: str, message: str, remedy: str) -> InputRejected:
+        return InputRejected(code, message, where=self.where, remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -90,9 +86,8 @@ def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...],
         InputRejected: T01, T02, T04, T08, D02, D03: what cannot be repaired.
     """
     checks: list[Check] = []
-    if recording.t.size < 2:
-        message = many(recording.t.size, "sample")
-        raise InputRejected("T08", message, where=recording.where, remedy="record again")
+    if recording.t.size <= 1:
+        raise recording.refused("T08", many(recording.t.size, "sample"), "record again")
     recording = _mark_missing(recording, limits, checks)
     recording = _drop_missing(recording, checks)
     recording = _drop_duplicates(recording, checks)
@@ -101,10 +96,31 @@ def repair(recording: Recording, limits: Limits) -> tuple[tuple[Recording, ...],
         for part in _split_at_steps(recording, checks)
         for piece in _split_at_gaps(part, limits, checks)
     )
-    if not limits.resampled:  # else late samples are part of the record of the resampling
-        for part in parts:
-            _report_clock(part, checks)
+    for part in parts if not limits.resampled else ():
+        # T03, T05: lost samples and uneven time stay; of a resampled log they are in its record.
+        steps = np.diff(part.t)
+        median = float(np.median(steps))
+        rms, worst = common.jitter(steps / median)
+        gaps = late_intervals(part)
+        lost = int(np.round(steps[gaps] / median - 1.0).sum())
+        if lost:
+            share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
+            where = f"{many(gaps.size, 'gap')} of at most {common.GAP_LIMIT}"
+            message = f"{many(lost, 'sample')} ({share}) lost in {where}, after {part.listed(gaps)}"
+            remedy = "give the recorder more priority, or record fewer signals"
+            checks.append(part.check("T03", message, remedy, "warn"))
+        if rms > common.LARGEST_JITTER:
+            vary = f"time is uneven: steps vary about {median:.6g} s by {percent(rms)} (rms)"
+            remedy = "add [resample] rate = … for an even grid"
+            message = f"{vary}, at most by {percent(worst)}"
+            checks.append(part.check("T05", message, remedy, "warn"))
     return parts, tuple(checks)
+
+
+def late_intervals(part: Recording) -> Index:
+    """Return the samples after which a few are lost, or come late."""
+    ticks = np.diff(part.t) / float(np.median(np.diff(part.t)))
+    return common.late(ticks, common.jitter(ticks)[0])
 
 
 def _mark_missing(recording: Recording, limits: Limits, checks: list[Check]) -> Recording:
@@ -115,38 +131,35 @@ def _mark_missing(recording: Recording, limits: Limits, checks: list[Check]) -> 
     lost = np.zeros((recording.t.size, 1), dtype=bool)
     if measured and limits.missing_rows:
         values = np.hstack([recording.signals[name] for name in measured])
-        lost = np.logical_and.reduce(np.isin(values, limits.missing_rows), axis=1)[:, None]
+        lost = np.all(np.isin(values, limits.missing_rows), axis=1, keepdims=True)
     if lost.any():
         message = f"{int(lost.sum())} rows of all measured signals are declared missing"
         remedy = "correct [missing] rows if these are samples"
-        checks.append(Check.of("D03", "repair", message, where=recording.where, remedy=remedy))
-    for name, values in recording.signals.items():
-        hit = np.isin(values, np.array(missing)) if missing else np.zeros(values.shape, dtype=bool)
-        signals[name] = values = np.where(hit | lost, np.nan, values)
+        checks.append(recording.check("D03", message, remedy))
+    for name, raw in recording.signals.items():
+        hit = np.isin(raw, np.array(missing)) if missing else np.zeros(raw.shape, dtype=bool)
+        signals[name] = values = np.where(hit | lost, np.nan, raw)
         if hit.any():
             message = f"{int(hit.sum())} numbers of {name} are declared missing values"
             remedy = "correct [missing] if these are samples"
-            checks.append(Check.of("D03", "repair", message, where=recording.where, remedy=remedy))
+            checks.append(recording.check("D03", message, remedy))
+        absurd = np.abs(values) * recording.si.get(name, 1.0) >= common.ABSURD
         for joint in range(values.shape[1]):
+            where, column = recording.column(name, joint), values[:, joint]
             with problems.part():
-                _refuse_absurd(recording, name, joint, values[:, joint])
+                if (bad := np.flatnonzero(absurd[:, joint])).size:
+                    message = f"{column[bad[0]]:g} in {recording.listed(bad)}"
+                    remedy = _NO_SAMPLE.format(repr(float(column[bad[0]])))
+                    raise InputRejected("D03", message, where=where, remedy=remedy)
+                filler = np.flatnonzero(common.sentinels(column[:, None])[:, 0])
+                if filler.size:
+                    value = f"{column[filler[0]]:.17g}"
+                    message = f"{value} in {recording.listed(filler)} looks like 'no sample': "
+                    message += "nothing else comes near it"
+                    remedy = _NO_SAMPLE.format(value)
+                    raise InputRejected("D03", message, where=where, remedy=remedy)
     problems.raise_all()
     return replace(recording, signals=signals)
-
-
-def _refuse_absurd(recording: Recording, name: str, joint: int, values: Array) -> None:
-    where = recording.column(name, joint)
-    bad = np.flatnonzero(np.abs(values) * recording.si.get(name, 1.0) >= ABSURD)
-    if bad.size:
-        message = f"{values[bad[0]]:g} in {recording.listed(bad)}"
-        remedy = _NO_SAMPLE.format(repr(float(values[bad[0]])))
-        raise InputRejected("D03", message, where=where, remedy=remedy)
-    filler = np.flatnonzero(sentinels(values[:, None])[:, 0])
-    if filler.size:
-        value = f"{values[filler[0]]:.17g}"
-        looks = f"{value} in {recording.listed(filler)} looks like 'no sample'"
-        message, remedy = f"{looks}: nothing else comes near it", _NO_SAMPLE.format(value)
-        raise InputRejected("D03", message, where=where, remedy=remedy)
 
 
 def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
@@ -157,69 +170,64 @@ def _drop_missing(recording: Recording, checks: list[Check]) -> Recording:
     if recording.clocked and 0.0 < empty.mean() < 1.0:  # rows of other topics: no samples of these
         return _drop_missing(recording.take(~empty), checks)
     if lost.all():
-        message, remedy = "no time stamp is a number", "choose another column of time"
-        raise InputRejected("D02", message, where=recording.where, remedy=remedy)
+        raise recording.refused("D02", "no time stamp is a number", "choose another column of time")
     for name, values in recording.signals.items():
         holes = np.isnan(values)
         for joint, share in enumerate(holes.mean(axis=0)):
-            if share > _MOST_MISSING:
+            if share > REPAIR.most_missing:
                 some = f"{100 * share:.0f} % of its samples are missing"
                 message = "holds no number at all" if share == 1.0 else some
-                where = recording.column(name, joint)
                 remedy = "choose another column, or record again"
+                where = recording.column(name, joint)
                 raise InputRejected("D02", message, where=where, remedy=remedy)
         lost |= holes.any(axis=1)
     if not lost.any():
         return recording
     which = np.flatnonzero(lost)
     samples = f"{which.size} of {lost.size} samples"
-    if lost.mean() > _MOST_MISSING:
-        message = f"{samples} have a missing value"
-        raise InputRejected("D02", message, where=recording.where, remedy="record again")
+    if lost.mean() > REPAIR.most_missing:
+        raise recording.refused("D02", f"{samples} have a missing value", "record again")
     message = f"{samples} with a missing value left out ({recording.listed(which)})"
-    remedy = "look for what loses samples"
-    checks.append(Check.of("D01", "repair", message, where=recording.where, remedy=remedy))
+    checks.append(recording.check("D01", message, "look for what loses samples"))
     return recording.take(~lost)
 
 
 def _drop_duplicates(recording: Recording, checks: list[Check]) -> Recording:
     """T02: drop a sample that is written twice; refuse one stamp with two values."""
     again = np.concatenate([[False], np.diff(recording.t) == 0.0])
-    if not again.any():
-        return recording
     which = np.flatnonzero(again)
+    if not which.size:
+        return recording
     every = recording.signals.values()
     differ = np.any([(x[which] != x[which - 1]).any(axis=1) for x in every], axis=0)
     if differ.any():
-        listed = recording.listed(which[differ])
-        message = f"{int(differ.sum())} time stamps stand twice with different values ({listed})"
+        message = f"{int(differ.sum())} time stamps stand twice with different values "
+        message += f"({recording.listed(which[differ])})"
         remedy = "record time with more digits, or import by rate instead of the column"
-        raise InputRejected("T02", message, where=recording.where, remedy=remedy)
+        raise recording.refused("T02", message, remedy)
     message = f"{which.size} samples that stand twice dropped ({recording.listed(which)})"
-    remedy = "let each sample be recorded once"
-    checks.append(Check.of("T02", "repair", message, where=recording.where, remedy=remedy))
+    checks.append(recording.check("T02", message, "let each sample be recorded once"))
     return recording.take(~again)
 
 
 def _split_at_steps(recording: Recording, checks: list[Check]) -> tuple[Recording, ...]:
     """T01: split where the clock was set back or, without a clock, lines are lost."""
     back = np.flatnonzero(np.diff(recording.t) < 0.0) + 1
-    if back.size > MOST_STEPS:
+    if back.size > common.MOST_STEPS:
         message = f"time runs backwards {back.size} times ({recording.listed(back)})"
         remedy = "sort the file by time, or choose another column of time"
-        raise InputRejected("T01", message, where=recording.where, remedy=remedy)
+        raise recording.refused("T01", message, remedy)
     cuts = sorted({*map(int, back), *(() if recording.clocked else recording.breaks)})
-    if not cuts:
-        return (_long_enough(recording),)
     kept, into = _cut(recording, cuts)
-    code, why = "F09", "lines are lost and no clock says how many"
-    if back.size:
-        code, why = "T01", "time steps back"
-    message = f"{why} at {recording.listed(np.array(cuts))}: {into}"
-    remedy = "record without interruption, by one clock"
-    checks.append(Check.of(code, "repair", message, where=recording.where, remedy=remedy))
+    if cuts:
+        code, why = "F09", "lines are lost and no clock says how many"
+        if back.size:
+            code, why = "T01", "time steps back"
+        message = f"{why} at {recording.listed(np.array(cuts))}: {into}"
+        checks.append(recording.check(code, message, "record without interruption, by one clock"))
     if not kept:
-        _long_enough(recording.take(slice(0, cuts[0])))
+        message = f"{cuts[0] if cuts else recording.t.size} samples left; a log needs {FEWEST}"
+        raise recording.refused("T08", message, "record longer")
     return kept
 
 
@@ -228,7 +236,7 @@ def _cut(recording: Recording, cuts: Sequence[int]) -> tuple[tuple[Recording, ..
     size = recording.t.size
     ends = zip([0, *cuts], [*cuts, size], strict=True)
     parts = [recording.take(slice(a, b)) for a, b in ends]
-    shortest = max(FEWEST, _SHORTEST_PART * size / len(parts))
+    shortest = max(FEWEST, REPAIR.shortest_part * size / len(parts))
     kept = tuple(part for part in parts if part.t.size >= shortest)
     words = "one part is kept" if len(kept) == 1 else f"split into {len(kept)} parts"
     if dropped := size - sum(part.t.size for part in kept):
@@ -236,58 +244,21 @@ def _cut(recording: Recording, cuts: Sequence[int]) -> tuple[tuple[Recording, ..
     return kept, words
 
 
-def _long_enough(recording: Recording) -> Recording:
-    if recording.t.size < FEWEST:
-        message = f"{recording.t.size} samples left; a log needs {FEWEST}"
-        raise InputRejected("T08", message, where=recording.where, remedy="record longer")
-    return recording
-
-
 def _split_at_gaps(part: Recording, limits: Limits, checks: list[Check]) -> tuple[Recording, ...]:
     """T04: split at a gap that no observer predicts through; nothing is interpolated across it."""
     steps = np.diff(part.t)
-    longest = GAP_TICKS * float(np.median(steps))
+    longest = common.GAP_TICKS * float(np.median(steps))
     if limits.longest_gap is not None:  # only resampling can bridge more than an observer does
         longest = limits.longest_gap if limits.resampled else min(longest, limits.longest_gap)
     wide = np.flatnonzero(steps > longest)
     if not wide.size:
         return (part,)
     kept, into = _cut(part, (wide + 1).tolist())
-    gaps = f"{many(wide.size, 'gap')} longer than {longest:.4g} s"
-    words = f"{gaps}, the longest {steps.max():.4g} s, after {part.listed(wide)}"
-    if steps[wide].sum() > 0.5 * (part.t[-1] - part.t[0]) or not kept:
+    words = f"{many(wide.size, 'gap')} longer than {longest:.4g} s, the longest {steps.max():.4g} s"
+    words += f", after {part.listed(wide)}"
+    if not kept or steps[wide].sum() > 0.5 * (part.t[-1] - part.t[0]):
         most = "they make more than half of the recording"
         most = most if kept else f"no stretch between them has {FEWEST} samples"
-        remedy = "record again without interruption"
-        raise InputRejected("T04", f"{words}: {most}", where=part.where, remedy=remedy)
-    remedy = "look why the recorder stopped there"
-    checks.append(Check.of("T04", "repair", f"{words}: {into}", where=part.where, remedy=remedy))
+        raise part.refused("T04", f"{words}: {most}", "record again without interruption")
+    checks.append(part.check("T04", f"{words}: {into}", "look why the recorder stopped there"))
     return kept
-
-
-def late_intervals(part: Recording) -> Index:
-    """Return the samples after which a few are lost, or come late."""
-    ticks = np.diff(part.t) / float(np.median(np.diff(part.t)))
-    return common.late(ticks, common.jitter(ticks)[0])
-
-
-def _report_clock(part: Recording, checks: list[Check]) -> None:
-    """T03, T05: report lost samples and uneven time; they stay as gaps of `t`."""
-    steps = np.diff(part.t)
-    median = float(np.median(steps))
-    rms, worst = common.jitter(steps / median)
-    gaps = late_intervals(part)
-    lost = int(np.round(steps[gaps] / median - 1.0).sum())
-    if lost:
-        share = f"{100.0 * lost / (lost + part.t.size):.2g} %"
-        where = f"{many(gaps.size, 'gap')} of at most {GAP_LIMIT}, after {part.listed(gaps)}"
-        message = f"{many(lost, 'sample')} ({share}) lost in {where}"
-        remedy = "give the recorder more priority, or record fewer signals"
-        checks.append(Check.of("T03", "warn", message, where=part.where, remedy=remedy))
-    if rms > LARGEST_JITTER:
-        vary = (
-            f"steps vary about {median:.6g} s by {percent(rms)} (rms), at most by {percent(worst)}"
-        )
-        remedy = "add [resample] rate = … for an even grid"
-        message = f"time is uneven: {vary}"
-        checks.append(Check.of("T05", "warn", message, where=part.where, remedy=remedy))

@@ -11,6 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +19,8 @@ import pytest
 
 from benchmarks.mutations import mutations, read_apart, warm_up
 from pipelines.errors import InputRejected, UsageError
-from pipelines.importers import filenames
-from pipelines.importers.filenames import matches
+from pipelines.importers import patterns
+from pipelines.importers.patterns import matches
 from pipelines.io.model_file import parse_model
 from pipelines.io.shipped import shipped
 from pipelines.io.toml_text import TomlError, parse_toml
@@ -100,7 +101,7 @@ def test_healthy_toml_is_within_the_bounds() -> None:
 @pytest.mark.parametrize("pattern", ["{x:(a+)+}!.csv", pytest.param("*a" * 20 + "!", marks=pytest.mark.slow)])
 def test_a_pattern_cannot_hang_the_import(pattern: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An expression that would take ages is refused when its time, here a second, is over; healthy ones give their groups."""
-    monkeypatch.setattr(filenames, "_SECONDS", 1.0)
+    monkeypatch.setattr(patterns, "RECIPE", replace(patterns.RECIPE, seconds=1.0))
     began = time.monotonic()
     with pytest.raises(UsageError, match=r"RRID-C02.*takes more than 1 s"):
         matches([pattern], ["a" * 60 + ".csv"], tmp_path)

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.recorded_arm import SIX, THREE, TWO, Arm, Run, simulate
 from pipelines.import_log import draft_recipe
-from pipelines.importers.stated import stated_of_some_joints
+from pipelines.importers.notes import stated_of_some_joints
 from tests.importers.good import Array, text, write
 
 DENIED = 'q = { columns = "q{j}", unit = "FILL IN" }'

@@ -13,9 +13,9 @@ import pytest
 from benchmarks.recorded_arm import LIFT, PANDA, THREE, Arm, Run, simulate
 from pipelines.errors import InputRejected, UsageError
 from pipelines.import_log import draft_recipe
-from pipelines.importers.column_names import read_name
 from pipelines.importers.evidence import rollover, sign_of
 from pipelines.importers.guess import guess_recipe
+from pipelines.importers.names import read_name
 from pipelines.importers.recipe import parse_recipe
 from pipelines.io.files import open_log
 from tests.importers.good import Array, good, run, text, write

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.importers.joint_side import drive_of, joint_side
 from pipelines.importers.raw import RawTable, expand
 from pipelines.importers.recipe import Recipe, parse_recipe
 from pipelines.importers.repair import Recording
+from pipelines.importers.units import drive_of, joint_side
 from pipelines.io.robot_files import load_robot
 from tests.importers.good import RECIPE, Array, recording
 

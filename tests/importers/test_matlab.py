@@ -14,9 +14,9 @@ import pytest
 import scipy.io
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.importers.array_files import read_npy
+from pipelines.importers.npy import read_npy
 from pipelines.importers.raw import columns_of_arrays
-from pipelines.importers.sources import read_table
+from pipelines.importers.tables import read_table
 from tests.importers.good import good, text
 
 

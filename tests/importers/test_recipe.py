@@ -7,7 +7,7 @@ import tomllib
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.importers import filenames
+from pipelines.importers import patterns
 from pipelines.importers.recipe import find_recipe, parse_recipe
 from pipelines.io.shipped import shipped_names
 from tests.importers.good import RECIPE
@@ -120,12 +120,12 @@ def test_c02_a_time_without_its_offset_is_refused(value: str) -> None:
     ("*.csv", "sub/run.csv", None),
 ])
 def test_patterns_give_their_groups(pattern: str, name: str, groups: dict[str, str] | None) -> None:
-    assert filenames.match(pattern, name) == groups
+    assert patterns.match(pattern, name) == groups
 
 
 def test_c02_a_broken_pattern_is_refused() -> None:
     with pytest.raises(UsageError, match="RRID-C02.*pattern"):
-        filenames.match("{a:(}.csv", "x.csv")
+        patterns.match("{a:(}.csv", "x.csv")
 
 
 def test_the_docstring_shows_a_recipe_that_is_valid() -> None:

@@ -12,7 +12,7 @@ from benchmarks.recorded_arm import THREE, simulate
 from pipelines.import_log import draft_recipe
 from pipelines.importers.clock import counted_on
 from pipelines.importers.guess import guess_recipe
-from pipelines.importers.stated import (
+from pipelines.importers.notes import (
     stated_counts,
     stated_gear,
     stated_rate,

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from pipelines.errors import InputRejected
 from pipelines.importers.raw import RawTable, unstacked
-from pipelines.importers.tables import read_text
+from pipelines.importers.text import read_text
 from tests.importers.good import good, lines, text
 
 

@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
-from pipelines.importers.sources import read_table
+from pipelines.importers.tables import read_table
 from pipelines.io import files
 from pipelines.io.files import open_log, write_log
 from pipelines.io.sandbox import Answer, guarded
@@ -126,7 +126,7 @@ def test_a_recording_that_is_none_is_refused(tmp_path: Path, monkeypatch: pytest
     import scipy.io
 
     scipy.io.savemat(tmp_path / "a.mat", {"q": np.zeros((50, 3))})
-    monkeypatch.setattr("pipelines.importers.sources.guarded", lambda work, path: Answer(about, {}))
+    monkeypatch.setattr("pipelines.importers.tables.guarded", lambda work, path: Answer(about, {}))
     with pytest.raises(InputRejected, match="RRID-F08"):
         read_table(tmp_path / "a.mat")
 

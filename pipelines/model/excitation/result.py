@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipelines.importers.controller_side import ControllerTable
+from pipelines.importers.units import ControllerTable
 from pipelines.io.experiment import ExperimentLog
 from pipelines.io.results import NOT_STORED
 from pipelines.model.excitation.apart import Apart

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.importers.controller_side import ControllerTable
+from pipelines.importers.units import ControllerTable
 from pipelines.io.experiment import Array, ExperimentLog
 from pipelines.io.results import NOT_STORED
 from pipelines.model.simulation.imitate import Imitation

@@ -8,36 +8,22 @@ give the order, and names without numbers leave the order of the file.
 from __future__ import annotations
 
 import re
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from pathlib import Path
 from typing import Literal
 
-import numpy as np
-
-from pipelines.errors import InputRejected
-from pipelines.importers.column_names import ColumnName, read_name, words_of
+from pipelines.importers.config import NAMES
+from pipelines.importers.names import ColumnName, Origin, read_name, words_of
 from pipelines.importers.raw import RawTable
-from pipelines.importers.sources import read_table
-from pipelines.io.limits import FEWEST
 from pipelines.io.units import canonical_unit
-
-__all__ = ["Choice", "Group", "by_texts", "choose", "file_quantity", "groups_of",
-           "lost_numbers", "of_torques", "sound_samples", "tables_beside", "texts_of",
-           "unit_of_group", "without_lost_rows"]  # fmt: skip
 
 _GENERIC = frozenset({"joint", "joints", "jnt", "axis", "link"})
 _JOINT_SIDE = _GENERIC | {"jnts", "axes", "achse", "gelenk", "j", "a", "q", "qpos", "jpos"}
 _LEARNING = {"observation", "action", "norm", "normalized", "normalised", "scaled"}
-_USABLE = 0.8  # of the cells of a column that is looked at
-_MOST_BESIDE = 20  # files that are read to see whether they have as many columns and rows
-_FAR_OFF = 3.0  # ranges of the other numbers between them and one that marks a lost sample
-_MOTION = ("position", "velocity", "acceleration", "torque", "current", "")
-_NO_NUMBER = 1e20  # nanoseconds since 1970 are 2e18
-
+_NAME = re.compile(r"[\w./:-]+")
 Order = Literal["robot", "numbers", "file", "text"]
+Side = Literal["joint", "motor", "scaled", ""]
 
 
 @dataclass(frozen=True)
@@ -45,7 +31,7 @@ class Group:
     """Columns that belong together, one a joint."""
 
     quantity: str
-    origin: Literal["measured", "plain", "commanded"]
+    origin: Origin
     motor: bool
     partial: bool
     filtered: bool
@@ -56,7 +42,7 @@ class Group:
     gripper: tuple[str, ...] = ()  # columns left out: the file's list of names calls them so
 
     @property
-    def side(self) -> Literal["joint", "motor", "scaled", ""]:
+    def side(self) -> Side:
         """Return the side of the gear by name: q is a joint's; robot learning may scale it."""
         if _LEARNING & set(self.words.split()):
             return "scaled"
@@ -79,6 +65,10 @@ class Choice:
     group: Group | None
     others: tuple[Group, ...] = ()
 
+    @property
+    def left_open(self) -> Choice:
+        return Choice(None, (*((self.group,) if self.group else ()), *self.others))
+
 
 Member = tuple[ColumnName, int | None]  # a column and its joint (from 0), where it is known
 
@@ -88,21 +78,25 @@ def groups_of(table: RawTable, joints: Sequence[str] = (), slides: bool = False)
 
     Where one of them `slides`, its force is grouped with the torques of the others.
     """
-    texts = texts_of(table, joints)
     patterns = _patterns(table, joints)
-    found: dict[tuple[object, ...], list[Member]] = {}
-    shared, port = _shared_path(table), _shared_port(table)
+    shared = _shared_path(table)
+    ports = {column.rpartition("/")[2] for column in table.columns if "/" in column}
+    port = f"/{ports.pop()}" if len(ports) == 1 else ""  # the "Out1" of dSPACE's blocks
+    kinds: dict[tuple[object, ...], list[Member]] = {}
     for column in table.columns:
-        rest, place = _without_joint(column.removeprefix(shared).removesuffix(port), patterns)
+        rest, place = column.removeprefix(shared).removesuffix(port), None
+        for k in sorted(range(len(patterns)), key=lambda k: -len(patterns[k].pattern)):
+            if found := patterns[k].search(rest):
+                rest, place = rest[: found.start()] + " " + rest[found.end() :], k
+                break
         if slides and _number(words_of(rest)) is not None:
             rest = re.sub("(?i)force|kraft|fuerza|forza", "torque", rest)
         name = replace(read_name(rest, canonical_unit(table.units.get(column, ""))), column=column)
-        if place is None:
-            place = _place_by_words(name.label, joints)
+        place = _place_by_words(name.label, joints) if place is None else place
         key = (name.quantity, name.origin, name.motor, name.partial, name.filtered, name.role)
-        found.setdefault(key, []).append((name, place))
-    groups = []
-    for part in (part for members in found.values() for part in _split(members, len(joints))):
+        kinds.setdefault(key, []).append((name, place))
+    groups, texts = [], texts_of(table, joints)
+    for part in (part for members in kinds.values() for part in _split(members, len(joints))):
         if {"x", "y", "z"} <= {name.column.removeprefix(shared).lower() for name, _ in part}:
             part = [(replace(name, quantity="other"), place) for name, place in part]  # a pose
         groups.append(_ordered(part, joints, texts))
@@ -114,25 +108,19 @@ def _shared_path(table: RawTable) -> str:
 
     It says nothing of a column, unless that all are commanded, or without the clock computed.
     """
+
+    def common(names: Sequence[str]) -> str:
+        folders = zip(*(re.split(r"(?<=[./])", name)[:-1] for name in names), strict=False)
+        same = takewhile(lambda parts: len(set(parts)) == 1 < len(parts), folders)
+        return "".join(parts[0] for parts in same)
+
     clocks = ("time", "index")
     signals = [column for column in table.columns if read_name(column).quantity not in clocks]
-    every, path = _common_path(list(table.columns)), _common_path(signals)
+    every, path = common(list(table.columns)), common(signals)
     # Simulink's models name every signal so.
     said = read_name(path.removeprefix(every).replace("Model Root", ""))
     path = every if said.partial and said.origin != "measured" else path or every
     return "" if read_name(path).origin == "commanded" else path
-
-
-def _shared_port(table: RawTable) -> str:
-    """Return the last part of all paths: the "Out1" of dSPACE's blocks."""
-    ports = {column.rpartition("/")[2] for column in table.columns if "/" in column}
-    return f"/{ports.pop()}" if len(ports) == 1 else ""
-
-
-def _common_path(names: Sequence[str]) -> str:
-    folders = zip(*(re.split(r"(?<=[./])", name)[:-1] for name in names), strict=False)
-    same = takewhile(lambda parts: len(set(parts)) == 1 < len(parts), folders)
-    return "".join(parts[0] for parts in same)
 
 
 def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
@@ -143,7 +131,10 @@ def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
     for generic in (frozenset[str](), _GENERIC):
         every = [re.findall(r"\d+|[A-Z]?[a-z]+|[A-Z]+", name) for name in joints]
         names = [[word for word in words if word.lower() not in generic] for words in every]
-        if any(sum(map(len, words)) < 3 or not any(map(str.isalpha, words)) for words in names):
+        if any(
+            len("".join(words)) <= NAMES.short or not any(map(str.isalpha, words))
+            for words in names
+        ):
             continue
         bodies = ["[^A-Za-z0-9]?".join(words) for words in names]
         found = [
@@ -152,14 +143,6 @@ def _patterns(table: RawTable, joints: Sequence[str]) -> list[re.Pattern[str]]:
         if found and all(any(pattern.search(c) for c in table.columns) for pattern in found):
             return found
     return []
-
-
-def _without_joint(column: str, names: Sequence[re.Pattern[str]]) -> tuple[str, int | None]:
-    """Return the column's name without the name of a joint in it, and that joint (from 0)."""
-    for place in sorted(range(len(names)), key=lambda k: -len(names[k].pattern)):
-        if found := names[place].search(column):
-            return column[: found.start()] + " " + column[found.end() :], place
-    return column, None
 
 
 def _place_by_words(label: Sequence[str], joints: Sequence[str]) -> int | None:
@@ -180,12 +163,12 @@ def texts_of(table: RawTable, joints: Sequence[str]) -> tuple[str, ...]:
     They are in columns of their own (name[0] is "elbow_joint") or in one ("['elbow', …]").
     """
     for note in table.notes if joints else ():
-        words = re.findall(r"[\w./:-]+", note)
+        words = _NAME.findall(note)
         if set(joints) <= set(words):
             return tuple(word for word in words if word in joints)
     texts = list(table.labels.values())
     for text in (text for text in texts if text.strip()[:1] in ("[", "(")):
-        words = re.findall(r"[\w./:-]+", text)
+        words = _NAME.findall(text)
         named = set(joints) <= set(words) or not joints
         if len(words) > 1 and named and not any(word[0].isdecimal() for word in words):
             return tuple(words)
@@ -207,7 +190,7 @@ def by_texts(
 
     Without texts of these columns there is no order.
     """
-    if len(texts) != len(columns) or len(texts) < 2:
+    if len(texts) != len(columns) or len(texts) == 1:
         return list(columns), None
     if joints and set(joints) <= set(texts):
         return [columns[list(texts).index(joint)] for joint in joints], "robot"
@@ -261,10 +244,9 @@ def _ordered(members: list[Member], joints: Sequence[str], texts: Sequence[str])
     places = [place for _, place in members]
     numbers = [_number(name.label) for name in names]
     order: Order = "file"
-    counted = None not in numbers and len(set(numbers)) == len(numbers)
     if joints and sorted(p for p in places if p is not None) == list(range(len(joints))):
         names, order = [names[places.index(place)] for place in range(len(joints))], "robot"
-    elif counted and all(place is None for place in places):
+    elif {*places} == {None} and None not in numbers and len(set(numbers)) == len(numbers):
         ranked = sorted(zip(numbers, names, strict=True), key=lambda pair: pair[0] or 0)
         names, order = [name for _, name in ranked], "numbers"
     columns = [name.column for name in names]
@@ -272,9 +254,7 @@ def _ordered(members: list[Member], joints: Sequence[str], texts: Sequence[str])
         columns, by_text = by_texts(columns, texts, joints)
         order = by_text or order
     first = names[0]
-    said = [
-        {w for w in name.label if w.isalpha() and (len(w) > 1 or not w.isascii())} for name in names
-    ]
+    said = [{w for w in name.label if w.isalpha() and (w[1:] or not w.isascii())} for name in names]
     unknown = frozenset(said[0].intersection(*said[1:])) if len(names) > 1 else frozenset()
     words = " ".join(first.role) or " ".join(first.label)
     kind = first.quantity, first.origin, first.motor, first.partial, first.filtered
@@ -309,116 +289,13 @@ def choose(
     return Choice(best[0], rest) if len(best) == 1 else Choice(None, (*best, *rest))
 
 
-def unit_of_group(group: Sequence[str], table: RawTable) -> tuple[str | None, ...]:
+def unit_of_group(columns: Sequence[str], table: RawTable) -> tuple[str | None, ...]:
     """Return the unit of each column as the header or its name says it; None where neither does.
 
     It may be one that `UNITS` does not have, such as "%".
     """
-    headers = [canonical_unit(table.units.get(column, "")).strip() for column in group]
+    headers = [canonical_unit(table.units.get(column, "")).strip() for column in columns]
     return tuple(
         header if header not in ("", "-", "1") else read_name(column).unit or None
-        for header, column in zip(headers, group, strict=True)
+        for header, column in zip(headers, columns, strict=True)
     )
-
-
-def file_quantity(path: Path) -> str:
-    """Return the quantity that the file's name says: "position" of pos_data.csv."""
-    found = read_name(path.stem).quantity
-    return found if found in ("position", "torque", "current") else ""
-
-
-def of_torques(path: Path) -> bool:
-    return file_quantity(path) in ("torque", "current")
-
-
-def tables_beside(path: Path, table: RawTable, by_name: bool) -> Iterator[RawTable]:
-    """Yield the files of the folder with the same columns and rows, as a rule of other signals.
-
-    Positions and torques by their names come first, and alone where `by_name`. Another number makes
-    no other signal: run_2.csv beside run_1.csv.
-    """
-    kind, stem = of_torques(path), re.sub(r"\d+", "#", path.stem)
-    found = [
-        other
-        for other in sorted(path.parent.glob("*"))[:200]
-        if other.suffix.lower() == path.suffix.lower()
-        and re.sub(r"\d+", "#", other.stem) != stem
-        and other.is_file()
-        and other.stat().st_size <= 1 << 30
-    ]
-    found.sort(key=lambda other: file_quantity(other) != "position")
-    named = [other for other in found if of_torques(other) != kind]
-    rest = [other for other in found if of_torques(other) == kind]
-    for other in named if by_name else (*named, *rest[:_MOST_BESIDE]):
-        try:
-            candidate = read_table(other)
-        except InputRejected:
-            continue  # another file of the folder
-        same = list(candidate.columns) == list(table.columns)
-        if same and candidate.rows.size == table.rows.size:
-            yield candidate
-
-
-def lost_numbers(table: RawTable) -> list[float]:
-    """Return whole numbers that mark lost samples: far off all other numbers of their column."""
-    found: Counter[float] = Counter()
-    for column in table.columns.values():
-        values = column[np.isfinite(column) & (np.abs(column) < _NO_NUMBER)]
-        for number in (float(values.min()), float(values.max())) if values.size else ():
-            others = values[values != number]
-            rare = others.size > _USABLE * values.size and np.unique(others[:1000]).size >= 50
-            if number == 0.0 or number != round(number) or not rare:
-                continue  # zero is also a joint at rest
-            room = float(np.ptp(others))
-            if min(abs(number - others.min()), abs(number - others.max())) > _FAR_OFF * room > 0.0:
-                found[number] += values.size - others.size
-    return sorted(number for number, cells in found.items() if cells > 1)
-
-
-def without_lost_rows(table: RawTable) -> tuple[RawTable, int]:
-    """Make holes of rows in which all that was measured is zero, far from the rows around them.
-
-    Far is a jump, into the zeros and out of them, beyond all other steps of some column.
-    """
-    columns = {}
-    for name, column in table.columns.items():
-        said, values = read_name(name), np.where(np.abs(column) < _NO_NUMBER, column, np.nan)
-        moves = np.unique(values[:1000]).size >= 50 and (np.diff(values) < 0).any()
-        if said.quantity in _MOTION and said.origin != "commanded" and moves:
-            columns[name] = values
-    x = np.column_stack(list(columns.values())) if columns else np.zeros((0, 0))
-    lost = (x == 0.0).all(axis=1)
-    starts = np.flatnonzero(~lost[:-1] & lost[1:])
-    ends = np.flatnonzero(lost[:-1] & ~lost[1:])
-    ends = ends[ends > starts[0]] if starts.size else starts
-    if x.shape[1] < 2 or not ends.size or lost.mean() > 1.0 - _USABLE:
-        return table, 0
-    steps = np.abs(np.diff(x, axis=0))
-    jumps = np.minimum(steps[starts[: ends.size]], steps[ends])
-    usual = np.nan_to_num(steps[~lost[:-1] & ~lost[1:]]).max(axis=0)
-    if not (np.median(np.nan_to_num(jumps), axis=0) > _FAR_OFF * usual).any():
-        return table, 0
-    holes = {name: np.where(lost, np.nan, table.columns[name]) for name in columns}
-    return replace(table, columns={**table.columns, **holes}), int(lost.sum())
-
-
-def sound_samples(table: RawTable, lost: Sequence[float]) -> RawTable:
-    """Return the rows without a hole, an absurd or a lost number, and columns of mostly numbers."""
-    usable = {
-        name: np.isfinite(values) & (np.abs(values) < _NO_NUMBER) & ~np.isin(values, lost)
-        for name, values in table.columns.items()
-    }
-    # A table of several topics leaves cells of the others empty: the rows of most columns count.
-    masks = Counter(known.tobytes() for known in usable.values() if known.any())
-    topic = np.frombuffer(masks.most_common(1)[0][0] if masks else b"", dtype=np.bool_)
-    usable = {name: known[topic] for name, known in usable.items()}
-    names = [name for name, known in usable.items() if known.mean() > _USABLE]
-    keep = np.all([usable[name] for name in names], axis=0) if names else np.zeros(0, dtype=bool)
-    if keep.sum() < FEWEST:
-        message = f"{int(keep.sum())} samples without a hole"
-        remedy = "give a recording of a motion"
-        raise InputRejected("T08", message, where=table.source, remedy=remedy)
-    rows = np.flatnonzero(topic)[keep]
-    lines = None if table.lines is None else table.lines[rows]
-    columns = {name: table.columns[name][rows] for name in names}
-    return replace(table, columns=columns, rows=table.rows[rows], lines=lines)

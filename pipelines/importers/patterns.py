@@ -4,24 +4,22 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 
 from pipelines.errors import EnvironmentFault, InputRejected, UsageError
+from pipelines.importers.config import RECIPE
 from pipelines.io.sandbox import Answer, guarded
 
-__all__ = ["files_below", "fill", "inside", "lying_there", "match", "matches", "unique"]
-
-_MOST_FILES = 100_000
-_NAMED = 5  # files that a message names
-_LONGEST = 500  # characters of a pattern
-_SIMPLE = 2  # wildcards: a name of 255 characters is tried 255² times at most
-_SECONDS = 3.0  # for all patterns of a recipe on all names
-_MEMORY = 256 << 20  # [B]
 _FIELD = re.compile(r"\{([A-Za-z_]\w*)(?::([^{}]+(?:\{\d+(?:,\d*)?\}[^{}]*)*))?\}")
 
 Patterns = str | tuple[str, ...]
+
+
+def each(patterns: Patterns) -> tuple[str, ...]:
+    """Return one or several patterns as several."""
+    return (patterns,) if isinstance(patterns, str) else patterns
 
 
 @lru_cache(maxsize=256)
@@ -30,33 +28,30 @@ def _compiled(pattern: str) -> re.Pattern[str]:
 
     {name} is any text without a slash, {name:regex} that; *, ** and ? are as in a shell.
     """
-    if len(pattern) > _LONGEST:
-        message, remedy = f"a pattern of {len(pattern)} characters", f"write at most {_LONGEST}"
+    if len(pattern) > RECIPE.longest_pattern:
+        message = f"a pattern of {len(pattern)} characters"
+        remedy = f"write at most {RECIPE.longest_pattern}"
         raise UsageError("C02", message, where="match", remedy=remedy)
-    parts, at = [], 0
-    seen: set[str] = set()
-    for found in _FIELD.finditer(pattern):
-        name, inner = found.group(1), found.group(2) or r"[^/]+?"
-        group = f"(?P={name})" if name in seen else f"(?P<{name}>{inner})"
-        parts += [_shell(pattern[at : found.start()]), group]
-        seen.add(name)
-        at = found.end()
-    parts.append(_shell(pattern[at:]))
+    shell = ((r"\*\*", ".*"), (r"\*", "[^/]*"), (r"\?", "[^/]"))
+    expression, seen = "", set[str]()
+    for k, part in enumerate(_FIELD.split(pattern)):
+        if k % 3 == 0:
+            text = re.escape(part)
+            for sign, meaning in shell:
+                text = text.replace(sign, meaning)
+            expression += text
+        elif k % 3 == 1:
+            name = part
+        else:
+            group = f"(?P={name})" if name in seen else f"(?P<{name}>{part or '[^/]+?'})"
+            expression += group
+            seen.add(name)
     try:
-        return re.compile("".join(parts))
+        return re.compile(expression)
     except re.error as problem:
         message = f"pattern '{pattern}': {problem}"
         remedy = "write {name}, or {name:regular expression}"
         raise UsageError("C02", message, where="match", remedy=remedy) from None
-
-
-def _shell(text: str) -> str:
-    text = re.escape(text)
-    return text.replace(r"\*\*", ".*").replace(r"\*", "[^/]*").replace(r"\?", "[^/]")
-
-
-def _each(patterns: Patterns) -> tuple[str, ...]:
-    return (patterns,) if isinstance(patterns, str) else patterns
 
 
 def matches(
@@ -69,7 +64,7 @@ def matches(
     Raises:
         UsageError: C02, a pattern is invalid, or takes too long.
     """
-    flat = [pattern for patterns in every for pattern in _each(patterns)]
+    flat = [pattern for patterns in every for pattern in each(patterns)]
     for pattern in flat:
         _compiled(pattern)
 
@@ -77,34 +72,28 @@ def matches(
         fits = [{name: match(patterns, name) for name in names} for patterns in every]
         return [{k: groups for k, groups in fit.items() if groups is not None} for fit in fits]
 
-    if all(":" not in p and len(re.findall(r"\{|\*+", p)) <= _SIMPLE for p in flat):
+    if all(":" not in p and len(re.findall(r"\{|\*+", p)) <= RECIPE.simple for p in flat):
         return work()
     try:
-        answer = guarded(lambda: Answer({"found": work()}, {}), where, seconds=_SECONDS, memory=_MEMORY)
+        found = guarded(
+            lambda: Answer({"found": work()}, {}),
+            where,
+            seconds=RECIPE.seconds,
+            memory=RECIPE.memory,
+        )
     except InputRejected:
-        message = f"a pattern takes more than {_SECONDS:.0f} s: {', '.join(flat)}"
+        message = f"a pattern takes more than {RECIPE.seconds:.0f} s: {', '.join(flat)}"
         remedy = "write fewer wildcards, and no repetition inside another, such as (a+)+"
         raise UsageError("C02", message, where=where, remedy=remedy) from None
-    found: list[dict[str, dict[str, str]]] = answer.about["found"]
-    return found
+    return list(found.about["found"])
 
 
 def match(patterns: Patterns, relative: str) -> dict[str, str] | None:
     """Return the groups of the first pattern that fits the path, and {stem}; None otherwise."""
-    for pattern in _each(patterns):
+    for pattern in each(patterns):
         if found := _compiled(pattern).fullmatch(relative):
             return {"stem": Path(relative).stem} | found.groupdict(default="")
     return None
-
-
-def lying_there(names: Sequence[str], endings: Collection[str]) -> str:
-    """Return the files of a folder in words, those with the `endings` of recordings first."""
-    if not names:
-        return "no file lies there"
-    ordered = sorted(names, key=lambda name: Path(name).suffix.lower() not in endings)
-    more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
-    lie = "lies" if len(names) == 1 else "lie"
-    return f"there {lie} {', '.join(ordered[:_NAMED])}{more}"
 
 
 def fill(template: str, groups: Mapping[str, str], where: object) -> str:
@@ -127,11 +116,8 @@ def files_below(folder: Path) -> tuple[str, ...]:
     Links to folders are not followed.
 
     Raises:
-        UsageError: not a folder. EnvironmentFault: no permission.
+        UsageError: C07, too many. EnvironmentFault: no permission.
     """
-    if not folder.is_dir():
-        remedy = "give the folder of the recordings with --source"
-        raise UsageError("C04", "no such folder", where=folder, remedy=remedy)
     if not os.access(folder, os.R_OK | os.X_OK):
         remedy = "change its permissions"
         raise EnvironmentFault("F13", "permission denied", where=folder, remedy=remedy)
@@ -140,8 +126,8 @@ def files_below(folder: Path) -> tuple[str, ...]:
         folders[:] = sorted(f for f in folders if not f.startswith("."))
         shown = [name for name in names if not name.startswith(".")]
         found += [Path(parent, name).relative_to(folder).as_posix() for name in shown]
-        if len(found) > _MOST_FILES:
-            message = f"more than {_MOST_FILES} files"
+        if len(found) > RECIPE.most_files:
+            message = f"more than {RECIPE.most_files} files"
             remedy = "give a folder that holds the recordings only"
             raise UsageError("C07", message, where=folder, remedy=remedy)
     return tuple(sorted(found))

@@ -14,17 +14,16 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
-from pipelines.importers.column_names import (
-    WORDS,
+from pipelines.importers.config import NOTES
+from pipelines.importers.names import (
     narrow_signs,
     plain_letters,
     read_name,
+    spoken,
+    vocabulary,
     words_of,
 )
 from pipelines.io.units import UNITS, canonical_unit
-
-__all__ = ["Statement", "stated_counts", "stated_gear", "stated_of_some_joints", "stated_rate",
-           "stated_scale", "stated_unit"]  # fmt: skip
 
 _NUMBER = r"(?<![\w.,:])([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?)(?![\d:])"
 _COUNT = (
@@ -54,18 +53,7 @@ _THINNED = re.compile(
     r"decimat\w*+\W++(?!1\b)|(?:down.?|sub)sampl|every (?:\d+(?:st|nd|rd|th)|second |other|tenth)"
     r"|jede[rn]? \d"
 )
-_GENERIC = frozenset({
-    "all", "alle", "are", "base", "column", "columns", "data", "each", "einheit", "einheiten",
-    "in", "is", "of", "otherwise", "si", "signals", "stated", "the", "to", "todas", "toutes",
-    "unidad", "unidades", "unit", "unita", "unite", "unites", "units", "unless", "value", "values",
-    "单位", "単位",
-})  # fmt: skip
 _UNIT_OF_NAME = re.compile(r"[a-z].*[\[(_ ](k?hz|[mµμu]?s)(?:[\])]|\b)(?=[^a-z]*$)")
-_GEARS = frozenset({
-    "gear", "gears", "gearbox", "gearing", "reduction", "reducer", "planetary", "harmonic",
-    "getriebe", "untersetzung", "ubersetzung", "reducteur", "reductor", "riduttore", "riduzione",
-    "reduccion", "减速比", "減速比",
-})  # fmt: skip
 _SAMPLED = re.compile(
     r"sampl|\bf_?s\b|\bt_?s\b|\bdt\b|_dt\b|\bfps\b|\brate\b|logg|record|acqui|scan|abtast|takt"
     r"|zyklus|cycle|echantillon|cadence|muestre|campion|amostra|bemonster|probkow|vzorkov|ornekleme"
@@ -77,21 +65,12 @@ _NOT_SAMPLED = re.compile(
     r"|duration|start|offset|length|fourier|\bfor\b|baud|regel|frequency of|trajectory|camera"
     r"|buffer|update|inner|current loop"
 )
-_VOID = frozenset({
-    "before", "but", "conversion", "convert", "converted", "display", "displayed", "either",
-    "except", "from", "gui", "kein", "likely", "maybe", "multiply", "nicht", "no", "non", "not",
-    "or", "originally", "pas", "plot", "plots", "print", "home", "initial", "offset", "start",
-    "zero", "printed", "probably", "raw", "show", "shown", "shows", "todo", "unknown", "was",
-    "were",
-})  # fmt: skip
 _SI = re.compile(
     r"\bsi[ -](?:base )?(?:units?|einheiten|unites?)\b"
     r"|\b(?:units?|einheiten|unites?|unidades|unita)\W+(?:\w+ )?si\b"
 )
 _SI_UNITS = {"position": "rad", "velocity": "rad/s", "torque": "N m", "current": "A", "time": "s"}
-_LONGEST = 300  # characters of a line that is read
 _OF_EACH = frozenset({"per", "pro", "par", "por", "je", "a", "/", "1"})
-_SLOWEST, _FASTEST = 1.0, 1e5  # [Hz] what robots are recorded at
 _AROUND = "#%/*!;\"' \t,"  # a comment
 
 
@@ -108,10 +87,10 @@ def _clauses(notes: Sequence[str]) -> Iterator[str]:
     """Yield the parts of lines that say one thing each; two cells are a name and its value."""
     for line in notes:
         text = narrow_signs(line).replace('",', '";').strip().lstrip("#%/*!;\"' ")
-        text = text.strip(" ,;\t\"'")[:_LONGEST]
+        text = text.strip(" ,;\t\"'")[: NOTES.longest]
         split = re.split(r"[;\t]|,(?!\d)|(?<=[^\W\d]),", text)
         cells = [cell.strip() for cell in split if cell.strip()]
-        values = cells[1 : 2 + (len(cells) > 3)]
+        values = cells[1:3] if cells[3:] else cells[1:2]
         if values and all(re.fullmatch(r"[+-]?\d\S*( ?[^\W\d]+)?", cell) for cell in values):
             yield " ".join(cells)
             continue
@@ -172,13 +151,13 @@ def stated_unit(
     found: dict[str, str] = {}
     for clause in _clauses(notes):
         words = _words(clause)
-        if words & _VOID or (words & WORDS["other"]) - {"data"}:
+        if words & spoken("void") or (words & vocabulary()["other"]) - {"data"}:
             continue
-        if words & (WORDS["temperature"] | _GEARS):
+        if words & (vocabulary()["temperature"] | spoken("gear")):
             continue
-        ordered = words & WORDS["commanded"] and not words & WORDS["measured"]
-        of_motor = words & WORDS["motor"] and not words & WORDS["joint"] and not motor
-        if ordered or of_motor or (quantity == "torque" and words & WORDS["partial"]):
+        ordered = words & vocabulary()["commanded"] and not words & vocabulary()["measured"]
+        of_motor = words & vocabulary()["motor"] and not words & vocabulary()["joint"] and not motor
+        if ordered or of_motor or (quantity == "torque" and words & vocabulary()["partial"]):
             continue
         if _SI.search(plain_letters(clause).lower()) and quantity in _SI_UNITS and not linear:
             found.setdefault(_SI_UNITS[quantity], clause)
@@ -186,7 +165,7 @@ def stated_unit(
             if UNITS[unit].quantity != quantity:
                 continue
             beside = {word for word in _words(before) if not word.isdecimal()}
-            generic = beside <= _GENERIC | WORDS["joint"] | {unit.lower()}
+            generic = beside <= spoken("generic") | vocabulary()["joint"] | {unit.lower()}
             fits = quantity != "position" or linear == (unit in ("m", "cm", "mm", "um"))
             if fits and (generic or read_name(before).quantity == quantity):
                 found.setdefault(canonical_unit(unit), clause)
@@ -226,7 +205,7 @@ def stated_rate(notes: Sequence[str]) -> Statement | None:
         named = _UNIT_OF_NAME.search(text)
         for number, unit in _QUANTITY.findall(text):
             rate = _rate_of(_number(number), unit or (named[1] if named else ""), text)
-            if _SLOWEST <= rate <= _FASTEST:
+            if NOTES.slowest <= rate <= NOTES.fastest:
                 found.setdefault(rate, clause)
     return _only(found, 0.02, "g")
 
@@ -251,14 +230,14 @@ def stated_of_some_joints(notes: Sequence[str], n: int) -> list[str]:
 
     A person must read them.
     """
-    of_joint, found = (WORDS["joint"] | {"q"}) - {"a"}, []
+    of_joint, found = (vocabulary()["joint"] | {"q"}) - {"a"}, []
     for clause in _clauses(notes):
-        words = words_of(clause[:_LONGEST])
+        words = words_of(clause[: NOTES.longest])
         pairs = itertools.pairwise(words)
         numbers = {number for word, number in pairs if word in of_joint and number.isdecimal()}
-        more = {word for word in words if not word.isdecimal()} - of_joint - WORDS["noise"]
-        if 0 < len(numbers) < n and len(more) > 2 and not any(_units(clause)):
-            found.append(clause.strip(_AROUND)[:_LONGEST])
+        more = {word for word in words if not word.isdecimal()} - of_joint - vocabulary()["noise"]
+        if 0 < len(numbers) < n and len(more) >= NOTES.fewest_words and not any(_units(clause)):
+            found.append(clause.strip(_AROUND)[: NOTES.longest])
     return found
 
 
@@ -295,11 +274,11 @@ def stated_gear(notes: Sequence[str]) -> Statement | None:
     """Return the gear ratio that the file states: "6:1", "1:101", "gear ratio 50"."""
     found: dict[float, str] = {}
     for note in notes:
-        line = note[:_LONGEST]
-        if _words(line) & _GEARS:
+        line = note[: NOTES.longest]
+        if _words(line) & spoken("gear"):
             ratios = [max(map(_number, pair)) for pair in _RATIO.findall(line)]
             for ratio in ratios or map(_number, re.findall(_NUMBER, line)):
-                found.setdefault(ratio, note.strip(_AROUND)[:_LONGEST])
+                found.setdefault(ratio, note.strip(_AROUND)[: NOTES.longest])
     return _only(found, 1e-3, ".10g")
 
 

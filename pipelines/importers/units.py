@@ -1,0 +1,452 @@
+"""Convert recorded numbers into SI on the joint side, and a planned motion back.
+
+unwrap -> scale, sign -> unit -> torque constant -> transmission -> offset. With q_motor = N q_joint
+and tau_joint = Nᵀ tau_motor, the power q̇ᵀ tau is the same on both sides, sample by sample.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from pipelines.errors import Check, Gathering, InputRejected, UsageError
+from pipelines.importers.config import EVIDENCE, RECIPE
+from pipelines.importers.evidence import quarter_turns
+from pipelines.importers.names import MOTION, quantity_of
+from pipelines.importers.raw import RawTable
+from pipelines.importers.recipe import DriveSpec, Numbers, Recipe, SignalSpec
+from pipelines.importers.repair import Recording
+from pipelines.io import schema
+from pipelines.io.log import Array, Signal
+from pipelines.io.output import write_file
+from pipelines.io.parquet import csv_cell
+from pipelines.io.robot import Drive, RobotDescription
+from pipelines.io.units import UNITS, canonical_unit, to_si
+from pipelines.quality.subject import many
+from pipelines.quality.units import degrees_or_motor
+
+_LINEAR = frozenset({"m", "cm", "mm", "um", "m/s", "cm/s", "mm/s", "m/s^2", "mm/s^2", "N", "mN",
+                     "kN"})  # fmt: skip
+_TURNS = {"deg": 360.0, "°": 360.0, "rad": 2.0 * math.pi, "mrad": 2000.0 * math.pi, "rev": 1.0,
+          "turn": 1.0}  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Converted:
+    """Signals in SI and what was done to them, in words."""
+
+    signals: dict[str, Signal] = field(default_factory=dict)
+    steps: list[str] = field(default_factory=list)
+    altered: list[str] = field(default_factory=list)  # beyond units and transmission
+    checks: list[Check] = field(default_factory=list)
+
+
+def drive_of(spec: DriveSpec, robot: RobotDescription, where: object) -> Drive | None:
+    """Return the drive of the recipe, or of the robot where the recipe says nothing.
+
+    Raises:
+        UsageError: C02, it does not fit the number of joints, or cannot be inverted.
+    """
+    n, rows = robot.n_joints, spec.transmission
+    own = robot.drive or Drive()
+    matrix, constants = own.transmission, own.torque_constant
+    if rows is not None:
+        if len(rows) != n or any(isinstance(row, tuple) and len(row) != n for row in rows):
+            message = f"drive.transmission must hold {n} gear ratios, or {n} rows of {n} numbers"
+            remedy = "write the gear ratio of each joint, or the whole matrix N of "
+            remedy += "q_motor = N q_joint"
+            raise UsageError("C02", message, where=where, remedy=remedy)
+        unit = np.eye(n)
+        pairs = zip(rows, unit, strict=True)
+        square = np.array([row if isinstance(row, tuple) else row * e for row, e in pairs])
+        if abs(np.linalg.det(square)) < RECIPE.singular:
+            message, remedy = "drive.transmission cannot be inverted", "each joint needs a motor"
+            raise UsageError("C02", message, where=where, remedy=remedy)
+        matrix = tuple(map(tuple, square.tolist()))
+    if spec.torque_constant is not None:
+        numbers = _per_joint(spec.torque_constant, n, "drive.torque_constant", where)
+        constants = tuple(numbers.tolist())
+    return None if matrix is None and constants is None else Drive(matrix, constants)
+
+
+def _per_joint(value: Numbers, n: int, what: str, where: object) -> Array:
+    """Return a number of each joint.
+
+    Raises:
+        UsageError: C02, there are more or fewer than joints.
+    """
+    if isinstance(value, tuple) and len(value) != n:
+        message = f"{what} holds {len(value)} numbers, the robot has {n} joints"
+        raise UsageError("C02", message, where=where, remedy="one number, or one a joint")
+    return np.broadcast_to(np.asarray(value, dtype=np.float64), (n,)).copy()
+
+
+def unit_declared(
+    name: str,
+    spec: SignalSpec,
+    table: RawTable,
+    columns: tuple[str, ...],
+    robot: RobotDescription,
+    assume: bool,
+) -> tuple[tuple[str, ...], list[Check]]:
+    """Return the unit of each joint: the recipe's, else the header's.
+
+    Raises:
+        InputRejected: S04, neither says it. S05, both differ.
+    """
+    where = f"{table.source}, signal {name}"
+    headers = [table.units.get(column) for column in columns]
+    if spec.unit is not None:
+        units, checks = _units_of_recipe(name, spec, robot, where)
+        for header, unit in zip(headers, units, strict=True):
+            known = UNITS.get(canonical_unit(header or "")), UNITS.get(canonical_unit(unit))
+            if None not in known and known[0] != known[1]:
+                message = f"the header says '{header}', the recipe says '{unit}'"
+                raise InputRejected("S05", message, where=where, remedy="correct one of them")
+        return units, checks
+    given = [header for header in headers if header is not None]
+    if given and (len(set(given)) == 1 or len(given) == len(columns)):
+        message = f"unit '{', '.join(dict.fromkeys(given))}' taken from the header"
+        units = tuple(header or given[0] for header in headers)
+        return units, [Check.of("S06", "ok", message, where=where)]
+    wanted = _own_units(name, robot)
+    if not assume:
+        words = f'"{wanted[0]}"' if len(set(wanted)) == 1 else json.dumps(wanted)
+        message = f"no unit; say what the numbers of {name} are in"
+        remedy = f"add unit = {words} (or what it is) to signals.{name}"
+        remedy += ", or pass --assume-units if they are SI"
+        raise InputRejected("S04", message, where=where, remedy=remedy)
+    message = f"no unit; taken as {', '.join(dict.fromkeys(wanted))}, as --assume-units says"
+    remedy = "write the unit in the recipe"
+    return wanted, [Check.of("S04", "warn", message, where=where, remedy=remedy)]
+
+
+def _units_of_recipe(
+    name: str, spec: SignalSpec, robot: RobotDescription, where: object
+) -> tuple[tuple[str, ...], list[Check]]:
+    """Return the unit of each joint that the recipe declares.
+
+    One SI unit for an arm of turning and sliding joints is SI for each of them, as in a log: "rad"
+    is m where a joint slides.
+
+    Raises:
+        UsageError: C02, there are more or fewer units than joints.
+    """
+    n = robot.n_joints
+    if isinstance(spec.unit, tuple):
+        if len(spec.unit) != n:
+            message = f"signals.{name}.unit holds {len(spec.unit)} units, the robot has {n} joints"
+            raise UsageError("C02", message, where=where, remedy="one unit, or one a joint")
+        return spec.unit, []
+    unit = canonical_unit(spec.unit or "")
+    own = _own_units(name, robot)
+    if spec.side == "motor" or len(set(own)) == 1 or unit != schema.unit_of(name):
+        return (spec.unit or "",) * n, []
+    joints = enumerate(zip(own, robot.joints, strict=True), start=1)
+    other = ", ".join(f"{x} for joint {j} '{joint.name}'" for j, (x, joint) in joints if x != unit)
+    message = f"'{unit}' declared for turning and sliding joints: taken as SI, {other}"
+    remedy = f"write unit = {json.dumps(own)} in signals.{name}"
+    return own, [Check.of("S05", "warn", message, where=where, remedy=remedy)]
+
+
+def _own_units(name: str, robot: RobotDescription) -> tuple[str, ...]:
+    """Return the SI unit of each joint; of an excitation without a law, that of acceleration."""
+    if schema.SIGNALS[name][0] == "excitation":
+        return (schema.unit_of(name),) * robot.n_joints
+    return tuple(schema.joint_unit(name, revolute) for revolute in robot.revolute)
+
+
+def si_of(units: Sequence[str], spec: SignalSpec) -> float:
+    """Return what one recorded number is in SI, on its side of the drive, at most."""
+    scale = float(np.max(np.abs(spec.scale)))
+    if set(units) & {"counts", "counts/s"} and spec.counts_per_rev is not None:
+        return scale * 2.0 * math.pi / float(np.min(spec.counts_per_rev))
+    return scale * max(UNITS[unit].factor if unit in UNITS else 1.0 for unit in units)
+
+
+def joint_side(
+    part: Recording,
+    recipe: Recipe,
+    units: Mapping[str, tuple[str, ...]],
+    robot: RobotDescription,
+    drive: Drive | None,
+    trust_units: bool = False,
+) -> Converted:
+    """Return all signals of a part in SI, joint side.
+
+    Raises:
+        InputRejected: S05 unit of another quantity, S07 degrees declared as radians, S10 current
+            without constant.
+    """
+    done = Converted()
+    problems = Gathering()
+    n, where = robot.n_joints, recipe.where
+    for name, raw in part.signals.items():
+        with problems.part():
+            spec, each = recipe.signals[name], units[name]
+            offset = _per_joint(spec.offset, n, f"signals.{name}.offset", where)
+            factor = _per_joint(spec.scale, n, f"signals.{name}.scale", where)
+            factor *= _per_joint(spec.sign, n, f"signals.{name}.sign", where)
+            values = _unwrapped(part, name, raw, spec, each, done) * factor
+            values = _in_si(part, name, values, recipe, each, drive, done)
+            if _motor_side(name, recipe):
+                values = _through_drive(name, values, drive, where, done)
+            elif schema.SIGNALS[name][0] in (*MOTION, "torque"):
+                _refuse_wrong_kind(part, name, each, robot)
+            if offset.any():
+                done.steps.append(f"{name}: offset {', '.join(f'{x:.6g}' for x in offset)} added")
+            law = recipe.controller.law if recipe.controller else None
+            unit, words = schema.unit_of(name, law), schema.SIGNALS[name][1]
+            done.signals[name] = Signal(values + offset, unit, words)
+    problems.raise_all()
+    if not trust_units and "q" in done.signals:
+        _refuse_degrees(part, done.signals["q"].values, units["q"], robot)
+    in_degrees = "q" in part.signals and set(units["q"]) <= {"deg", "°"}
+    if turns := quarter_turns(part.signals["q"]) if in_degrees else {}:
+        starts = f"the numbers start at {', '.join(map(str, turns.values()))} times pi/2"
+        message = f"declared in degrees, but {starts}, digit by digit: radians of the motor side?"
+        remedy = 'if so, declare unit = "rad" and add [drive] transmission = the gear ratios'
+        at = f"{part.where}, signal q"
+        done.checks.append(Check.of("S07", "warn", message, where=at, remedy=remedy))
+    return done
+
+
+def _unwrapped(
+    part: Recording,
+    name: str,
+    raw: Array,
+    spec: SignalSpec,
+    units: tuple[str, ...],
+    done: Converted,
+) -> Array:
+    """D07: follow a counter that starts again; a jump of more than half its range is one.
+
+    Where the recipe names no range, and every large step of a position is a whole turn amid small
+    ones, these are unwrapped too.
+    """
+    wrap = spec.wrap
+    if wrap is None and len(set(units)) == 1 and schema.SIGNALS[name][0] == "position":
+        turn = _TURNS.get(units[0], math.inf)
+        if units[0] == "counts" and isinstance(spec.counts_per_rev, int | float):
+            turn = float(spec.counts_per_rev)
+        steps = np.abs(np.diff(raw, axis=0))
+        large = steps > 0.5 * turn
+        near = EVIDENCE.same_ratio * turn
+        if large.any() and not large.all() and np.abs(steps[large] - turn).max() < near:
+            wrap = turn if steps[~large].max() < near else None
+    if wrap is None:
+        return raw
+    turns = np.round(np.diff(raw, axis=0) / wrap)
+    for joint in np.flatnonzero(turns.any(axis=0)):
+        count = many(int(np.abs(turns[:, joint]).sum()), "rollover")
+        rollovers = f"{count} of {wrap:g} unwrapped"
+        at = part.listed(np.flatnonzero(turns[:, joint]) + 1)
+        message, where = f"{rollovers} ({at})", part.column(name, int(joint))
+        remedy = "let the recorder count turns"
+        done.checks.append(Check.of("D07", "warn", message, where=where, remedy=remedy))
+        done.altered.append(f"{name} of joint {joint + 1}: {rollovers}")
+    zero = np.zeros((1, raw.shape[1]))
+    return raw - wrap * np.concatenate([zero, np.cumsum(turns, axis=0)]) if turns.any() else raw
+
+
+def _in_si(
+    part: Recording,
+    name: str,
+    values: Array,
+    recipe: Recipe,
+    units: tuple[str, ...],
+    drive: Drive | None,
+    done: Converted,
+) -> Array:
+    """Return SI values still on their side of the drive; a torque's current is a signal too."""
+    where, spec = f"{part.where}, signal {name}", recipe.signals[name]
+    quantity, own = schema.SIGNALS[name][0], schema.unit_of(name)
+    if quantity == "excitation":
+        quantity = _excitation(name, recipe, units, where)
+    si = np.empty_like(values)
+    for unit in dict.fromkeys(units):
+        at = np.flatnonzero([other == unit for other in units])
+        if unit in ("counts", "counts/s") and quantity in ("position", "velocity"):
+            if spec.counts_per_rev is None:
+                remedy = f"add counts_per_rev to signals.{name}"
+                raise InputRejected(
+                    "S05", "counts without counts_per_rev", where=where, remedy=remedy
+                )
+            what = f"signals.{name}.counts_per_rev"
+            turn = _per_joint(spec.counts_per_rev, len(units), what, recipe.where)
+            rate = f"{spec.counts_per_rev} counts a revolution"
+            done.steps.append(f"{name}: {unit} at {rate} to {own}")
+            si[:, at] = values[:, at] * (2.0 * math.pi / turn[at])
+        elif quantity == "torque" and unit in UNITS and UNITS[unit].quantity == "current":
+            constants = drive.torque_constant if drive else None
+            if constants is None:
+                message = f"{name} is recorded in {unit}, motor current instead of torque"
+                remedy = "add [drive] torque_constant = … [N m/A]"
+                raise InputRejected("S10", message, where=where, remedy=remedy)
+            listed = ", ".join(f"{constants[j]:g}" for j in at)
+            done.steps.append(f"{name}: {unit} times {listed} N m/A")
+            amperes = UNITS[unit].factor * values
+            si[:, at] = amperes[:, at] * np.array(constants)[at]
+            if name == "tau" and at.size == len(units) and "current" not in recipe.signals:
+                done.signals["current"] = Signal(amperes, "A", schema.SIGNALS["current"][1])
+        else:
+            to = to_si(unit, quantity, where=where)
+            if not to.is_si:
+                done.steps.append(f"{name}: {unit} to {own}")
+            si[:, at] = to.factor * values[:, at] + to.offset
+    return si
+
+
+def _excitation(name: str, recipe: Recipe, units: tuple[str, ...], where: str) -> str:
+    """Return the quantity of an excitation by the controller's law: torque or acceleration."""
+    law = recipe.controller.law if recipe.controller else None
+    if law in ("pd", "pd+feedforward"):
+        return "torque"
+    if quantity_of(units[0]) != "torque":
+        return "acceleration"
+    said = f'under [controller] law = "{law}" it is an acceleration'
+    message = f"'{units[0]}' is a unit of torque, and "
+    message += said if law else "the recipe has no [controller]"
+    add = 'add [controller] law = "pd" with its gains kp = [ … ] and kd = [ … ]'
+    remedy = f"where {name} was added to the torque of a PD controller, {add}"
+    raise InputRejected("S05", message, where=where, remedy=remedy)
+
+
+def _motor_side(name: str, recipe: Recipe) -> bool:
+    motor = recipe.drive.transmission is not None
+    side = recipe.signals[name].side or ("motor" if motor else "joint")
+    return schema.SIGNALS[name][0] in (*MOTION, "torque") and side == "motor"
+
+
+def _through_drive(
+    name: str, values: Array, drive: Drive | None, where: str, done: Converted
+) -> Array:
+    """q_joint = N⁻¹ q_motor, tau_joint = Nᵀ tau_motor."""
+    if drive is None or drive.transmission is None:
+        message = f"'signals.{name}' is on the motor side, but there is no drive.transmission"
+        remedy = "add [drive] transmission = the gear ratios"
+        raise UsageError("C02", message, where=where, remedy=remedy)
+    matrix = np.array(drive.transmission)
+    to_joint = f"{name}: motor to joint side by the"
+    if schema.SIGNALS[name][0] in MOTION:
+        done.steps.append(f"{to_joint} inverse of the transmission")
+        return np.asarray(np.linalg.solve(matrix, values.T).T, dtype=np.float64)
+    done.steps.append(f"{to_joint} transposed transmission")
+    return np.asarray(values @ matrix, dtype=np.float64)
+
+
+def _refuse_wrong_kind(
+    part: Recording, name: str, units: tuple[str, ...], robot: RobotDescription
+) -> None:
+    """S05: an angle for a joint that slides, a length for one that turns."""
+    own = _own_units(name, robot)
+    for j, (unit, joint) in enumerate(zip(units, robot.joints, strict=True)):
+        if quantity_of(unit) != "current" and joint.revolute == (unit in _LINEAR):
+            each = f"one a joint: unit = {json.dumps(own)}"
+            wanted = f"such as {own[j]}" if len(set(own)) == 1 else each
+            message = f"'{unit}' for joint {j + 1} '{joint.name}', which is {joint.type}"
+            where, remedy = part.column(name, j), f"declare its unit, {wanted}"
+            raise InputRejected("S05", message, where=where, remedy=remedy)
+
+
+def _refuse_degrees(
+    part: Recording, q: Array, units: tuple[str, ...], robot: RobotDescription
+) -> None:
+    """S07: refuse declared radians far beyond the joint's range: degrees, or the motor's side."""
+    for j, joint in enumerate(robot.joints):
+        low, high = joint.position
+        span, where = float(np.ptp(q[:, j])), part.column("q", j)
+        if units[j] not in ("rad", "m") or not (math.isfinite(low) and math.isfinite(high)):
+            continue
+        too_far = span > EVIDENCE.twice_room * (high - low)
+        unit = "rad" if joint.revolute else "m"
+        message = f"moves over {span:.4g} declared {unit}, its limits are {low:.4g} to {high:.4g}"
+        message += f" {unit}: "
+        if not joint.revolute and too_far:
+            remedy = 'declare unit = "mm" for this joint, one unit a joint'
+            raise InputRejected("S07", f"{message}looks like mm", where=where, remedy=remedy)
+        slack = EVIDENCE.limit_slack * (high - low)
+        angle = np.deg2rad(q[:, j])
+        degrees = bool(angle.min() >= low - slack and angle.max() <= high + slack)
+        if joint.revolute and span > 4.0 * math.pi and (degrees or too_far):
+            turns = quarter_turns(q)
+            starts = f"it starts at {', '.join(map(str, turns.values()))} times pi/2"
+            motor = f"; {starts}, as motors of such gear ratios do at rest" if turns else ""
+            message += f"looks like {'degrees or ' if degrees else ''}the motor side{motor}"
+            remedy = degrees_or_motor(span, (low, high))
+            raise InputRejected("S07", message, where=where, remedy=remedy)
+
+
+@dataclass(frozen=True, eq=False)
+class ControllerTable:
+    """Named columns for a controller."""
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: Array  # (samples, columns)
+    rate: float  # [Hz]
+
+
+def controller_table(
+    recipe: Recipe | None,
+    robot: RobotDescription,
+    motion: Callable[[Array], Array],
+    duration: float,
+    sample_time: float,
+) -> ControllerTable:
+    """Return positions as a robot's controller reads them: a recipe of `import`, run backwards.
+
+    In the recipe's order of columns, at its rate: importing the table by the recipe gives the
+    motion.
+
+    Args:
+        recipe: of the robot's recordings; None: joint side, SI, at `sample_time` [s].
+        motion: q (samples, joints) [rad] at times (samples,) [s].
+
+    Raises:
+        UsageError: C02, the recipe does not say how positions are recorded, or does not fit.
+    """
+    rate, n = 1.0 / sample_time, robot.n_joints
+    if recipe is not None:
+        rate = recipe.time.rate or 1.0 / (recipe.time.sample_time or sample_time)
+    t = np.arange(round(duration * rate) + 1) / rate
+    values = motion(t)
+    names, units = tuple(f"q_{j + 1}" for j in range(n)), _own_units("q", robot)
+    if recipe is not None:
+        spec = recipe.signals.get("q")
+        if spec is None:
+            message, remedy = "the recipe has no signal q", "give a recipe that imports positions"
+            raise UsageError("C02", message, where=recipe.where, remedy=remedy)
+        units = _units_of_recipe("q", spec, robot, recipe.where)[0] if spec.unit else units
+        # q = q_recorded A + b, of which zeros and a quarter of each unit vector show b and A.
+        probe = 0.25 * np.eye(n + 1, n, -1)
+        recorded = Recording(
+            probe[:, 0], {"q": probe}, {"q": names}, np.arange(n + 1), recipe.where
+        )
+        alone = replace(recipe, signals={"q": replace(spec, wrap=None)})
+        drive = drive_of(recipe.drive, robot, recipe.where)
+        q = joint_side(recorded, alone, {"q": units}, robot, drive, trust_units=True).signals["q"]
+        b, a = q.values[0], 4.0 * (q.values[1:] - q.values[0])
+        values = np.linalg.solve(a.T, (values - b).T).T
+        at = spec.where  # columns as the recipe calls them; numbered where it gives none by name
+        pattern = at if isinstance(at, str) and "{j}" in at else "q_{j}"
+        names = tuple(pattern.replace("{j}", str(j + 1)) for j in range(n))
+        if isinstance(at, tuple) and len(at) == n and all(isinstance(x, str) for x in at):
+            names = tuple(map(str, at))
+    return ControllerTable(("t", *names), ("s", *units), np.column_stack([t, values]), rate)
+
+
+def write_controller_table(path: Path, table: ControllerTable) -> None:
+    """Write CSV: one header line of names, each number with all its digits."""
+
+    def fill(draft: Path) -> None:
+        with draft.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(",".join(map(csv_cell, table.names)) + "\n")
+            file.writelines(",".join(map(repr, row.tolist())) + "\n" for row in table.values)
+
+    write_file(path, fill)
