@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines import __version__
-from pipelines.errors import Check, EnvironmentFault, UsageError, did_you_mean, escaped
+from pipelines.errors import EnvironmentFault, UsageError, did_you_mean, escaped
 from pipelines.io.option import option
 from rrrid_cli import console
 from rrrid_cli.options import (
@@ -86,7 +86,6 @@ class Batch:
     resume: bool = option(False, "Do only what is unfinished, failed, rejected or changed.")
     shard: str | None = option(None, "I/N: every Nth item alone, from the Ith on. [all]")
     backend: str = option("local", "local, or dask://HOST:PORT: a Dask scheduler.")
-    baseline: str | None = option(None, "Known model.json: only what goes beyond it is found.")
     joints: tuple[int, ...] = option((), "Joints to take of every log: 1,3. --robot is theirs.")
 
 
@@ -293,14 +292,11 @@ def _demo(name: str, given: Mapping[str, Any]) -> int:
 def _batch(name: str, given: Mapping[str, Any]) -> int:
     """Run the workflow, or one stage, on every robot and day of many folders, in parallel."""
     common, own = read(Common, given), read(Batch, given)
-    from pipelines.batch.server import warm_up
-
-    if own.backend == "local":
-        warm_up(f"pipelines.{own.stage.replace('-', '_')}")
-    from pipelines.batch.batch import Wanted, run_batch
-    from pipelines.batch.items import read_shard
-    from pipelines.batch.plan import Options, Plan, load_stage, module_of
+    from pipelines.batch import module_of, run_batch
+    from pipelines.executor import Plan
+    from pipelines.io.places import slug
     from pipelines.io.processors import processors
+    from pipelines.stage import Request
 
     for flag, value, possible, remedy in (
         ("--jobs", own.jobs, own.jobs is None or own.jobs > 0, "give 1 or more"),
@@ -310,16 +306,30 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
         if not possible:
             raise UsageError("C02", f"'{value}' is not possible", where=flag, remedy=remedy)
     module, values = module_of(own.stage), vars(common) | vars(own)
-    load_stage(module)
     settings = make_settings(own.stage, common.config, common.set, {})
-    options = Options(**_fields_of(Options, values | {"memory": _bytes(own.memory)}))
-    values |= {"jobs": own.jobs or processors(), "shard": read_shard(own.shard)}
+    request = Request((), **_fields_of(Request, values | {"out": None}))
+    values |= {
+        "out": common.out or Path("runs/several") / slug(own.root.resolve().name) / "batch",
+        "jobs": own.jobs or processors(),
+        "memory": _bytes(own.memory),
+        "abort": own.on_error == "abort",
+        "shard": read_shard(own.shard),
+    }
     progress = console.Progress(common)
     with progress:
-        wanted = Wanted(tell=progress, **_fields_of(Wanted, values))
-        outcome = run_batch(Plan(module, settings, options), wanted)
+        plan = Plan(module, settings, request, **_fields_of(Plan, values))
+        outcome = run_batch(plan, progress)
     console.print_outcome(outcome, common)
     return outcome.exit_code
+
+
+def read_shard(text: str | None) -> tuple[int, int]:
+    """Return "2/4" as (2, 4); (1, 1) where nothing was said."""
+    found = re.fullmatch(r"([0-9]{1,8})/([0-9]{1,8})", text or "1/1")
+    if not found or not 1 <= int(found[1]) <= int(found[2]):
+        message, remedy = f"'{text}' is no shard", "write I/N, from 1/N to N/N"
+        raise UsageError("C02", message, where="--shard", remedy=remedy)
+    return int(found[1]), int(found[2])
 
 
 def _bytes(text: str | None) -> int | None:
@@ -336,30 +346,22 @@ def _bytes(text: str | None) -> int | None:
 
 def _report(name: str, given: Mapping[str, Any]) -> int:
     """Draw a report again from its stored result; nothing is computed."""
-    from pipelines.batch.redraw import redraw_batch
-    from pipelines.io.stored_result import read_result
-    from pipelines.stored.redraw import redraw
+    from pipelines.rerender import rerender
 
     common, folder = read(Common, given), read(Inputs, given).folder
-    home, target = folder.absolute(), common.out and common.out.absolute()
-    checks: tuple[Check, ...] = ()
-    if home.is_dir() and read_result(home).command == "batch":
-        drawn = redraw_batch(home, target)
-    else:
-        drawn, _, checks = redraw(home, target, common.force)
+    drawn = rerender(folder.absolute(), common.out and common.out.absolute(), common.force)
     if not common.quiet:
         console.print_verdict(drawn)
-        console.print_checks(checks)
         print(f"→ {escaped((common.out or folder) / 'report.html')}")
     return 0
 
 
 def _doctor(name: str, given: Mapping[str, Any]) -> int:
     """Examine libraries, threads and folders, with a self-test of some seconds; exit 6: no use."""
-    from pipelines.installation.examine import examine
+    from pipelines.selfcheck import examine
 
     found, as_json = [], read(Common, given).json
-    for one in examine(self_test=not read(Inputs, given).quick):  # each is printed when it is known
+    for one in examine(not read(Inputs, given).quick):  # each is printed when it is known
         found.append(one)
         if not as_json:
             remedy = f" ({one.remedy})" if one.remedy else ""
@@ -389,10 +391,10 @@ def _schema(name: str, given: Mapping[str, Any]) -> int:
 
 def schema_of(what: str) -> dict[str, Any]:
     """Return the JSON schema of a command's result.json, of a "model" or of a "log"."""
-    from pipelines.batch.result import Result
     from pipelines.io.log_schema import log_schema
     from pipelines.io.model_file import model_schema
     from pipelines.io.result_schema import result_schema
+    from pipelines.report.batch_report import Result
     from pipelines.stage import result_type
 
     known = ("model", "log", "batch", *STAGES)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from pipelines.batch.batch import Wanted, run_batch
-from pipelines.batch.plan import Options, Plan
-from pipelines.batch.summary import Summary
-from pipelines.stage import Outcome
+from pipelines.batch import run_batch
+from pipelines.executor import Plan
+from pipelines.report.batch_report import Result
+from pipelines.stage import Outcome, Request
 from tests.batch.faulty import Settings
 
 Lay = Callable[[Mapping[str, str]], Path]
+
+QUIET = Request((), no_report=True)
 
 
 @pytest.fixture
@@ -31,13 +34,13 @@ def lay(tmp_path: Path) -> Lay:
     return make
 
 
-def obey(root: Path, options: Options | None = None, factor: float = 1.0, **wanted: Any) -> Outcome[Summary]:
+def obey(root: Path, factor: float = 1.0, request: Request = QUIET, check: bool = False, **wanted: Any) -> Outcome[Result]:
     """A batch of `tests.batch.faulty` on `root`, into `out` beside it where nothing else is said."""
-    plan = Plan("tests.batch.faulty", Settings(factor), options or Options(no_report=True))
-    return run_batch(plan, Wanted(root, **({"out": root.parent / "out", "no_report": True} | wanted)))
+    request = replace(request, check=check)
+    return run_batch(Plan("tests.batch.faulty", Settings(factor), request, root, **{"out": root.parent / "out", **wanted}))
 
 
-def statuses(outcome: Outcome[Summary]) -> dict[str, str]:
+def statuses(outcome: Outcome[Result]) -> dict[str, str]:
     """Name -> status, and the error's code where there is one, as result.json has them."""
     stored = json.loads((outcome.folder / "result.json").read_text())
     assert stored == outcome.json

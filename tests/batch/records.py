@@ -1,15 +1,14 @@
-"""Items of a batch as they are known when they are done."""
+"""Sessions of a robot as they are known when their items are done."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from pipelines.batch.parts import Part
-from pipelines.batch.record import Record, Status
+from pipelines.estimation.drift import Session
 
 STD = 0.02
 
 
-def item_of(name: str, status: Status = "ok", accepts: bool = False, **known: Any) -> Record:
+def item_of(name: str, **known: Any) -> Session:
     """An item of one robot, of which `known` is known."""
-    return Record(name, name, status, int(status == "found"), part=Part(**known), accepts=accepts)
+    return Session(name, **known)

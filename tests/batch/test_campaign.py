@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.batch.items import find_items
-from pipelines.batch.record import Ledger, intact
+from pipelines.batch import find_items, is_intact, read_ledger
 from pipelines.io.files import hash_file
 from tests.batch.conftest import Lay, contents, obey, statuses
 from tests.batch.test_command import nobody_left
@@ -66,10 +65,10 @@ def test_killed_at_200_random_points(lay: Lay, tmp_path: Path) -> None:
         killed += not done
         assert nobody_left(process.pid)
         _complete(tmp_path / "out")
-        ledger = Ledger(tmp_path / "out/ledger")
+        ledger = read_ledger(tmp_path / "out")
         for item in items:  # nothing is believed to be done that is not
-            record = ledger.get(item)
-            if record is not None and not intact(record, tmp_path / "out/items" / item.slug):
+            record = ledger.get(item.slug)
+            if record is not None and not is_intact(record, tmp_path / "out/items" / item.slug):
                 redone += 1
         if done:
             ended += 1
@@ -87,12 +86,9 @@ def test_killed_at_200_random_points(lay: Lay, tmp_path: Path) -> None:
 @pytest.mark.parametrize("bad", ["crash", "reject", "sleep 60", "bug"])
 def test_one_bad_among_1000(lay: Lay, tmp_path: Path, bad: str) -> None:
     """P11: exit 4, and 999 results equal to a clean run's."""
-    from pipelines.batch.plan import Options
-
     items = {f"{i:03d}": f"value {i} std 0.1" for i in range(1000)}
-    options = Options(no_report=True, timeout=5.0)
-    clean = contents(obey(lay(items), options, jobs=2, out=tmp_path / "clean").folder)
-    outcome = obey(lay({"500": bad}), options, jobs=2)
+    clean = contents(obey(lay(items), jobs=2, timeout=5.0, out=tmp_path / "clean").folder)
+    outcome = obey(lay({"500": bad}), jobs=2, timeout=5.0)
     assert outcome.exit_code == 4
     assert [name for name, status in statuses(outcome).items() if status != "ok"] == ["500"]
     mine = {place: text for place, text in contents(outcome.folder).items() if place.startswith("items/")}

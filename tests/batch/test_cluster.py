@@ -15,7 +15,6 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.batch.plan import Options
 from pipelines.errors import EnvironmentFault
 from tests.batch.conftest import Lay, contents, obey, statuses
 from tests.cli.commands import REPO
@@ -60,9 +59,9 @@ ITEMS = {f"{i:02d}": f"value {i} std 0.1" for i in range(8)}
 def test_a_cluster_gives_the_same_bytes_and_bears_the_same_misfortunes(lay: Lay, tmp_path: Path, cluster: Cluster) -> None:
     """P12, P03-P05: what each item is, is what it is in local processes; crash, hang and memory cost their own items."""
     root = lay(ITEMS | {"big": "memory", "bug": "bug", "hung": "sleep 60", "rejected": "reject", "segfault": "crash"})
-    options = Options(no_report=True, timeout=3.0, memory=1 << 30)
-    away = obey(root, options, backend=cluster.address)
-    here = obey(root, options, out=tmp_path / "here", jobs=2)
+    limits = {"timeout": 3.0, "memory": 1 << 30}
+    away = obey(root, backend=cluster.address, **limits)
+    here = obey(root, out=tmp_path / "here", jobs=2, **limits)
     assert away.exit_code == 4
     assert statuses(away) == statuses(here)
     assert {place: text for place, text in contents(away.folder).items() if not place.startswith("crashes")} == {

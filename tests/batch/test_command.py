@@ -12,10 +12,10 @@ from pathlib import Path
 import pytest
 
 from pipelines import convert
-from pipelines.batch.batch import Wanted, run_batch
-from pipelines.batch.plan import Options, Plan
+from pipelines.batch import run_batch
+from pipelines.executor import Plan
 from pipelines.io.files import write_log
-from tests.batch.conftest import contents
+from tests.batch.conftest import QUIET, contents
 from tests.cli.commands import REPO, RRRID, rrrid
 from tests.io.logs import small_log
 from tests.seeds import rarely
@@ -78,9 +78,8 @@ def test_a_signal_ends_with_a_summary_and_resume_ends_the_same(many: Path, tmp_p
     assert 2 <= len(done) < 14
     assert {item["error"]["code"] for item in items if item["status"] != "ok"} == {"RRID-P06"}
     if number == signal.SIGINT:
-        plan = Plan("pipelines.convert", convert.Settings(), Options(no_report=True))
-        resumed, whole = (run_batch(plan, Wanted(many / "root", tmp_path / name, resume=True, no_report=True))
-                          for name in ("out", "whole"))
+        resumed, whole = (run_batch(Plan("pipelines.convert", convert.Settings(), QUIET, many / "root", tmp_path / name,
+                                         resume=True)) for name in ("out", "whole"))
         assert json.loads((tmp_path / "out/provenance.json").read_text())["kept"] == len(done)
         assert contents(resumed.folder) == contents(whole.folder)
 
@@ -107,7 +106,7 @@ def test_json_is_the_result_and_nothing_else(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("words", "code"), [
     (("--stage", "inspekt"), "C01"), (("--shard", "5/4"), "C02"), (("--jobs", "0"), "C02"), (("--memory", "much"), "C02"),
     (("--timeout", "-1"), "C02"), (("--on-error", "panic"), "C02"), (("--backend", "spark://x"), "C02"),
-    (("--baseline", "no.json"), "C04"), (("--set", "convert.too=h5"), "C01")])
+    (("--set", "convert.too=h5"), "C01")])
 def test_a_wrong_option_is_exit_2(tmp_path: Path, words: tuple[str, ...], code: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """C01, C02, C04: before anything is written."""
     from pipelines.errors import UsageError

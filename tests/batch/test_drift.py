@@ -3,22 +3,24 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 
 import jsonschema
 import numpy as np
 import pytest
 
-from pipelines.batch.drift import Course, drift_of, from_others
-from pipelines.batch.record import Record
-from pipelines.batch.result import Result
-from pipelines.batch.summary import Summary, summary_report
+from pipelines.batch import result_of
+from pipelines.estimation.drift import DriftFigure, Session, drift_of, from_others
+from pipelines.executor import Record
 from pipelines.io.result_schema import result_schema
+from pipelines.report.batch_report import DoneItem, Result, batch_report
+from pipelines.report.report import Report
 from pipelines.report.result_figures import fitted, residuals
 from tests.batch.conftest import Lay, obey
 from tests.batch.records import STD, item_of
 
 
-def _records(values: np.ndarray) -> list[Record]:
+def _records(values: np.ndarray) -> list[Session]:
     """Items recorded one a day, in an order that is not that of their names."""
     order = np.random.default_rng(0).permutation(len(values))
     return [item_of(f"item {order[i]:03d}", figures={"p1": (float(value), STD, "kg m^2")}, robot="arm",
@@ -51,7 +53,7 @@ def test_a_step_is_dated() -> None:
 
 def test_a_phase_that_scatters_about_half_a_turn_has_not_moved() -> None:
     """3.1, -3.1, … rad are next to each other; one a radian on has moved, and the values stand as they were written."""
-    def course(values: list[float], name: str = "extend model cogging joint 2 phase") -> Course:
+    def course(values: list[float], name: str = "extend model cogging joint 2 phase") -> DriftFigure:
         records = [item_of(str(k), figures={name: (value, 0.05, "rad")}, robot="arm") for k, value in enumerate(values)]
         return drift_of(records)[0].figures[0]
 
@@ -115,17 +117,23 @@ def test_the_page_says_figures_in_words_and_the_file_has_their_keys() -> None:
         records = tuple(item_of(f"day {k}", figures={"coulomb:3:level": (float(x), STD, "N m")}, robot="arm")
                         for k, x in enumerate(values))
         drifts = drift_of(records)
-        page = summary_report(Summary("estimate-bps", records, drifts))
+        page = _page(records)
         (table,) = next(section.tables for section in page.sections if section.title == "Drift of arm")
         assert (page.tone, table.rows[0][0]) == (tone, "Coulomb friction at joint 3, level")
         assert drifts[0].figures[0].name == "coulomb:3:level"
         assert ("Coulomb friction at joint 3, level: " in page.verdict) is (step > 0.0)
 
 
+def _page(sessions: Iterable[Session], figures: bool = True) -> Report:
+    """Of a batch of these sessions."""
+    records = [Record(DoneItem(one.name, "ok", None, "", 0, one.robot, None, None), one.name, one.figures) for one in sessions]
+    return batch_report(result_of("estimate-bps", records, []), figures=figures)
+
+
 def _tone(values: np.ndarray) -> str:
     """Of the page of a batch whose items have these values."""
     records = tuple(item_of(f"{k:03d}", figures={"p1": (float(x), STD, "kg m^2")}, robot="arm") for k, x in enumerate(values))
-    return summary_report(Summary("estimate-bps", records, drift_of(records)), figures=False).tone
+    return _page(records, figures=False).tone
 
 
 def test_one_item_among_hundreds_is_not_lost_in_them() -> None:

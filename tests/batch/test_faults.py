@@ -10,9 +10,9 @@ from xml.etree import ElementTree
 
 import pytest
 
-from pipelines.batch.plan import Options
 from pipelines.errors import EnvironmentFault, NothingMatched
 from pipelines.io.places import slug
+from pipelines.stage import Request
 from tests.batch.conftest import Lay, contents, obey, statuses
 
 GOOD = {f"good-{i}": f"value {i} std 0.1" for i in range(6)}
@@ -24,7 +24,7 @@ def test_each_misfortune_costs_its_own_item(lay: Lay) -> None:
     alone = obey(lay(GOOD))
     before = {place: bytes_ for place, bytes_ in contents(alone.folder).items() if place.startswith("items/")}
     bad = {"big": "memory", "bug": "bug", "hung": "sleep 60", "rejected": "reject", "segfault": "crash"}
-    outcome = obey(lay(bad), Options(no_report=True, timeout=2.0, memory=1 << 30), jobs=2)
+    outcome = obey(lay(bad), timeout=2.0, memory=1 << 30, jobs=2)
     assert statuses(outcome) == dict.fromkeys(GOOD, "ok") | {
         "big": "failed RRID-P03", "bug": "failed RRID-Z70", "hung": "failed RRID-P05", "rejected": "rejected RRID-F02",
         "segfault": "failed RRID-P04"}
@@ -97,7 +97,7 @@ def test_a_full_disk_stops_the_batch_and_it_can_go_on(lay: Lay, tmp_path: Path, 
 
 def test_abort_stops_at_the_first_error(lay: Lay) -> None:
     """--on-error abort: what was not begun is not done, and said so."""
-    outcome = obey(lay({"00": "reject"} | {f"{i:02d}": "sleep 0.02" for i in range(1, 40)}), on_error="abort")
+    outcome = obey(lay({"00": "reject"} | {f"{i:02d}": "sleep 0.02" for i in range(1, 40)}), abort=True)
     codes = [(item["error"] or {}).get("code") for item in outcome.json["items"]]
     assert outcome.exit_code == 4
     assert codes[0] == "RRID-F02"
@@ -118,7 +118,7 @@ def test_hostile_names_are_inert(lay: Lay) -> None:
     """X08, X09, X11: markup, escape sequences, bytes that are no text in a folder's name; every file of the summary is whole."""
     good = ["<script>alert(1)</script>", "\x1b]0;owned\x07", "[bold]$a_{", os.fsdecode(b"\xff\xfe")]
     bad = ["=1+1", "a\nb", os.fsdecode(b"\xfd"), "]]>", "&amp;"]
-    outcome = obey(lay(dict.fromkeys(good, "fine") | dict.fromkeys(bad, "reject")), no_report=False)
+    outcome = obey(lay(dict.fromkeys(good, "fine") | dict.fromkeys(bad, "reject")), request=Request(()))
     names = [item["name"] for item in json.loads((outcome.folder / "result.json").read_text(encoding="utf-8"))["items"]]
     assert len(set(names)) == 9
     assert not re.search(r"[\x00-\x08\x0b-\x1f]", "".join(names))

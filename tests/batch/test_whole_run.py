@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from pipelines import run
-from pipelines.batch.batch import Wanted, run_batch
-from pipelines.batch.plan import Options, Plan
+from pipelines.batch import run_batch
+from pipelines.executor import Plan
 from pipelines.stage import Request, run_stage
-from tests.batch.conftest import contents
+from tests.batch.conftest import QUIET, contents
 from tests.batch.test_cluster import Cluster
 
 SAMPLES = Path(__file__).parents[2] / "sample_logs"
@@ -38,8 +38,7 @@ def root(tmp_path: Path) -> Path:
 
 
 def _batch(root: Path, name: str, **wanted: Any) -> Path:
-    plan = Plan("pipelines.run", run.Settings(), Options(no_report=True))
-    outcome = run_batch(plan, Wanted(root, root.parent / name, no_report=True, **wanted))
+    outcome = run_batch(Plan("pipelines.run", run.Settings(), QUIET, root, root.parent / name, **wanted))
     assert outcome.exit_code == 0
     return outcome.folder
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from pipelines.installation import examine, self_test
-from pipelines.installation.examine import Finding
+from pipelines import selfcheck
+from pipelines.selfcheck import Finding
 from tests.cli.commands import rrrid
 
 
@@ -36,18 +36,18 @@ def test_a_library_that_is_missing_or_too_old(monkeypatch: pytest.MonkeyPatch) -
         return "1.9.3" if name == "numpy" else version(name)
 
     monkeypatch.setattr(importlib.metadata, "version", other)
-    found = list(examine.examine(self_test=False))
+    found = list(selfcheck.examine(with_self_test=False))
     assert (named(found, "numpy").level, named(found, "h5py").level, named(found, "mujoco").level) == ("bad", "bad", "ok")
-    assert named(found, "numpy").found == "1.9.3, 1.26 or later is asked for"
+    assert named(found, "numpy").found == "1.9.3, >=1.26 is required"
     assert "rrrid[bench]" in named(found, "mujoco").remedy
 
 
 def test_folders_and_threads(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """A temporary folder that cannot be written is a fault, HOME is only remarked upon; many threads are slow."""
-    monkeypatch.setattr(examine.tempfile, "gettempdir", lambda: "/proc/nothing")
+    monkeypatch.setattr(selfcheck.tempfile, "gettempdir", lambda: "/proc/nothing")
     monkeypatch.setenv("HOME", "/proc/nothing")
     monkeypatch.setenv("OMP_NUM_THREADS", "8")
-    found = list(examine.examine(self_test=False))
+    found = list(selfcheck.examine(with_self_test=False))
     levels = [named(found, name).level for name in ("temporary folder", "HOME", "BLAS")]
     assert levels == ["bad", "warn", "warn"]
 
@@ -57,13 +57,13 @@ def test_what_breaks_in_the_self_test_is_named(monkeypatch: pytest.MonkeyPatch) 
     def broken(path: Path, log: object) -> None:
         raise OSError("HDF5 library version mismatch")
 
-    monkeypatch.setattr(self_test, "write_log", broken)
-    found = list(self_test.run_self_test())
+    monkeypatch.setattr(selfcheck, "write_log", broken)
+    found = list(selfcheck.self_test())
     assert [one.level for one in found] == ["ok", "bad", "bad", "ok", "ok"]
     assert "HDF5 library version mismatch" in found[1].found
 
 
 def test_another_system_is_remarked_upon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(examine.platform, "system", lambda: "Darwin")
-    python = named(list(examine.examine(self_test=False)), "Python")
+    monkeypatch.setattr(selfcheck.platform, "system", lambda: "Darwin")
+    python = named(list(selfcheck.examine(with_self_test=False)), "Python")
     assert (python.level, "Linux alone" in python.remedy) == ("warn", True)

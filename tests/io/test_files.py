@@ -13,7 +13,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from pipelines.batch.items import find_items
+from pipelines.batch import find_items
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
 from pipelines.io.experiment import Controller, Derived, Signal
 from pipelines.io.files import find_logs, open_log, write_log

@@ -12,9 +12,9 @@ from tests.cli.commands import REPO
 
 COUNTED = """
 import json, os
-from pipelines.installation import examine
 from pipelines.io.processors import processors
-doctor = next(one.found for one in examine.examine(self_test=False) if one.name == "processor")
+from pipelines.selfcheck import examine
+doctor = next(one.found for one in examine(with_self_test=False) if one.name == "processor")
 print(json.dumps([doctor.split()[0], processors()]))
 """
 

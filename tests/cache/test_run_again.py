@@ -12,12 +12,11 @@ from typing import Any
 
 import pytest
 
-from pipelines import estimate_bps, inspect, reconstruct, run, validate_writing
+from pipelines import cache, estimate_bps, inspect, reconstruct, run, validate_writing
+from pipelines.cache import CACHE, Store
 from pipelines.errors import EnvironmentFault, UsageError
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog
-from pipelines.recall import chain
-from pipelines.recall.store import CACHE, Store
 from pipelines.report import render
 from pipelines.stage import Outcome, Request, run_stage
 from tests.controlled import controlled_log
@@ -157,14 +156,14 @@ def test_exactly_what_is_affected(small: Path, change: Callable[[Path], run.Sett
 @pytest.mark.row("P09")
 def test_changed_code_and_libraries(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """P09: a module of one stage alone, and a library of all."""
-    code = chain.code_of
-    monkeypatch.setattr(chain, "code_of", lambda module, without: code(module, without) | (
+    code = cache.code_of
+    monkeypatch.setattr(cache, "code_of", lambda module, sources, *without: code(module, sources, *without) | (
         {"pipelines.signal.smoother": "other"} if module == "pipelines.reconstruct" else {}))
     planned = run.plan(Request((small / "logs",), out=small / "out"), SHORT)
     assert [(one.stage, one.why) for one in planned if one.computed] == [
         ("reconstruct", "code of signal.smoother"), ("frf", "reconstruct before it changed")]
-    monkeypatch.setattr(chain, "code_of", code)
-    monkeypatch.setattr(chain, "libraries", lambda: {"numpy": "0.1"})
+    monkeypatch.setattr(cache, "code_of", code)
+    monkeypatch.setattr(cache, "libraries", lambda *names: {"numpy": "0.1"})
     assert all(one.computed and "numpy" in one.why for one in run.plan(Request((small / "logs",), out=small / "out"), SHORT))
 
 
@@ -211,7 +210,7 @@ def test_no_output_names_the_user(small: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_two_runs_at_once(small: Path) -> None:
     """P08: the second is told; when the first has ended, it may."""
     holder = Store(small / "out")
-    holder._own()
+    holder.hold()
     with pytest.raises(EnvironmentFault, match="P08"):
         go(small, no_report=True)
     holder.release()
@@ -291,5 +290,5 @@ def test_a_stage_reads_no_other_logs_than_it_says(module: str, samples: Path) ->
 def test_entries_are_open_files(small: Path) -> None:
     """What is stored is JSON, HDF5 and logs; the key stands in it in plain words."""
     entry = json.loads((small / "out" / CACHE / "reconstruct/entry.json").read_text())
-    assert list(entry["parts"]["logs"]) == [[name, open_log(small / f"logs/{name}").sha256] for name in ("1.h5", "2.h5")]
+    assert entry["about"]["key"]["log"] == {name: open_log(small / f"logs/{name}").sha256 for name in ("1.h5", "2.h5")}
     assert {p.suffix for p in (small / "out").rglob("*") if p.is_file()} == {".json", ".h5"}

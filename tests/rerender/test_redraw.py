@@ -11,10 +11,8 @@ import pytest
 from pipelines import inspect, run
 from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.io.files import write_log
-from pipelines.report import render
-from pipelines.report.report import Figure
+from pipelines.rerender import rerender
 from pipelines.stage import Request, run_stage
-from pipelines.stored.redraw import redraw
 from tests.cli.commands import rrrid
 from tests.controlled import controlled_log
 from tests.seeds import rarely
@@ -42,52 +40,24 @@ def test_a_lost_report_comes_back(results: Path, tmp_path: Path, command: str) -
     before = contents(results / command)
     (tmp_path / "here/report.html").unlink()
     shutil.rmtree(tmp_path / "here/figures")
-    redraw(tmp_path / "here")
+    rerender(tmp_path / "here")
     assert contents(tmp_path / "here") == before
-    redraw(tmp_path / "here", tmp_path / "there")
+    rerender(tmp_path / "here", tmp_path / "there")
     drawn = {name: content for name, content in contents(tmp_path / "there").items() if name != "provenance.json"}
     assert drawn == {name: content for name, content in before.items() if name == "report.html" or name.startswith("figures/")}
     assert contents(tmp_path / "here") == before
 
 
-@pytest.mark.slow
-def test_only_figures_not_in_order_cost_a_drawing(results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """None where a run's lie there; the one that is lost or damaged; all where other code drew them. The bytes are the same."""
-    shutil.copytree(results / "run", tmp_path / "a")
-    before, names = contents(results / "run"), list[str]()
-    figures = sorted(name[8:-4] for name in before if name.startswith("figures/") and name.endswith(".png"))
-    own = render._draw
-
-    def noted(figure: Figure, name: str) -> tuple[str, bytes]:
-        names.append(name)
-        return own(figure, name)
-
-    monkeypatch.setattr(render, "_draw", noted)
-    redraw(tmp_path / "a")
-    assert (len(figures) > 4, names) == (True, [])
-    (tmp_path / f"a/figures/{figures[0]}.svg").unlink()
-    redraw(tmp_path / "a")
-    assert names == figures[:1]
-    (tmp_path / f"a/figures/{figures[2]}.png").write_bytes(b"no picture")
-    redraw(tmp_path / "a", force=True)
-    assert names == [figures[0], figures[2]]
-    assert contents(tmp_path / "a") == before
-    (tmp_path / "a/.cache/drawing.json").write_text('{"drawing": "another version"}')
-    redraw(tmp_path / "a", tmp_path / "b")
-    assert sorted(names[2:]) == figures
-    assert all(before[name] == content for name, content in contents(tmp_path / "b").items() if name.startswith("figures/"))
-
-
 @pytest.mark.row("C05")
 def test_no_result_is_lost_to_a_report(results: Path, tmp_path: Path) -> None:
-    """C05: a folder with another command's result is refused; a report that is there already is replaced."""
+    """C05: another command's result is not replaced without --force; a report that lies there is."""
     shutil.copytree(results / "inspect", tmp_path / "there")
-    with pytest.raises(UsageError, match="RRID-C05 .*earlier result of inspect"):
-        redraw(results / "run", tmp_path / "there")
+    with pytest.raises(UsageError, match=r"C05.*result of 'inspect'.*--force"):
+        rerender(results / "run", tmp_path / "there")
     assert contents(tmp_path / "there") == contents(results / "inspect")
-    redraw(results / "run", tmp_path / "here")
-    redraw(results / "inspect", tmp_path / "here")
-    assert rrrid("report", results / "run", "--out", "there", cwd=tmp_path).returncode == 2
+    rerender(results / "run", tmp_path / "new")
+    rerender(results / "inspect", tmp_path / "new")
+    assert contents(tmp_path / "new")["report.html"] == contents(results / "inspect")["report.html"]
 
 
 @pytest.mark.slow
@@ -98,14 +68,14 @@ def test_what_was_taken_away_since_is_not_missed(results: Path, tmp_path: Path) 
     (tmp_path / "a/report.html").unlink()
     (tmp_path / "a/result.h5").unlink(missing_ok=True)
     (tmp_path / "a/.cache/drawing.json").unlink()
-    redraw(tmp_path / "a")
+    rerender(tmp_path / "a")
     assert contents(tmp_path / "a")["report.html"] == contents(results / "run")["report.html"]
 
 
 def refused(folder: Path) -> RrridError:
     before = contents(folder)
     with pytest.raises(RrridError) as problem:
-        redraw(folder)
+        rerender(folder)
     assert contents(folder) == before
     return problem.value
 
@@ -128,7 +98,7 @@ def test_an_edited_report_is_kept(results: Path, tmp_path: Path) -> None:
     shutil.copytree(results / "inspect", tmp_path / "a")
     (tmp_path / "a/report.html").write_text("my notes")
     assert refused(tmp_path / "a").code == "RRID-C05"
-    redraw(tmp_path / "a", force=True)
+    rerender(tmp_path / "a", force=True)
     assert contents(tmp_path / "a") == contents(results / "inspect")
 
 
@@ -143,7 +113,7 @@ def test_a_provenance_that_is_none_leads_nowhere(results: Path, tmp_path: Path, 
     (tmp_path / "a/b/elsewhere/notes.txt").write_text("mine")
     before = contents(tmp_path)
     with pytest.raises(RrridError) as problem:
-        redraw(tmp_path / "a/b/result")
+        rerender(tmp_path / "a/b/result")
     assert problem.value.exit_code in (2, 3)
     assert contents(tmp_path) == before
 
@@ -152,11 +122,11 @@ def test_another_versions_result_is_refused(tmp_path: Path) -> None:
     """An earlier schema, fields that this version does not know, and a command that has no report: exit 3, 3 and 2."""
     for name, told, kind in (("frf", {"schema_version": 1}, InputRejected),
                              ("inspect", {"schema_version": 2, "logs": 3}, InputRejected),
-                             ("batch", {"schema_version": 2}, UsageError)):
+                             ("doctor", {"schema_version": 2}, UsageError)):
         (tmp_path / name).mkdir()
         (tmp_path / name / "result.json").write_text(json.dumps({"command": name, **told}))
         with pytest.raises(kind):
-            redraw(tmp_path / name, tmp_path / "out")
+            rerender(tmp_path / name, tmp_path / "out")
 
 
 def test_on_the_command_line(results: Path, tmp_path: Path) -> None:

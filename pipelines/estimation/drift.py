@@ -1,0 +1,202 @@
+"""Compare the figures of one robot from session to session against their own uncertainty.
+
+Of n values x, each with its standard deviation s, where nothing moved,
+
+    χ² = Σ ((xᵢ - x̄) / sᵢ)²,    x̄ = Σ (xᵢ/sᵢ²) / Σ (1/sᵢ²)
+
+follows a χ² distribution with n - 1 degrees of freedom (Bevington and Robinson 2003, eq. (4.17),
+(4.19), § 4.4). A value has moved where it lies farther than the limit from the mean of the others
+that have not. A residual has no std of its own: it is judged by the scatter of most of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from pipelines.estimation.config import DriftConfig
+from pipelines.io.log import Array
+from pipelines.model.parameter_names import quantity_of
+
+__all__ = ["DriftFigure", "RobotDrift", "Session", "drift_of", "from_others", "is_drift"]
+
+_CONFIG = DriftConfig()
+_MAD_TO_STD = 1.4826  # numerics: of a normal distribution (Rousseeuw and Croux 1993)
+
+
+@dataclass(frozen=True)
+class Session:
+    """The figures of one robot's logs of one day."""
+
+    name: str
+    robot: str = ""
+    recorded: str = ""  # when; the order of the sessions
+    figures: Mapping[str, tuple[float, float, str]] = field(
+        default_factory=dict
+    )  # value, std, unit
+    residuals: Mapping[str, tuple[float, str]] = field(default_factory=dict)  # value, unit
+
+
+@dataclass(frozen=True)
+class DriftFigure:
+    """One figure through the items, in the order of their recording."""
+
+    name: str
+    unit: str
+    items: tuple[str, ...]
+    value: tuple[float, ...]
+    std: tuple[float, ...] | None
+    away: tuple[float, ...]  # [std] of each from the mean of those that have not moved
+    chi_square: float | None
+    freedom: int | None
+    probability: float | None  # of so large a χ² if nothing moved
+    trend: float  # [std] from the first item to the latest
+    moved: tuple[str, ...]  # the items beyond three std
+
+
+@dataclass(frozen=True)
+class RobotDrift:
+    """Every figure that more than one item of a robot has."""
+
+    robot: str
+    figures: tuple[DriftFigure, ...]
+    residuals: tuple[DriftFigure, ...]
+
+
+def drift_of(sessions: Iterable[Session]) -> tuple[RobotDrift, ...]:
+    """Return the drift of every robot with more than one session, in the order of their names."""
+    robots: dict[str, list[Session]] = {}
+    for session in sorted(sessions, key=lambda one: (one.recorded, one.name)):
+        if session.figures or session.residuals:
+            robots.setdefault(session.robot, []).append(session)
+    drifts = []
+    for robot, own in sorted(robots.items()):
+        if len(own) > 1:
+            figures = _series([(one.name, one.figures) for one in own])
+            residuals = _series([(one.name, one.residuals) for one in own])
+            drifts.append(RobotDrift(robot, figures, residuals))
+    return tuple(drifts)
+
+
+def _series(sessions: list[tuple[str, Mapping[str, Any]]]) -> tuple[DriftFigure, ...]:
+    """Return every figure that two sessions have in the same unit."""
+    found = []
+    for name in dict.fromkeys(name for _, numbers in sessions for name in numbers):
+        items = tuple(item for item, numbers in sessions if name in numbers)
+        values = [numbers[name] for _, numbers in sessions if name in numbers]
+        if len(items) > 1 and len({unit for *_, unit in values}) == 1:
+            value = np.array([numbers[0] for numbers in values])
+            if isinstance(values[0][1], str):  # the unit: it has no std
+                found.append(_residual(name, values[0][-1], items, value))
+            else:
+                std = np.array([numbers[1] for numbers in values])
+                found.append(_figure(name, values[0][-1], items, value, std))
+    return tuple(found)
+
+
+def _figure(name: str, unit: str, items: tuple[str, ...], value: Array, std: Array) -> DriftFigure:
+    from scipy.special import gammaincc
+
+    turned, weight, freedom = _on_one_turn(name, value, std), 1.0 / std**2, len(items) - 1
+    mean = np.sum(weight * turned) / np.sum(weight)
+    chi_square = float(np.sum(weight * (turned - mean) ** 2))
+    probability = float(gammaincc(freedom / 2.0, chi_square / 2.0))
+    trend = float((turned[-1] - turned[0]) / np.hypot(std[-1], std[0]))
+    away = from_others(turned, std)
+    return DriftFigure(
+        name,
+        unit,
+        items,
+        tuple(value.tolist()),
+        tuple(std.tolist()),
+        tuple(away.tolist()),
+        chi_square,
+        freedom,
+        probability,
+        trend,
+        _moved(items, away),
+    )
+
+
+def _residual(name: str, unit: str, items: tuple[str, ...], value: Array) -> DriftFigure:
+    """Judge by the median absolute deviation, where there are enough items."""
+    away, trend = np.zeros(len(value)), 0.0
+    deviation = value - np.median(value)
+    scatter = _MAD_TO_STD * float(np.median(np.abs(deviation)))
+    if len(value) >= _CONFIG.enough and scatter > 0.0:
+        away = deviation / scatter
+        trend = float(value[-1] - value[0]) / (math.sqrt(2.0) * scatter)
+    return DriftFigure(
+        name,
+        unit,
+        items,
+        tuple(value.tolist()),
+        None,
+        tuple(away.tolist()),
+        None,
+        None,
+        None,
+        trend,
+        _moved(items, away),
+    )
+
+
+def _moved(items: tuple[str, ...], away: Array) -> tuple[str, ...]:
+    return tuple(item for item, far in zip(items, away, strict=True) if abs(far) > _CONFIG.limit)
+
+
+def _on_one_turn(name: str, value: Array, std: Array) -> Array:
+    """Return `value`; an angle on a circle within half a turn of where most of them point."""
+    quantity = quantity_of(name)
+    if quantity is None or quantity.period is None:
+        return value
+    half, turn = quantity.period / 2.0, 2j * np.pi / quantity.period
+    middle = float(np.angle(np.sum(np.exp(turn * value) / std**2)) / abs(turn))
+    return np.asarray(middle + (value - middle + half) % quantity.period - half)
+
+
+def from_others(value: Array, std: Array) -> Array:
+    """Return how far each value is from the weighted mean of the others that have not moved [std].
+
+    What moved most leaves the mean first, and the rest is judged anew: it would draw the mean to
+    itself, and others would seem to have moved. At least half of them stay.
+    """
+    kept = np.ones(len(value), dtype=bool)
+    while True:
+        weight = np.where(kept, 1.0 / std**2, 0.0)
+        others = _sum_of_others(weight)
+        mean = _sum_of_others(weight * value) / others
+        away = np.asarray((value - mean) / np.sqrt(std**2 + 1.0 / others))
+        worst = int(np.argmax(np.where(kept, np.abs(away), 0.0)))
+        if abs(away[worst]) <= _CONFIG.limit or np.sum(kept) <= max(2, (len(value) + 1) // 2):
+            return away
+        kept[worst] = False
+
+
+def _sum_of_others(x: Array) -> Array:
+    """Return for each the sum of all others, summed: a difference would lose small values."""
+    before = np.concatenate(([0.0], np.cumsum(x[:-1])))
+    return before + np.concatenate((np.cumsum(x[:0:-1])[::-1], [0.0]))
+
+
+def is_drift(drift: RobotDrift) -> bool:
+    """Return whether a robot's figures moved farther than chance moves the farthest of so many.
+
+    χ² shows many items that moved a little, the farthest item a single one among hundreds: both
+    are tested, at levels for which all tests together keep the false alarm rate (Šidák 1967).
+    """
+    figures, items = len(drift.figures), sum(len(one.items) for one in drift.figures)
+    for one in drift.figures:
+        farthest = math.erfc(max(map(abs, one.away)) / math.sqrt(2.0))
+        if one.moved and ((one.probability or 0.0) < _level(figures) or farthest < _level(items)):
+            return True
+    return False
+
+
+def _level(tests: int) -> float:
+    """Return the level of each of two times `tests`."""
+    return -math.expm1(math.log1p(-_CONFIG.false_alarms) / (2 * max(1, tests)))

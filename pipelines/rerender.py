@@ -1,0 +1,153 @@
+"""Draw the report of a stored result again; nothing is computed.
+
+report, folder = rerender(folder)       in its place; with `out` elsewhere
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shutil
+from importlib import import_module
+from pathlib import Path, PurePath
+from typing import Any
+
+from pipelines import __version__
+from pipelines.batch import claim
+from pipelines.cache import locked
+from pipelines.errors import InputRejected, RrridError, UsageError
+from pipelines.io.output import (
+    PROVENANCE,
+    environment_faults,
+    hash_file,
+    keep_apart,
+    refuse_foreign,
+    tilde,
+    write_text,
+    written_by,
+)
+from pipelines.io.results import (
+    StoredResult,
+    decode,
+    headed,
+    json_text,
+    listed_outputs,
+    read_foreign_series,
+    read_result,
+)
+from pipelines.report.batch_report import Result as BatchResult
+from pipelines.report.batch_report import batch_report
+from pipelines.report.render import write_report
+from pipelines.report.report import Report
+from pipelines.stage import Stage, footer_of, result_type
+
+__all__ = ["rerender"]
+
+_AGAIN = "run the command again"
+
+
+def rerender(folder: Path, out: Path | None = None, force: bool = False) -> Report:
+    """Draw the report of the result in `folder`, there or in `out`.
+
+    Raises:
+        UsageError: C04, no result there; C02, a result without a report; C05, files that rrrid did
+            not write, or another command's result in `out`.
+        InputRejected: F05, it is not as it was written; S01, its series are missing; S20, it is of
+            another version.
+        EnvironmentFault: disk full, no permission; P08, a batch is at work there.
+    """
+    stored = read_result(folder)
+    home = stored.path.parent
+    is_batch = stored.command == "batch"
+    if out is not None:
+        keep_apart(out, (stored.path,), (home,))
+        refuse_foreign(out, force)
+        if written_by(out) not in ("", "report") and not force:
+            words = f"holds the result of '{written_by(out)}'"
+            remedy = "choose another folder with --out, or replace it with --force"
+            raise UsageError("C05", words, where=out, remedy=remedy)
+    elif is_batch:
+        claim(home, str(stored.object.get("stage")))
+    else:
+        refuse_foreign(home, force)
+    report: Report = tilde(_report(stored))
+    about = _provenance(home)
+    footer = footer_of(stored.command, about.get("inputs", {}))
+    if is_batch:
+        footer = {"command": "rrrid batch", "version": __version__, "stage": about["stage"]}
+    with locked(home / "ledger", home) if is_batch else contextlib.nullcontext():
+        _draw(report, home if out is None else out, footer)
+        if out is None:
+            others = {n: sha for n, sha in about["outputs"].items() if not _is_drawn(n)}
+            about = about | {"outputs": others | _drawn(home)}
+        else:
+            about = {"tool": "rrrid", "version": __version__, "command": "report"}
+            about |= {"inputs": {str(stored.path): hash_file(stored.path)}, "outputs": _drawn(out)}
+        write_text((out or home) / PROVENANCE, json_text(tilde(about)))
+    return report
+
+
+def _draw(report: Report, folder: Path, footer: dict[str, str]) -> None:
+    with environment_faults(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        shutil.rmtree(folder / "figures", ignore_errors=True)
+    write_report(report, folder, footer)
+
+
+def _drawn(folder: Path) -> dict[str, str]:
+    files = [folder / "report.html", *sorted((folder / "figures").glob("*"))]
+    return {path.relative_to(folder).as_posix(): hash_file(path) for path in files}
+
+
+def _is_drawn(name: str) -> bool:
+    return name == "report.html" or name.startswith("figures/")
+
+
+def _report(stored: StoredResult) -> Report:
+    """Return the report as the stage draws it of what was stored."""
+    object_ = {key: value for key, value in stored.object.items() if key not in headed("", {})}
+    module = "import_log" if stored.command == "import" else stored.command.replace("-", "_")
+    try:
+        if stored.command == "batch":
+            return batch_report(decode(BatchResult, object_, {}))
+        stage: Stage[Any, Any] = import_module(f"pipelines.{module}").STAGE
+        if stored.command == "run":
+            from pipelines.run import restored
+
+            return stage.report(restored(stored.path.parent, stored.object))
+        return stage.report(decode(result_type(stage), object_, _series(stored)))
+    except RrridError:
+        raise
+    except ImportError:
+        words = f"a result of {stored.command} has no report to draw again"
+        raise UsageError("C02", words, where=stored.path, remedy=_AGAIN) from None
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as problem:
+        words = f"does not hold what this version draws ({type(problem).__name__}: {problem})"
+        remedy = f"it was written by another version; {_AGAIN}"
+        raise InputRejected("S20", words, where=stored.path, remedy=remedy) from problem
+
+
+def _series(stored: StoredResult) -> dict[str, Any]:
+    """Return the long series that figures are drawn of, as they were written."""
+    if '"$series"' not in json.dumps(stored.object):
+        return {}
+    if not stored.series.is_file():
+        words = "the series that its figures are drawn of are missing"
+        raise InputRejected("S01", words, where=stored.series, remedy=_AGAIN)
+    expected = listed_outputs(stored.path.parent).get(stored.series.name)
+    if expected is not None and expected != hash_file(stored.series):
+        words = "sha256 differs from provenance.json: it was changed since it was written"
+        raise InputRejected("F05", words, where=stored.series, remedy=_AGAIN)
+    return read_foreign_series(stored.series)
+
+
+def _provenance(folder: Path) -> dict[str, Any]:
+    try:
+        about: dict[str, Any] = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
+        dict(about.get("inputs", {}))
+        if any(".." in PurePath(name).parts or name.startswith("/") for name in about["outputs"]):
+            raise ValueError  # X11
+    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        words = "has no provenance.json that says what it is"
+        raise InputRejected("F05", words, where=folder, remedy=_AGAIN) from None
+    return about

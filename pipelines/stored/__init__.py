@@ -1,1 +1,0 @@
-"""What is done with the results of commands once they are there, without computing anything again."""
