@@ -29,7 +29,7 @@ from pipelines.cache import code_of, digest_of_json, libraries, locked, read_sou
 from pipelines.errors import Check, EnvironmentFault, UsageError, clean, did_you_mean
 from pipelines.estimation.drift import Session, drift_of
 from pipelines.executor import Item, Plan, Record, failed, relative, run_items
-from pipelines.io.files import find_logs, regular_file
+from pipelines.io.files import find_logs
 from pipelines.io.output import (
     PROVENANCE,
     environment_faults,
@@ -46,6 +46,7 @@ from pipelines.io.output import (
 from pipelines.io.parquet import write_rows
 from pipelines.io.results import decode, encode, headed, json_text
 from pipelines.io.robot_files import robot_sources
+from pipelines.io.sandbox import regular_file
 from pipelines.report.batch_report import Result, batch_report
 from pipelines.run import STEPS
 from pipelines.stage import Outcome

@@ -19,14 +19,14 @@ import numpy as np
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.importers.recipe import Recipe
 from pipelines.importers.units import controller_table, write_controller_table
-from pipelines.io.atomic import write_file
 from pipelines.io.files import write_log
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
+from pipelines.io.output import write_file
 from pipelines.io.results import json_text, stored_result
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
-from pipelines.io.text import read_small_text
+from pipelines.io.sandbox import read_small_text
 from pipelines.model.arm import Arm
 from pipelines.model.excitation.allowed import refuse_strange
 from pipelines.model.excitation.apart import Pair, refuse_hidden, refuse_one

@@ -15,15 +15,13 @@ from pathlib import Path
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.importers.recipe import Recipe
 from pipelines.importers.units import controller_table, write_controller_table
-from pipelines.io.canonical import digest_of
-from pipelines.io.derive import derive, recording
-from pipelines.io.experiment import ExperimentLog
 from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import ModelFile, read_model
 from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
-from pipelines.io.text import read_small_text
+from pipelines.io.sandbox import read_small_text
 from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.in_folder import fitted_in_folder
 from pipelines.model.motion import Reconstructed, Reconstruction

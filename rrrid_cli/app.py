@@ -294,7 +294,7 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
     common, own = read(Common, given), read(Batch, given)
     from pipelines.batch import module_of, run_batch
     from pipelines.executor import Plan
-    from pipelines.io.places import slug
+    from pipelines.io.output import slug
     from pipelines.io.processors import processors
     from pipelines.stage import Request
 
@@ -391,9 +391,9 @@ def _schema(name: str, given: Mapping[str, Any]) -> int:
 
 def schema_of(what: str) -> dict[str, Any]:
     """Return the JSON schema of a command's result.json, of a "model" or of a "log"."""
-    from pipelines.io.log_schema import log_schema
     from pipelines.io.model_file import model_schema
-    from pipelines.io.result_schema import result_schema
+    from pipelines.io.results import result_schema
+    from pipelines.io.schema import log_schema
     from pipelines.report.batch_report import Result
     from pipelines.stage import result_type
 

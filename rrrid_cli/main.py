@@ -20,7 +20,7 @@ from typing import Any, NoReturn, TextIO
 import typer
 
 from pipelines.errors import EnvironmentFault, Interrupted, RrridError, UsageError, did_you_mean
-from pipelines.io.atomic import fault_of
+from pipelines.io.output import fault_of
 from rrrid_cli.app import build
 from rrrid_cli.console import print_error
 
@@ -141,7 +141,7 @@ def _as_error(problem: BaseException, words: Iterable[str]) -> RrridError:
 
 def _as_given(problem: RrridError, words: Iterable[str]) -> RrridError:
     """Return the error with every path as the command line gave it; stages have absolute paths."""
-    from pipelines.io.places import renamed
+    from pipelines.io.output import renamed
 
     names: dict[str, str] = {}
     for text in (

@@ -47,18 +47,15 @@ from pipelines.io.units import to_si
 
 __all__ = [
     "ENDINGS",
-    "PROVENANCE",
     "RECORDINGS",
     "Opened",
     "entries",
     "expanded",
     "find_logs",
-    "hash_file",
     "nothing_there",
     "open_log",
     "read_unguarded",
     "refuse_unlike_format",
-    "regular_file",
     "write_csv",
     "write_log",
 ]

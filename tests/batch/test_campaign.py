@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pipelines.batch import find_items, is_intact, read_ledger
-from pipelines.io.files import hash_file
+from pipelines.io.output import hash_file
 from tests.batch.conftest import Lay, contents, obey, statuses
 from tests.batch.test_command import nobody_left
 from tests.cli.commands import REPO

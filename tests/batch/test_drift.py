@@ -12,7 +12,7 @@ import pytest
 from pipelines.batch import result_of
 from pipelines.estimation.drift import DriftFigure, Session, drift_of, from_others
 from pipelines.executor import Record
-from pipelines.io.result_schema import result_schema
+from pipelines.io.results import result_schema
 from pipelines.report.batch_report import DoneItem, Result, batch_report
 from pipelines.report.report import Report
 from pipelines.report.result_figures import fitted, residuals

@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 import pytest
 
 from pipelines.errors import EnvironmentFault, NothingMatched
-from pipelines.io.places import slug
+from pipelines.io.output import slug
 from pipelines.stage import Request
 from tests.batch.conftest import Lay, contents, obey, statuses
 

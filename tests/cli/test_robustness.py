@@ -21,8 +21,8 @@ from pipelines.errors import InputRejected, UsageError
 from pipelines.importers import patterns
 from pipelines.importers.patterns import matches
 from pipelines.io.model_file import parse_model
-from pipelines.io.shipped import shipped
-from pipelines.io.toml_text import TomlError, parse_toml
+from pipelines.io.robot import shipped
+from pipelines.io.sandbox import TomlError, parse_toml
 from tests.cli.commands import REPO, RRRID, rrrid
 
 SECONDS, MEGABYTES = 5.0, 500.0  # of CPU and of memory beyond the program's own

@@ -9,7 +9,7 @@ import pytest
 from pipelines.errors import InputRejected, UsageError
 from pipelines.importers import patterns
 from pipelines.importers.recipe import find_recipe, parse_recipe
-from pipelines.io.shipped import shipped_names
+from pipelines.io.robot import shipped_names
 from tests.importers.good import RECIPE
 
 

@@ -15,8 +15,8 @@ import pytest
 
 from pipelines.batch import find_items
 from pipelines.errors import EnvironmentFault, InputRejected, NothingMatched, UsageError
-from pipelines.io.experiment import Controller, Derived, Signal
 from pipelines.io.files import find_logs, open_log, write_log
+from pipelines.io.log import Controller, Derived, Signal
 from tests.io.logs import ROBOT_TEXT, random_log, small_log
 from tests.seeds import seeds
 

@@ -7,12 +7,14 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import json
 import os
 import resource
 import select
 import signal
 import struct
+import sys
 import time
 import warnings
 from collections.abc import Callable
@@ -20,7 +22,6 @@ from dataclasses import dataclass
 from types import TracebackType
 
 from pipelines.errors import RrridError
-from pipelines.io.guard import die_with_parent
 
 __all__ = ["Contained", "Outcome"]
 
@@ -95,7 +96,8 @@ class Contained:
 
 
 def _serve(work: Callable[[bytes], None], receive: int, send: int) -> None:
-    die_with_parent()
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(1, int(signal.SIGKILL), 0, 0, 0)  # PR_SET_PDEATHSIG: end with the parent
     warnings.simplefilter("ignore")  # as in the command; the tests make errors of them
     resource.setrlimit(resource.RLIMIT_AS, (_MEMORY, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pipelines.importers.units import ControllerTable
-from pipelines.io.experiment import ExperimentLog
+from pipelines.io.log import ExperimentLog
 from pipelines.io.results import NOT_STORED
 from pipelines.model.excitation.apart import Apart
 from pipelines.model.excitation.others import Plan

@@ -9,7 +9,7 @@ import numpy as np
 
 from pipelines.errors import Check
 from pipelines.importers.units import ControllerTable
-from pipelines.io.experiment import Array, ExperimentLog
+from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.results import NOT_STORED
 from pipelines.model.simulation.imitate import Imitation
 from pipelines.model.writing.cases import Case

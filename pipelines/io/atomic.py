@@ -1,1 +1,0 @@
-from pipelines.io.output import *  # noqa: F403

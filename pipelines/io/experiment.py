@@ -1,1 +1,0 @@
-from pipelines.io.log import *  # noqa: F403

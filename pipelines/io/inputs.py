@@ -1,1 +1,0 @@
-from pipelines.io.sessions import *  # noqa: F403

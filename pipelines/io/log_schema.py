@@ -1,3 +1,0 @@
-from pipelines.io.schema import log_schema
-
-__all__ = ["log_schema"]

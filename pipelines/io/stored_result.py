@@ -1,1 +1,0 @@
-from pipelines.io.results import *  # noqa: F403

@@ -1,1 +1,0 @@
-from pipelines.io.sandbox import *  # noqa: F403
