@@ -61,7 +61,7 @@ class RrridError(Exception):
 
     exit_code = 70
 
-    def __init__(self, code: str, message: str, *, where: object = "", remedy: str = "") -> None:
+    def __init__(self, code: str, message: str, where: object = "", remedy: str = "") -> None:
         self.code = f"RRID-{code}"
         self.message = clean(message)
         self.where = clean(where)
@@ -112,7 +112,7 @@ class Check:
     gate: bool = False
 
     @staticmethod
-    def of(code: str, level: Level, message: str, *, where: object = "", remedy: str = "", gate: bool = False) -> Check:
+    def of(code: str, level: Level, message: str, where: object = "", remedy: str = "", *, gate: bool = False) -> Check:
         """A check from a bare row name ("T05"), its texts made printable."""
         return Check(f"RRID-{code}", level, clean(message), clean(where), clean(remedy), gate)
 

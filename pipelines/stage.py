@@ -24,6 +24,7 @@ from typing import Any, Generic, Literal, TypeVar
 from pipelines import __version__
 from pipelines.errors import Check, EnvironmentFault, InputRejected, RrridError, clean
 from pipelines.io.files import expanded
+from pipelines.io.hdf5 import write_series
 from pipelines.io.log import ExperimentLog
 from pipelines.io.output import (
     PROVENANCE,
@@ -44,7 +45,7 @@ from pipelines.io.output import (
     write_file,
     write_text,
 )
-from pipelines.io.results import encode, headed, json_text, write_series
+from pipelines.io.results import encode, headed, json_text
 from pipelines.io.robot_files import robot_sources
 from pipelines.io.sessions import (
     Inputs,

@@ -20,8 +20,9 @@ from matplotlib.figure import Figure as Drawing
 from pipelines.cache import digest_of_json
 from pipelines.errors import Check
 from pipelines.io.files import open_log, write_csv, write_log
+from pipelines.io.hdf5 import read_series
 from pipelines.io.output import PROVENANCE
-from pipelines.io.results import decode, encode, read_series, result_schema
+from pipelines.io.results import decode, encode, result_schema
 from pipelines.report import render
 from pipelines.report.report import Figure
 from pipelines.report.style import figure_style

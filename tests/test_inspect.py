@@ -13,8 +13,9 @@ import pytest
 from pipelines import import_log, inspect, reconstruct
 from pipelines.errors import InputRejected
 from pipelines.io.files import find_logs, open_log, write_log
+from pipelines.io.hdf5 import read_series
 from pipelines.io.log import ExperimentLog
-from pipelines.io.results import decode, read_series
+from pipelines.io.results import decode
 from pipelines.stage import Outcome, Request, run_stage
 from tests.fault_table import FAULTS
 from tests.faulty import faster, good_path

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import timedelta
 
-__all__ = ["FORMAT", "LIMITS", "SANDBOX", "SESSIONS", "TEXT", "URDF"]
-
 
 @dataclass(frozen=True)
 class SandboxConfig:

@@ -45,21 +45,6 @@ from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import Answer, guarded, regular_file
 from pipelines.io.units import to_si
 
-__all__ = [
-    "ENDINGS",
-    "RECORDINGS",
-    "Opened",
-    "entries",
-    "expanded",
-    "find_logs",
-    "nothing_there",
-    "open_log",
-    "read_unguarded",
-    "refuse_unlike_format",
-    "write_csv",
-    "write_log",
-]
-
 # `import` reads JSON too, but so are results
 RECORDINGS = (".csv", ".txt", ".tsv", ".dat", ".mat", ".npy", ".npz", ".jsonl")
 ENDINGS = {".h5": "hdf5", ".hdf5": "hdf5", ".parquet": "parquet"}

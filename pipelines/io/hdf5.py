@@ -18,17 +18,6 @@ from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.sandbox import Answer
 from pipelines.io.schema import FORMAT, FORMAT_VERSION, plain
 
-__all__ = [
-    "explain",
-    "read_parts",
-    "read_series",
-    "refuse_bad_dataset",
-    "refuse_oversize",
-    "refuse_version",
-    "write",
-    "write_series",
-]
-
 Array = npt.NDArray[np.float64]
 
 _GROUPS = ("controller", "derived")

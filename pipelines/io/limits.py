@@ -12,22 +12,6 @@ import numpy.typing as npt
 from pipelines.io.config import LIMITS
 from pipelines.io.log import Array
 
-__all__ = [
-    "ABSURD",
-    "FEWEST",
-    "GAP_LIMIT",
-    "GAP_TICKS",
-    "LARGEST_JITTER",
-    "MOST_STEPS",
-    "SHORTEST",
-    "jitter",
-    "late",
-    "percent",
-    "recorded_span",
-    "sentinels",
-    "shorter_than_period",
-]
-
 FEWEST = LIMITS.fewest
 SHORTEST = LIMITS.shortest
 GAP_LIMIT = LIMITS.gap

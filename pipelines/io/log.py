@@ -20,26 +20,6 @@ from pipelines.io import schema
 from pipelines.io.robot import RobotDescription, format_robot, parse_robot
 from pipelines.io.sandbox import Answer
 
-__all__ = [
-    "Array",
-    "Controller",
-    "Derived",
-    "ExperimentLog",
-    "Signal",
-    "assembled",
-    "attributes_of",
-    "columns_in",
-    "created",
-    "derive",
-    "derived_by",
-    "digest_of",
-    "log_text",
-    "parts_of",
-    "recording",
-    "select_joints",
-    "with_robot",
-]
-
 Array = npt.NDArray[np.float64]
 
 PER_JOINT = ("kp", "kd", "ki", "observer_gain", "output_limit", "torque_resolution")

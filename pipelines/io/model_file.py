@@ -32,24 +32,6 @@ from pipelines.io.schema import DRAFT, adapter, described
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-__all__ = [
-    "FORMAT",
-    "FORMAT_VERSION",
-    "ModelFile",
-    "Source",
-    "StoredEffect",
-    "StoredParameter",
-    "StoredValue",
-    "Validity",
-    "model_schema",
-    "model_text",
-    "parse_model",
-    "read_covariance",
-    "read_model",
-    "write_covariance",
-    "write_model",
-]
-
 Array = npt.NDArray[np.float64]
 
 FORMAT = "rrrid-model"

@@ -5,8 +5,6 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-__all__ = ["option"]
-
 
 def option(default: Any, text: str, *flags: str, **more: Any) -> Any:
     """Return a dataclass field that the command line offers as an option.

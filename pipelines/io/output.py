@@ -25,33 +25,6 @@ from typing import Any
 
 from pipelines.errors import EnvironmentFault, RrridError, UsageError, clean
 
-__all__ = [
-    "PROVENANCE",
-    "environment_faults",
-    "fault_of",
-    "given_names",
-    "hash_file",
-    "keep_apart",
-    "provenance_of",
-    "refuse_foreign",
-    "refuse_own_place",
-    "refuse_unwritable",
-    "remove_folder",
-    "renamed",
-    "replace_folder",
-    "short_names",
-    "slug",
-    "staging_folder",
-    "staging_place",
-    "sweep",
-    "temporary_folder",
-    "tilde",
-    "told_apart",
-    "write_file",
-    "write_text",
-    "written_by",
-]
-
 PROVENANCE = "provenance.json"
 _MARK = ".rrrid-tmp-"
 _ELSEWHERE = "choose another folder with --out"

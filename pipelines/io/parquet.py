@@ -19,8 +19,6 @@ from pipelines.io.output import write_file
 from pipelines.io.sandbox import Answer
 from pipelines.io.schema import FORMAT, FORMAT_VERSION, plain
 
-__all__ = ["columns_of", "csv_cell", "read_parts", "write", "write_rows", "write_table"]
-
 # its other allocators reserve more address space than a guarded child may use
 os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 

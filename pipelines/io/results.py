@@ -29,30 +29,10 @@ import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.config import FORMAT as LIMITS
-from pipelines.io.hdf5 import read_series, write_series
+from pipelines.io.hdf5 import read_series
 from pipelines.io.output import PROVENANCE, hash_file
 from pipelines.io.sandbox import Answer, guarded, read_small_text, regular_file
 from pipelines.io.schema import DRAFT
-
-__all__ = [
-    "FLAT",
-    "NOT_STORED",
-    "SCHEMA_VERSION",
-    "StoredResult",
-    "decode",
-    "encode",
-    "headed",
-    "json_text",
-    "listed_outputs",
-    "read_any_result",
-    "read_foreign_series",
-    "read_result",
-    "read_series",
-    "result_schema",
-    "stored_result",
-    "words_of",
-    "write_series",
-]
 
 Array = npt.NDArray[np.float64]
 T = TypeVar("T")

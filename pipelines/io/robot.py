@@ -26,19 +26,6 @@ from pipelines.io.schema import STRICT, adapter, described
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-__all__ = [
-    "Drive",
-    "Joint",
-    "LinkParameters",
-    "RobotDescription",
-    "format_robot",
-    "inconsistency",
-    "inconsistency_of_link",
-    "parse_robot",
-    "shipped",
-    "shipped_names",
-]
-
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]

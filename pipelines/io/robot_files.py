@@ -13,8 +13,6 @@ from pipelines.io.files import ENDINGS, open_log
 from pipelines.io.robot import Joint, RobotDescription, inconsistency_of_link, parse_robot, shipped
 from pipelines.io.sandbox import TomlError, parse_toml, read_small_text
 
-__all__ = ["load_robot", "robot_at_hand", "robot_sources", "split_tip"]
-
 _URDF = (".urdf", ".xacro")
 _HERE, _SHIPPED = "robot.toml", "rrr"  # where none is named
 

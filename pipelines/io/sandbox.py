@@ -38,8 +38,6 @@ if TYPE_CHECKING:  # --help needs no NumPy
 
     Array = npt.NDArray[np.float64]
 
-__all__ = ["Answer", "TomlError", "guarded", "parse_toml", "read_small_text", "regular_file"]
-
 T = TypeVar("T")
 
 _AGAIN = "copy the file again"

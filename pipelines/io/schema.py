@@ -22,32 +22,6 @@ if TYPE_CHECKING:
     from pydantic import TypeAdapter
     from pydantic_core import ErrorDetails
 
-__all__ = [
-    "DERIVED",
-    "DRAFT",
-    "EXPERIMENTS",
-    "FORMAT",
-    "FORMAT_VERSION",
-    "LAWS",
-    "ONE_JOINT",
-    "ORIGINS",
-    "ROLES",
-    "SIGNALS",
-    "STRICT",
-    "TORQUE_KINDS",
-    "ControllerAttributes",
-    "DerivedAttributes",
-    "LogAttributes",
-    "adapter",
-    "checked",
-    "described",
-    "joint_unit",
-    "log_schema",
-    "plain",
-    "quantity_of",
-    "unit_of",
-]
-
 FORMAT = "rrrid-log"
 FORMAT_VERSION = 1  # numerics
 DRAFT = "https://json-schema.org/draft/2020-12/schema"

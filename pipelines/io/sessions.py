@@ -23,22 +23,6 @@ from pipelines.io.output import written_by
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
 
-__all__ = [
-    "Inputs",
-    "Rejected",
-    "Request",
-    "Session",
-    "SeveralSessions",
-    "apart",
-    "called",
-    "check_alike",
-    "of_one_session",
-    "only",
-    "read_by_role",
-    "read_logs",
-    "refuse_mixed",
-]
-
 Key = tuple[str, str, str]  # robot's name, its description, day
 
 

@@ -9,8 +9,6 @@ from typing import Final
 
 from pipelines.errors import InputRejected, did_you_mean
 
-__all__ = ["UNITS", "Unit", "canonical_unit", "of_rated", "to_si"]
-
 
 @dataclass(frozen=True)
 class Unit:

@@ -19,8 +19,6 @@ from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_y
 from pipelines.io.config import URDF
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription, inconsistency
 
-__all__ = ["JointPlacement", "UrdfChain", "chain_from_urdf", "import_urdf"]
-
 Array = npt.NDArray[np.float64]
 
 _MOVING = ("revolute", "continuous", "prismatic")

@@ -9,8 +9,8 @@ import numpy as np
 
 from pipelines import estimate_bps
 from pipelines.io.files import write_log
+from pipelines.io.hdf5 import read_series
 from pipelines.io.log import ExperimentLog
-from pipelines.io.results import read_series
 from pipelines.stage import Outcome, Request, run_stage
 
 Result = estimate_bps.Result
