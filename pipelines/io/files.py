@@ -82,7 +82,7 @@ def write_log(path: Path | str, log: ExperimentLog) -> None:
     container = ENDINGS.get(path.suffix.lower())
     if container is None:
         words, remedy = f"'{path.suffix}' names no container", "end the name in .h5 or .parquet"
-        raise UsageError("C02", words, where=path, remedy=remedy)
+        raise UsageError("C02", words, path, remedy)
     refuse_unlike_format(log)
     write = hdf5.write if container == "hdf5" else parquet.write
     write_file(path, lambda draft: write(draft, parts_of(log)))
@@ -136,12 +136,11 @@ def open_log(
     if parts.about["digest"] is None:
         words = "no integrity data: nothing would notice a flipped bit"
         remedy = "'rrrid convert' writes a copy that has them"
-        checks.append(Check.of("F05", "warn", words, where=path, remedy=remedy))
+        checks.append(Check.of("F05", "warn", words, path, remedy))
     if joints:
         names, columns = ", ".join(map(str, joints)), columns_in(log)
         words = f"joints {names} of {columns} are used, as --joints says"
-        remedy = "leave --joints out to use all"
-        checks.append(Check.of("S02", "warn", words, where=path, remedy=remedy))
+        checks.append(Check.of("S02", "warn", words, path, "leave --joints out to use all"))
         log = select_joints(log, joints, robot)
     if robot is not None:
         log = with_robot(log, robot)
@@ -165,16 +164,15 @@ def _verified(parts: Answer, path: Path, *, whole: bool) -> ExperimentLog:
     """Return the log as it is written, checked against the digest that it carries."""
     log, digest = assembled(parts, str(path)), parts.about["digest"]
     if digest is not None and not isinstance(digest, str):
-        remedy = "write it as a text, or leave it out"
         words = "attribute 'digest' is not a text"
-        raise InputRejected("S20", words, where=path, remedy=remedy)
+        raise InputRejected("S20", words, path, "write it as a text, or leave it out")
     if whole and digest is not None and digest != digest_of(log):
         remedy = (
             "copy the file again from where it was recorded; if it was edited on purpose, "
             "delete its attribute digest, which may be left out"
         )
         words = "checksum mismatch: the content does not fit its digest"
-        raise InputRejected("F04", words, where=path, remedy=remedy)
+        raise InputRejected("F04", words, path, remedy)
     return log
 
 
@@ -192,7 +190,7 @@ def _reading(path: Path) -> Iterator[int]:
     except BlockingIOError:
         os.close(handle)
         words, remedy = "in use by another process", "wait until the recording is finished"
-        raise EnvironmentFault("F15", words, where=path, remedy=remedy) from None
+        raise EnvironmentFault("F15", words, path, remedy) from None
     except OSError:
         pass  # a file system without locks
     try:
@@ -207,7 +205,7 @@ def _refuse_modified(path: Path, handle: int, before: os.stat_result) -> None:
         same = (now.st_size, now.st_mtime_ns, now.st_ino)
         if same != (before.st_size, before.st_mtime_ns, before.st_ino):
             words, remedy = "was modified while it was read", "wait until the recording is finished"
-            raise InputRejected("F14", words, where=path, remedy=remedy)
+            raise InputRejected("F14", words, path, remedy)
 
 
 def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
@@ -227,16 +225,16 @@ def _container(path: Path, magic: bytes, size: int) -> tuple[str, list[Check]]:
             file.seek(max(0, size - 4))
             if file.read() != _PARQUET_MAGIC:
                 remedy = "copy the file again from where it was recorded"
-                raise InputRejected("F07", "truncated: no footer", where=path, remedy=remedy)
+                raise InputRejected("F07", "truncated: no footer", path, remedy)
     elif magic.startswith(_ARCHIVES) and path.suffix.lower() not in ENDINGS:
         remedy = "unpack it, and give the logs or their folder"
-        raise UsageError("X12", "an archive, which is not opened", where=path, remedy=remedy)
+        raise UsageError("X12", "an archive, which is not opened", path, remedy)
     else:
-        raise InputRejected("F06", "neither HDF5 nor Parquet", where=path, remedy=_RECIPE)
+        raise InputRejected("F06", "neither HDF5 nor Parquet", path, _RECIPE)
     if ENDINGS.get(path.suffix.lower()) == container:
         return container, []
     words = f"named '{path.suffix}', but its content is {container}; read as that"
-    return container, [Check.of("F06", "warn", words, where=path, remedy="rename it")]
+    return container, [Check.of("F06", "warn", words, path, "rename it")]
 
 
 def _refuse_unlisted(path: Path, sha256: str) -> None:
@@ -253,7 +251,7 @@ def _refuse_unlisted(path: Path, sha256: str) -> None:
         if expected not in (None, sha256):
             words = f"sha256 differs from the manifest in {folder.name or folder}"
             remedy = "copy the file again, or run the command that wrote it again"
-            raise InputRejected("F05", words, where=path, remedy=remedy)
+            raise InputRejected("F05", words, path, remedy)
 
 
 def _refuse_bad_urdf(log: ExperimentLog) -> None:
@@ -302,7 +300,7 @@ def _oriented(
     else:
         return signal
     words = f"stored as {values.shape}, read as {turned.shape}"
-    checks.append(Check.of("S11", "warn", words, where=where, remedy=remedy))
+    checks.append(Check.of("S11", "warn", words, where, remedy))
     return replace(signal, values=turned)
 
 
@@ -317,16 +315,15 @@ def _in_si(
         if not assume_units:
             words = f"no units; {wanted} is what the format wants"
             remedy = "declare them, or pass --assume-units if they are SI"
-            raise InputRejected("S04", words, where=where, remedy=remedy)
+            raise InputRejected("S04", words, where, remedy)
         words = f"no units; taken as {wanted}, as --assume-units says"
-        remedy = "write the attribute units"
-        checks.append(Check.of("S04", "warn", words, where=where, remedy=remedy))
+        checks.append(Check.of("S04", "warn", words, where, "write the attribute units"))
         return replace(signal, units=wanted)
     unit = to_si(signal.units, schema.quantity_of(name, law), where=where)
     if not unit.is_si:
         words = f"declared in {signal.units}, converted to {wanted}"
         remedy = "store SI units, if results should not list the conversion"
-        checks.append(Check.of("S06", "warn", words, where=where, remedy=remedy))
+        checks.append(Check.of("S06", "warn", words, where, remedy))
     return replace(signal, values=unit.factor * signal.values + unit.offset, units=wanted)
 
 
@@ -343,7 +340,7 @@ def refuse_unlike_format(log: ExperimentLog) -> None:
             bad = True
         if bad:
             words, remedy = "not a text in UTF-8 without NUL", "write it as plain text"
-            raise InputRejected("S20", words, where=f"{where}, {place}", remedy=remedy)
+            raise InputRejected("S20", words, f"{where}, {place}", remedy)
     _refuse_signals(log)
     _refuse_shapes(log, where)
 
@@ -360,19 +357,18 @@ def _refuse_signals(log: ExperimentLog) -> None:
         hints = "".join(did_you_mean(name, unknown) for name in missing)
         there = ", ".join(sorted(log.signals)) or "none"
         words = f"signal {', '.join(missing)} missing{hints}; there are {there}"
-        remedy = "rename it, or import the recording with --map"
-        raise InputRejected("S01", words, where=where, remedy=remedy)
+        raise InputRejected("S01", words, where, "rename it, or import the recording with --map")
     measured = [name for name in ("q", "tau") if name in log.signals]
     if planned and measured:
         words = f"a planned log has references only, but there is {', '.join(measured)}"
         remedy = "remove them, or say where they come from: origin 'measured' or 'simulated'"
-        raise InputRejected("S20", words, where=where, remedy=remedy)
+        raise InputRejected("S20", words, where, remedy)
     for name in log.signals:
         if name not in known:
             hint = did_you_mean(name, known)
             more = " without a /derived group" if name in schema.DERIVED else hint
             words = f"signal '{name}' is not in format version {schema.FORMAT_VERSION}{more}"
-            raise InputRejected("S19", words, where=where, remedy="rename or remove it")
+            raise InputRejected("S19", words, where, "rename or remove it")
 
 
 def _refuse_shapes(log: ExperimentLog, where: str) -> None:
@@ -383,16 +379,15 @@ def _refuse_shapes(log: ExperimentLog, where: str) -> None:
         place, shape, wanted = f"{where}, signal {name}", signal.values.shape, (*samples, n)
         if signal.units != (unit := schema.unit_of(name, law)):
             words = f"units are '{signal.units}', the format wants '{unit}'"
-            raise InputRejected("S05", words, where=place, remedy="convert the samples to SI")
+            raise InputRejected("S05", words, place, "convert the samples to SI")
         if (name == "t" and len(shape) == 1) or (name != "t" and shape == wanted):
             continue
         if name != "t" and shape[:-1] == samples:
             words = f"{shape[1]} columns for a robot of {n} joints"
             remedy = "give the description of this robot, or choose the columns with --joints"
-            raise InputRejected("S02", words, where=place, remedy=remedy)
+            raise InputRejected("S02", words, place, remedy)
         words = f"shape {shape}, neither ({samples[0]}, {n}) nor ({n}, {samples[0]})"
-        remedy = "store (samples, joints), and t as a vector"
-        raise InputRejected("S11", words, where=place, remedy=remedy)
+        raise InputRejected("S11", words, place, "store (samples, joints), and t as a vector")
     moves_one = log.experiment in schema.ONE_JOINT
     faults = {
         f"a {log.experiment} log {'needs' if moves_one else 'does not have'} the attribute joint": (
@@ -421,7 +416,7 @@ def _refuse_shapes(log: ExperimentLog, where: str) -> None:
     for words, wrong in faults.items():
         if wrong:
             remedy = "write one value a joint, joints counted from 1; gains, or law 'unknown'"
-            raise InputRejected("S20", words, where=where, remedy=remedy)
+            raise InputRejected("S20", words, where, remedy)
 
 
 def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
@@ -438,7 +433,7 @@ def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
         matches = sorted(glob.glob(str(path), recursive=True))
         if not matches:
             words, remedy = "nothing matches that pattern", "logs end in .h5 or .parquet"
-            raise NothingMatched("C06", words, where=path, remedy=remedy)
+            raise NothingMatched("C06", words, path, remedy)
         found += map(Path, matches)
     return tuple(dict.fromkeys(found))
 
@@ -491,7 +486,7 @@ def nothing_there(
         passed = f", but recordings such as {recorded[0].name}"
         draft = f"rrrid import --guess {shlex.quote(str(recorded[0]))}"
         remedy = f"make logs of them; this drafts the recipe: {draft}"
-    return NothingMatched("C06", f"no log there{passed}", where=where, remedy=remedy)
+    return NothingMatched("C06", f"no log there{passed}", where, remedy)
 
 
 def _within(folders: Sequence[Path], pattern: str) -> list[Path]:
@@ -537,7 +532,7 @@ def entries(folder: Path, checks: list[Check]) -> list[Path]:
             if entry.is_dir():
                 words = "link to a folder passed over"
                 remedy = "give what it leads to by its own path, if that is meant"
-            checks.append(Check.of("X11", "warn", words, where=entry, remedy=remedy))
+            checks.append(Check.of("X11", "warn", words, entry, remedy))
         elif entry.is_dir():
             if not (entry / PROVENANCE).is_file():
                 found.append(entry)

@@ -198,11 +198,10 @@ def refuse_version(attributes: dict[str, Any], container: str, where: str) -> No
     if form != FORMAT:
         words = f"{container}, but not an experiment log: its format is {form!r}"
         remedy = "use 'rrrid import' with a recipe to make a log of a recording"
-        raise InputRejected("F06", words, where=where, remedy=remedy)
+        raise InputRejected("F06", words, where, remedy)
     if version != FORMAT_VERSION or not isinstance(version, int) or isinstance(version, bool):
         words = f"format_version {version}; this program understands version {FORMAT_VERSION}"
-        remedy = "update rrrid, or write the log in that version"
-        raise InputRejected("F11", words, where=where, remedy=remedy)
+        raise InputRejected("F11", words, where, "update rrrid, or write the log in that version")
 
 
 def _refuse_links(group: Any, where: str) -> None:
@@ -213,19 +212,17 @@ def _refuse_links(group: Any, where: str) -> None:
         link = group.get(name, getlink=True)
         if isinstance(link, h5py.ExternalLink):
             words = f"external link '{name}' -> '{link.filename}' refused"
-            remedy = "store the data in the log itself"
-            raise InputRejected("X01", words, where=where, remedy=remedy)
+            raise InputRejected("X01", words, where, "store the data in the log itself")
         if isinstance(link, h5py.SoftLink):
             words, remedy = f"soft link '{name}' refused", "store the data in the log itself"
-            raise InputRejected("X04", words, where=where, remedy=remedy)
+            raise InputRejected("X04", words, where, remedy)
 
 
 def _refuse_many(group: Any, where: str) -> None:
     """Refuse endless groups (X04)."""
     if max(len(group), len(group.attrs)) > LIMITS.members:
         words = f"more than {LIMITS.members} members or attributes"
-        remedy = "a log holds robot, controller and signals"
-        raise InputRejected("X04", words, where=where, remedy=remedy)
+        raise InputRejected("X04", words, where, "a log holds robot, controller and signals")
 
 
 def _refuse_unknown(group: Any, known: Collection[str], where: str) -> None:
@@ -238,9 +235,8 @@ def _refuse_unknown(group: Any, known: Collection[str], where: str) -> None:
             continue
         words = f"'{name}' is not in format version {FORMAT_VERSION}"
         if group.get(name, getclass=True) is h5py.Group:
-            words = f"group {words}, and not looked into"
-            raise InputRejected("X04", words, where=where, remedy="remove it")
-        raise InputRejected("S19", words, where=where, remedy="remove it")
+            raise InputRejected("X04", f"group {words}, and not looked into", where, "remove it")
+        raise InputRejected("S19", words, where, "remove it")
 
 
 def _group(file: Any, name: str, where: str) -> Any:
@@ -248,7 +244,7 @@ def _group(file: Any, name: str, where: str) -> Any:
 
     if file.get(name, getclass=True) is not h5py.Group:
         remedy = "a log has /robot and /signals"
-        raise InputRejected("S01", f"group /{name} is missing", where=where, remedy=remedy)
+        raise InputRejected("S01", f"group /{name} is missing", where, remedy)
     return file[name]
 
 
@@ -265,14 +261,13 @@ def _attribute(attributes: Any, name: str, where: str) -> Any:
     declared = math.prod(stored.shape) * stored.dtype.itemsize
     if declared > LIMITS.attribute:
         remedy = "an attribute is a few words or numbers"
-        raise InputRejected("X05", f"declares {declared} bytes", where=where, remedy=remedy)
+        raise InputRejected("X05", f"declares {declared} bytes", where, remedy)
     if h5py.check_string_dtype(stored.dtype) is None and stored.dtype.kind not in "SUfiu":
         words = f"of type {stored.dtype}, neither text nor number"
-        remedy = "write it as a text or a number"
-        raise InputRejected("S12", words, where=where, remedy=remedy)
+        raise InputRejected("S12", words, where, "write it as a text or a number")
     value = attributes[name]
     if isinstance(value, h5py.Empty):
-        raise InputRejected("S20", "empty", where=where, remedy="write its value, or leave it out")
+        raise InputRejected("S20", "empty", where, "write its value, or leave it out")
     if isinstance(value, np.generic | np.ndarray):
         value = value.tolist()
     return plain(_text(value))
@@ -290,7 +285,7 @@ def _robot_text(dataset: Any, where: str) -> str:
     scalar = isinstance(dataset, h5py.Dataset) and dataset.shape == ()
     if not scalar or h5py.check_string_dtype(dataset.dtype) is None or _foreign(dataset):
         remedy = "write the robot's TOML as a single text"
-        raise InputRejected("S20", "/robot is not a scalar text", where=where, remedy=remedy)
+        raise InputRejected("S20", "/robot is not a scalar text", where, remedy)
     return str(dataset.asstr()[()])
 
 
@@ -306,16 +301,14 @@ def refuse_bad_dataset(dataset: Any, where: str) -> None:
     import h5py
 
     if not isinstance(dataset, h5py.Dataset):
-        remedy = "a signal is one data set"
-        raise InputRejected("S19", "not a data set", where=where, remedy=remedy)
+        raise InputRejected("S19", "not a data set", where, "a signal is one data set")
     if foreign := _foreign(dataset):
         code, remedy = "X02" if "raw" in foreign else "X03", "store the data in the log itself"
-        raise InputRejected(code, f"{foreign} refused", where=where, remedy=remedy)
+        raise InputRejected(code, f"{foreign} refused", where, remedy)
     kind = dataset.dtype
     if kind.kind not in "fiu" or kind.itemsize > np.dtype(float).itemsize or dataset.ndim < 1:
         words = f"type {kind} of shape {dataset.shape}, not real numbers over samples"
-        remedy = "store float64 of shape (samples, joints)"
-        raise InputRejected("S12", words, where=where, remedy=remedy)
+        raise InputRejected("S12", words, where, "store float64 of shape (samples, joints)")
     properties = dataset.id.get_create_plist()
     for index in range(properties.get_nfilters()):
         code, _, _, name = properties.get_filter(index)
@@ -323,7 +316,7 @@ def refuse_bad_dataset(dataset: Any, where: str) -> None:
             label = name.decode("utf-8", "replace") if name else "unnamed"
             words = f"needs the HDF5 filter {code} ({label}), which is not installed"
             remedy = "install its plug-in (pip install hdf5plugin covers most), or write with gzip"
-            raise InputRejected("F10", words, where=where, remedy=remedy)
+            raise InputRejected("F10", words, where, remedy)
 
 
 def refuse_oversize(declared: int, size: int, code: str, where: object) -> None:
@@ -332,7 +325,7 @@ def refuse_oversize(declared: int, size: int, code: str, where: object) -> None:
     if declared > min(usual, max(LIMITS.long, LIMITS.long_packing * size)):
         words = f"declares {declared / 1e6:.0f} MB in a file of {size / 1e6:.3f} MB"
         remedy = "this is not a recording; if it is, store it uncompressed"
-        raise InputRejected(code, words, where=where, remedy=remedy)
+        raise InputRejected(code, words, where, remedy)
 
 
 def _reals(dataset: Any, where: str) -> Array:
@@ -343,11 +336,11 @@ def _reals(dataset: Any, where: str) -> Array:
         code, words = "F02", f"the data cannot be read: {problem}"
         if "filter" in str(problem) or "etcher" in str(problem):
             code, words = "F04", "checksum mismatch, the data are damaged"
-        raise InputRejected(code, words, where=where, remedy=_AGAIN) from None
+        raise InputRejected(code, words, where, _AGAIN) from None
     whole = stored.dtype.kind in "iu" and stored.size
     if whole and max(abs(int(stored.max())), abs(int(stored.min()))) > LIMITS.integer:
         words, remedy = "integers beyond 2^53, which are no samples", "store float64"
-        raise InputRejected("S12", words, where=where, remedy=remedy)
+        raise InputRejected("S12", words, where, remedy)
     return np.asarray(stored, dtype=np.float64)
 
 
@@ -363,4 +356,4 @@ def explain(problem: BaseException, path: Path) -> InputRejected:
     elif isinstance(problem, MemoryError):
         code, words = "X05", "needs more memory than a log may"
         remedy = "split the recording"
-    return InputRejected(code, words, where=path, remedy=remedy)
+    return InputRejected(code, words, path, remedy)

@@ -240,24 +240,22 @@ def assembled(parts: Answer, where: str) -> ExperimentLog:
     values = schema.checked("attributes", groups.pop("attributes"), where)
     robot = groups.pop("robot", None)
     if not isinstance(robot, str):
-        remedy = "a log explains itself: write /robot"
         words = "the robot description is missing"
-        raise InputRejected("S01", words, where=where, remedy=remedy)
+        raise InputRejected("S01", words, where, "a log explains itself: write /robot")
     for name, kind in (("controller", Controller), ("derived", Derived)):
         if name in groups:
             found = schema.checked(name, groups.pop(name), f"{where}, {name}")
             values[name] = kind(**found)
     if groups:
         words = f"{sorted(groups)} are not in format version {schema.FORMAT_VERSION}"
-        raise InputRejected("S19", words, where=where, remedy="remove them")
+        raise InputRejected("S19", words, where, "remove them")
     signals = {}
     for name, samples in parts.arrays.items():
         words_of = dict(parts.about["signals"][name])
         units, long_name = str(words_of.pop("units", "")), str(words_of.pop("long_name", ""))
         if words_of:
             words = f"attributes {sorted(words_of)} are not in the format"
-            place = f"{where}, signal {name}"
-            raise InputRejected("S19", words, where=place, remedy="remove them")
+            raise InputRejected("S19", words, f"{where}, signal {name}", "remove them")
         signals[name] = Signal(samples, units, long_name)
     return ExperimentLog(**values, robot_text=robot, signals=signals, source=where)
 
@@ -350,7 +348,7 @@ def with_robot(log: ExperimentLog, robot: RobotDescription) -> ExperimentLog:
     if columns not in (0, robot.n_joints):
         words = f"log has {columns} joints, model {robot.n_joints}"
         remedy = "give the description of this robot, or choose the columns with --joints"
-        raise InputRejected("S02", words, where=log.source or log.name, remedy=remedy)
+        raise InputRejected("S02", words, log.source or log.name, remedy)
     return replace(log, robot_text=format_robot(robot))
 
 
@@ -372,17 +370,14 @@ def select_joints(
         words = f"'{','.join(map(str, joints))}' names a joint twice"
         if absent:
             words = f"a log with {columns} joints has no joint {' or '.join(absent)}"
-        remedy = "give each of --joints once, counted from 1"
-        raise UsageError("C02", words, where=where, remedy=remedy)
+        raise UsageError("C02", words, where, "give each of --joints once, counted from 1")
     if robot is None and log.n_joints != len(joints):
         words = f"{len(joints)} joint{' is' if len(joints) == 1 else 's are'} chosen"
         words = f"{words}, but the log describes a robot of {log.n_joints}"
-        remedy = "describe the arm that is left with --robot"
-        raise UsageError("C02", words, where=where, remedy=remedy)
+        raise UsageError("C02", words, where, "describe the arm that is left with --robot")
     if log.joint is not None and log.joint not in joints:
         words = f"the log moves joint {log.joint}, which --joints leaves out"
-        remedy = "choose it too, or leave this log out"
-        raise InputRejected("S02", words, where=where, remedy=remedy)
+        raise InputRejected("S02", words, where, "choose it too, or leave this log out")
     chosen = np.array(joints) - 1
     samples = log.t.size if "t" in log else -1
 

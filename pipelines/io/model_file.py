@@ -155,7 +155,7 @@ def read_model(source: str | Path) -> ModelFile:
 
 def _wrong(words: str, where: object) -> InputRejected:
     remedy = "write the model again, or correct it by the schema: rrrid schema model"
-    return InputRejected("S18", f"not a model file: {words}", where=where, remedy=remedy)
+    return InputRejected("S18", f"not a model file: {words}", where, remedy)
 
 
 def parse_model(text: str, where: object = "") -> ModelFile:
@@ -185,7 +185,7 @@ def parse_model(text: str, where: object = "") -> ModelFile:
     if type(version) is int and version > FORMAT_VERSION:
         words = f"the model file has format version {version}"
         words = f"{words}; this program understands up to {FORMAT_VERSION}"
-        raise InputRejected("F11", words, where=where, remedy="update rrrid")
+        raise InputRejected("F11", words, where, "update rrrid")
     if type(version) is not int or version != FORMAT_VERSION:
         raise _wrong(f'its "format_version" is {version}, not {FORMAT_VERSION}', where)
     try:
@@ -272,4 +272,4 @@ def read_covariance(path: Path) -> tuple[tuple[str, ...], Array]:
         words = "not the covariance of a model's parameters"
         remedy = "run estimate-bps again, or take the file away"
         words = f"{words}: {type(problem).__name__}: {problem}"
-        raise InputRejected("S18", words, where=path, remedy=remedy) from None
+        raise InputRejected("S18", words, path, remedy) from None

@@ -53,17 +53,17 @@ def fault_of(problem: OSError, path: Path) -> RrridError:
     draft = named and os.path.basename(os.fsdecode(named)).startswith(_MARK)
     where = named if named and not draft else path
     if problem.errno in (errno.ENAMETOOLONG, errno.ELOOP):
-        return UsageError("C07", "not a path of this system", where=where, remedy="check the path")
+        return UsageError("C07", "not a path of this system", where, "check the path")
     if problem.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
         remedy = "choose another --out, or change its permissions"
-        return EnvironmentFault("F13", "permission denied", where=where, remedy=remedy)
+        return EnvironmentFault("F13", "permission denied", where, remedy)
     words, remedy = "cannot be read or written: ", "check the disk and the path"
     words += os.strerror(problem.errno) if problem.errno else str(problem)
     if problem.errno == errno.EFBIG:
         words, remedy = "larger than this process may write", "raise its limit (ulimit -f)"
     if problem.errno in (errno.ENOSPC, errno.EDQUOT):
         words, remedy = "no space left on the disk", "free space and run again"
-    return EnvironmentFault("P02", words, where=where, remedy=remedy)
+    return EnvironmentFault("P02", words, where, remedy)
 
 
 def hash_file(path: Path) -> str:
@@ -220,11 +220,10 @@ def keep_apart(out: Path, sources: Iterable[Path], folders: Iterable[Path]) -> N
         linked = Path(os.path.abspath(source)).is_relative_to(os.path.abspath(out))
         if linked or source.resolve().is_relative_to(target):
             words = f"holds the input {source}, and would be replaced with it"
-            raise UsageError("C05", words, where=out, remedy=_ELSEWHERE)
+            raise UsageError("C05", words, out, _ELSEWHERE)
     for folder in folders:
         if os.path.isdir(folder) and target.is_relative_to(folder.resolve()):
-            words = f"lies inside the input {folder}"
-            raise UsageError("C05", words, where=out, remedy=_ELSEWHERE)
+            raise UsageError("C05", f"lies inside the input {folder}", out, _ELSEWHERE)
 
 
 def refuse_own_place(out: Path) -> None:
@@ -235,8 +234,7 @@ def refuse_own_place(out: Path) -> None:
         return
     if here.is_relative_to(out.resolve()):
         words = "is the folder you are in, or around it, and would be replaced under you"
-        remedy = f"{_ELSEWHERE}, or call from outside of it (cd)"
-        raise UsageError("C05", words, where=out, remedy=remedy)
+        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or call from outside of it (cd)")
 
 
 def refuse_foreign(
@@ -256,7 +254,7 @@ def refuse_foreign(
         The names of the files that are made again.
     """
     if out.is_symlink() or (out.exists() and not out.is_dir()):
-        raise UsageError("C05", "is not a folder", where=out, remedy=_ELSEWHERE)
+        raise UsageError("C05", "is not a folder", out, _ELSEWHERE)
     refuse_own_place(out)
     if not out.exists() or not any(out.iterdir()):
         return ()
@@ -269,18 +267,16 @@ def refuse_foreign(
     foreign = list(islice((name for name in _members(out) if name not in known), 3))
     if foreign:
         words = f"holds files that rrrid did not write there: {', '.join(foreign)}"
-        raise UsageError("C05", words, where=out, remedy=f"{_ELSEWHERE}, or move them")
+        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or move them")
     if command and about.get("command") != command:
         words = f"holds the earlier result of {clean(about.get('command'), 40)}"
-        remedy = f"{_ELSEWHERE}, or replace it with --force"
-        raise UsageError("C05", words, where=out, remedy=remedy)
+        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or replace it with --force")
     edited = [
         name for name in _members(out) if name in ours and hash_file(out / name) != ours[name]
     ]
     if kept := [name for name in edited if not remade(name)]:
         words = f"holds files that were changed since rrrid wrote them: {', '.join(kept[:3])}"
-        remedy = f"{_ELSEWHERE}, or replace them with --force"
-        raise UsageError("C05", words, where=out, remedy=remedy)
+        raise UsageError("C05", words, out, f"{_ELSEWHERE}, or replace them with --force")
     return tuple(edited)
 
 
@@ -288,11 +284,10 @@ def refuse_unwritable(out: Path) -> None:
     """Refuse an `out` that cannot be made where it should be (F13, C05)."""
     above = next(path for path in out.absolute().parents if path.exists())
     if not above.is_dir():
-        words = f"lies below {above}, which is not a folder"
-        raise UsageError("C05", words, where=out, remedy=_ELSEWHERE)
+        raise UsageError("C05", f"lies below {above}, which is not a folder", out, _ELSEWHERE)
     if not os.access(above, os.W_OK | os.X_OK):
         remedy = "choose another --out, or change its permissions"
-        raise EnvironmentFault("F13", "permission denied", where=above, remedy=remedy)
+        raise EnvironmentFault("F13", "permission denied", above, remedy)
 
 
 def _members(folder: Path, above: str = "") -> Iterator[str]:

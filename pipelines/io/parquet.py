@@ -99,8 +99,7 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
     except (OSError, pa.ArrowException, ValueError, KeyError, UnicodeError, MemoryError) as problem:
         raise _explain(problem, path) from None
     if table.num_rows != rows or any(column.null_count for column in table.columns):
-        words = "rows are missing inside the table"
-        raise InputRejected("F04", words, where=where, remedy=_AGAIN)
+        raise InputRejected("F04", "rows are missing inside the table", where, _AGAIN)
     keys = ("controller", "derived", "robot")
     groups: dict[str, Any] = {key: about.pop(key) for key in keys if key in about}
     digest = about.pop("digest", None)
@@ -118,8 +117,7 @@ def _about(schema: Any, where: str) -> dict[str, Any]:
     try:
         about = json.loads((schema.metadata or {}).get(_KEY, b"{}"))
     except (ValueError, RecursionError):
-        words = "the attributes are damaged"
-        raise InputRejected("F04", words, where=where, remedy=_AGAIN) from None
+        raise InputRejected("F04", "the attributes are damaged", where, _AGAIN) from None
     if not isinstance(about, dict):
         about = {}
     refuse_version(about, "Parquet", where)
@@ -135,20 +133,20 @@ def _signal_columns(schema: Any, where: str) -> dict[str, list[str]]:
         match = _COLUMN.fullmatch(field.name)
         if match is None:
             words = f"column '{field.name}' is not in format version {FORMAT_VERSION}"
-            raise InputRejected("S19", words, where=where, remedy="rename or remove it")
+            raise InputRejected("S19", words, where, "rename or remove it")
         if not (types.is_floating(field.type) or types.is_integer(field.type)):
             words, place = f"type {field.type}, not real numbers", f"{where}, column {field.name}"
-            raise InputRejected("S12", words, where=place, remedy="store double")
+            raise InputRejected("S12", words, place, "store double")
         own, joint = found.setdefault(match["signal"], {}), int(match["joint"] or 0)
         if joint in own:
             words = f"two columns are called '{field.name}'"
-            raise InputRejected("S03", words, where=where, remedy="rename one")
+            raise InputRejected("S03", words, where, "rename one")
         own[joint] = field.name
     for signal, own in found.items():
         if sorted(own) != ([0] if signal == "t" else list(range(1, len(own) + 1))):
             words = f"columns of {signal} are {', '.join(own.values())}"
             remedy = f"number the joints from 1: {signal}_1, {signal}_2, …"
-            raise InputRejected("S02", words, where=where, remedy=remedy)
+            raise InputRejected("S02", words, where, remedy)
     return {signal: [own[joint] for joint in sorted(own)] for signal, own in found.items()}
 
 
@@ -157,7 +155,7 @@ def _words(schema: Any, columns: list[str], where: str) -> dict[str, str]:
     every = [schema.field(column).metadata or {} for column in columns]
     if any(words != every[0] for words in every):
         words = f"columns {', '.join(columns)} differ in units or long_name"
-        raise InputRejected("S20", words, where=where, remedy="give one signal one unit")
+        raise InputRejected("S20", words, where, "give one signal one unit")
     decoded = {
         k.decode("utf-8", "replace"): v.decode("utf-8", "replace") for k, v in every[0].items()
     }
@@ -188,7 +186,7 @@ def _explain(problem: BaseException, path: Path) -> InputRejected:
         words = "checksum mismatch in a page, the data are damaged"
     elif "magic bytes" in text.lower() or "footer" in text.lower():
         code, words = "F07", "truncated: no footer"
-    return InputRejected(code, words, where=path, remedy=_AGAIN)
+    return InputRejected(code, words, path, _AGAIN)
 
 
 def csv_cell(text: str) -> str:

@@ -166,26 +166,25 @@ def read_result(path: Path) -> StoredResult:
     file = path / "result.json" if path.is_dir() else path
     if path.is_dir() and not file.is_file():
         remedy = "name the folder that a command has left with --out"
-        raise UsageError("C04", "no result.json there", where=path, remedy=remedy)
+        raise UsageError("C04", "no result.json there", path, remedy)
     regular_file(file, what="a result.json, or the folder it is in")
     if listed_outputs(file.parent).get(file.name) not in (None, hash_file(file)):
         words = "sha256 differs from provenance.json: it was changed since it was written"
-        raise InputRejected("F05", words, where=file, remedy=_AGAIN)
+        raise InputRejected("F05", words, file, _AGAIN)
     try:
         text = read_small_text(file, LIMITS.result, what="a result.json")
         found = json.loads(text, parse_int=_whole_number)
     except (ValueError, RecursionError):
         words = "not complete JSON, or with numbers that no float holds"
-        raise InputRejected("F02", words, where=file, remedy=_AGAIN) from None
+        raise InputRejected("F02", words, file, _AGAIN) from None
     if isinstance(found, dict) and found.get("format") == "rrrid-model":
         return StoredResult(file, "model", found)
     if not isinstance(found, dict) or not isinstance(found.get("command"), str):
         remedy = "name a result.json, or the folder it is in"
-        raise InputRejected("S19", "not a result of rrrid", where=file, remedy=remedy)
+        raise InputRejected("S19", "not a result of rrrid", file, remedy)
     version = found.get("schema_version", 1)
     if not isinstance(version, int) or version < SCHEMA_VERSION:
-        words = "written by an earlier rrrid"
-        raise InputRejected("F17", words, where=file, remedy=_AGAIN)
+        raise InputRejected("F17", "written by an earlier rrrid", file, _AGAIN)
     return StoredResult(file, found["command"], found)
 
 
@@ -211,7 +210,7 @@ def read_any_result(path: Path) -> StoredResult:
         if stage["name"] == path.name:
             if stage["result"] is None:
                 words = f"the run has no result of {path.name}: it was passed over, or refused"
-                raise UsageError("C04", words, where=path, remedy="its report says why")
+                raise UsageError("C04", words, path, "its report says why")
             found = {"command": path.name, **stage["result"]}
             return StoredResult(path.parent / "result.json", path.name, found, path.name)
     return read_result(path)

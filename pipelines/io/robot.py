@@ -162,15 +162,12 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
         _refuse_impossible(found)
     except TomlError as problem:
         words = f"the robot description is not valid TOML: {problem}"
-        remedy = "correct it at that place"
-        raise fail("C01", words, where=where, remedy=remedy) from None
+        raise fail("C01", words, where, "correct it at that place") from None
     except ValidationError as problem:
         code, words = _fault_in_words(problem.errors(include_url=False)[0])
-        words = f"robot description, {words}"
-        raise fail(code, words, where=where, remedy=_CORRECT) from None
+        raise fail(code, f"robot description, {words}", where, _CORRECT) from None
     except _Wrong as wrong:
-        words, remedy = f"robot description, {wrong.words}", wrong.remedy
-        raise fail("C02", words, where=where, remedy=remedy) from None
+        raise fail("C02", f"robot description, {wrong.words}", where, wrong.remedy) from None
     own = found.kinematics
     urdf_text = own.urdf_text if own.convention == "urdf" else None
     return RobotDescription(
@@ -351,5 +348,4 @@ def shipped(kind: str, name: str) -> Path:
         if name in known and path.is_file():
             return path
     words = f"no such file, and no shipped {kind[:-1]} of that name{did_you_mean(name, known)}"
-    remedy = f"shipped {kind}: {', '.join(known) or 'none'}"
-    raise UsageError("C04", words, where=name, remedy=remedy)
+    raise UsageError("C04", words, name, f"shipped {kind}: {', '.join(known) or 'none'}")

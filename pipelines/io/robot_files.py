@@ -38,8 +38,7 @@ def load_robot(source: str | Path, tip_link: str | None = None) -> RobotDescript
         return _from_urdf(path, tip)
     if tip:
         words = "the link at which the arm ends is given for a URDF, and this is a description"
-        remedy = f'write tip_link = "{tip}" under [kinematics] in it'
-        raise UsageError("C02", words, where=source, remedy=remedy)
+        raise UsageError("C02", words, source, f'write tip_link = "{tip}" under [kinematics] in it')
     table = _table_of(text)
     _refuse_recipe(table, path)
     if _urdf_in(table) is not None:
@@ -79,7 +78,7 @@ def _split_file(path: Path) -> tuple[Path, str | None]:
 def _file_and_tip(source: str | Path) -> tuple[Path, str | None]:
     if not str(source):
         remedy = "name a description, a URDF, or a shipped robot"
-        raise UsageError("C02", "empty", where="--robot", remedy=remedy)
+        raise UsageError("C02", "empty", "--robot", remedy)
     path, tip = _split_file(Path(source))
     if os.path.lexists(path) and not os.path.isdir(path):
         return path, tip
@@ -89,7 +88,7 @@ def _file_and_tip(source: str | Path) -> tuple[Path, str | None]:
         if not os.path.isdir(path):
             raise
         words = "a folder, not the description of a robot"
-        raise UsageError("C04", words, where=source, remedy=problem.remedy) from None
+        raise UsageError("C04", words, source, problem.remedy) from None
 
 
 def _table_of(text: str) -> dict[str, Any]:
@@ -112,7 +111,7 @@ def _refuse_recipe(table: dict[str, Any], path: Path) -> None:
         tip = robot.get("tip_link")
         remedy = f"give the robot that it names: {f'{use}:{tip}' if tip else use}"
     words = "this is a recipe of rrrid import, not a robot description"
-    raise UsageError("C02", words, where=path, remedy=remedy)
+    raise UsageError("C02", words, path, remedy)
 
 
 def _impossible_links(robot: RobotDescription, path: Path) -> tuple[Check, ...]:
@@ -123,7 +122,7 @@ def _impossible_links(robot: RobotDescription, path: Path) -> tuple[Check, ...]:
         if words:
             words = f"no rigid body has the inertial parameters of joint '{joint.name}': {words}"
             remedy = "correct its link: what is known of the links is used"
-            checks.append(Check.of("S20", "warn", words, where=path, remedy=remedy))
+            checks.append(Check.of("S20", "warn", words, path, remedy))
     return tuple(checks)
 
 
@@ -148,7 +147,7 @@ def _with_urdf(table: dict[str, Any], path: Path) -> RobotDescription:
     if described.n_joints != arm.n_joints:
         words = f"{described.n_joints} [[joint]] tables, but the URDF has {arm.n_joints}"
         remedy = "describe each moving joint once, or none"
-        raise UsageError("S02", f"{words} moving joints", where=path, remedy=remedy)
+        raise UsageError("S02", f"{words} moving joints", path, remedy)
     joints = []
     for mine, urdf in zip(described.joints, arm.joints, strict=True):
         plain = Joint(mine.name)

@@ -77,21 +77,17 @@ def regular_file(
     try:
         status = path.stat()
     except FileNotFoundError:
-        raise UsageError("C04", "no such file", where=path, remedy="check the path") from None
+        raise UsageError("C04", "no such file", path, "check the path") from None
     except ValueError:
-        words = "not a path of this system"
-        raise UsageError("C07", words, where=path, remedy="check the path") from None
+        raise UsageError("C07", "not a path of this system", path, "check the path") from None
     except OSError as problem:
         raise fault_of(problem, path) from None
     if not stat.S_ISREG(status.st_mode):
-        raise InputRejected("F12", "not a regular file", where=path, remedy=f"give {what}")
+        raise InputRejected("F12", "not a regular file", path, f"give {what}")
     if not os.access(path, os.R_OK):
-        remedy = "change its permissions"
-        raise EnvironmentFault("F13", "permission denied", where=path, remedy=remedy)
+        raise EnvironmentFault("F13", "permission denied", path, "change its permissions")
     if status.st_size == 0 and not empty:
-        raise InputRejected(
-            "F01", "empty file", where=path, remedy="copy it again, or record again"
-        )
+        raise InputRejected("F01", "empty file", path, "copy it again, or record again")
     return status
 
 
@@ -111,13 +107,12 @@ def read_small_text(path: Path, limit: int = TEXT.size, *, what: str = "a TOML f
         raise fault_of(problem, path) from None
     if len(data) > limit:
         words = f"longer than the {limit} bytes that such a text may have"
-        raise UsageError("C02", words, where=path, remedy=f"give {what}")
+        raise UsageError("C02", words, path, f"give {what}")
     try:
         return data.decode("utf-8").replace("\r\n", "\n")
     except UnicodeDecodeError as problem:
         words = f"not a text in UTF-8: byte {problem.start} is {data[problem.start]:#04x}"
-        remedy = f"give {what}, saved as UTF-8"
-        raise UsageError("C02", words, where=path, remedy=remedy) from None
+        raise UsageError("C02", words, path, f"give {what}, saved as UTF-8") from None
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -193,7 +188,7 @@ def guarded(
         crashed = _reaped(child, kill=not ended)
     if ended and crashed:
         reason = f"the reading library crashed on it (signal {crashed})"
-    raise InputRejected("F03", f"{reason}, the file is damaged", where=path, remedy=_AGAIN)
+    raise InputRejected("F03", f"{reason}, the file is damaged", path, _AGAIN)
 
 
 def _fork(
@@ -298,7 +293,7 @@ def _received(
     except OSError:
         words = f"its description is longer than {longest / 1e6:.0f} MB"
         remedy = "keep samples in signals, and texts short"
-        raise InputRejected("X05", words, where=path, remedy=remedy) from None
+        raise InputRejected("X05", words, path, remedy) from None
     reply = json.loads(text)
     if "internal" in reply:
         raise RuntimeError(f"reading {path}: {reply['internal']}")
@@ -333,7 +328,7 @@ def _error(error: Mapping[str, Any], path: Path) -> RrridError:
     kinds = {kind.exit_code: kind for kind in (UsageError, InputRejected, EnvironmentFault)}
     kind, code = kinds.get(error["exit"], InputRejected), error["code"].removeprefix("RRID-")
     where = error["where"] or path
-    return kind(code, error["message"], where=where, remedy=error["remedy"])
+    return kind(code, error["message"], where, error["remedy"])
 
 
 def _reaped(child: int, *, kill: bool) -> int:

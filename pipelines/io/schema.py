@@ -225,8 +225,7 @@ def checked(group: str, found: object, where: str) -> dict[str, Any]:
 
     if not isinstance(found, Mapping):
         words = "the attributes are missing"
-        remedy = "write them, or import the recording again"
-        raise InputRejected("S01", words, where=where, remedy=remedy)
+        raise InputRejected("S01", words, where, "write them, or import the recording again")
     table = plain(found)
     for name in ("joint", "delay"):  # programs that know only doubles (MATLAB) write 2.0
         if isinstance(table.get(name), float) and table[name].is_integer():
@@ -243,7 +242,7 @@ def checked(group: str, found: object, where: str) -> dict[str, Any]:
         raise _first_fault(faults, GROUPS[group], where) from None
     except (ValueError, RecursionError):
         words = "attribute 'settings' is not a JSON text"
-        raise InputRejected("S20", words, where=where, remedy="correct it") from None
+        raise InputRejected("S20", words, where, "correct it") from None
     names = (field.name for field in dataclasses.fields(values))
     return {name: value for name in names if (value := getattr(values, name)) is not None}
 
@@ -256,10 +255,10 @@ def _first_fault(faults: list[ErrorDetails], kind: type[Any], where: str) -> Inp
     if fault["type"] == "unexpected_keyword_argument":
         words = f"attribute '{name}' is not in format version {FORMAT_VERSION}"
         hint = did_you_mean(name, fields)
-        return InputRejected("S19", f"{words}{hint}", where=where, remedy="rename or remove it")
+        return InputRejected("S19", f"{words}{hint}", where, "rename or remove it")
     if fault["type"] in order:
         remedy = "write it, or import the recording again"
-        return InputRejected("S01", f"attribute '{name}' is missing", where=where, remedy=remedy)
+        return InputRejected("S01", f"attribute '{name}' is missing", where, remedy)
     wanted = fields[name].metadata["description"]
     if fault["type"] == "literal_error":
         expected = str(fault["ctx"]["expected"]).replace("'", "").replace(" or ", ", ")
@@ -268,8 +267,7 @@ def _first_fault(faults: list[ErrorDetails], kind: type[Any], where: str) -> Inp
         value = repr(fault["input"])[:60]
     except ValueError:
         value = "a number of thousands of digits"
-    words = f"attribute '{name}' is {value}, not {wanted}"
-    return InputRejected("S20", words, where=where, remedy="correct it")
+    return InputRejected("S20", f"attribute '{name}' is {value}, not {wanted}", where, "correct it")
 
 
 def quantity_of(name: str, law: str | None = None) -> str:

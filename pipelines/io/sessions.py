@@ -123,8 +123,7 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     by_role = _by_role(request.roles)
     asked = tuple(dict.fromkeys((*request.paths, *(p for own in by_role.values() for p in own))))
     if not asked:
-        remedy = "name logs, or folders of logs"
-        raise UsageError("C02", "no logs", where="LOGS", remedy=remedy)
+        raise UsageError("C02", "no logs", "LOGS", "name logs, or folders of logs")
     paths, checks = find_logs(asked)
     robot = load_robot(request.robot) if request.robot is not None else None
     logs: list[Opened] = []
@@ -162,8 +161,7 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     if session is None:
         known = [one.name for one in found]
         words = f"no session '{request.session}'{did_you_mean(request.session, known)}"
-        remedy = f"there are: {', '.join(known)}"
-        raise UsageError("C01", words, where="--session", remedy=remedy)
+        raise UsageError("C01", words, "--session", f"there are: {', '.join(known)}")
     return only(inputs, session)
 
 
@@ -186,8 +184,7 @@ def _roles_of(by_role: Mapping[str, tuple[Path, ...]]) -> dict[Path, str]:
         for file in find_logs(given)[0]:
             if roles.setdefault(file, role) != role:
                 words = f"{file.name} is named for {roles[file]} and for {role}"
-                remedy = "name it for one of them"
-                raise UsageError("C02", words, where=f"--{role}", remedy=remedy)
+                raise UsageError("C02", words, f"--{role}", "name it for one of them")
     return roles
 
 
@@ -210,7 +207,7 @@ def _all_of(rejected: list[Rejected]) -> RrridError:
     named = _first_of([f"{r.path.name} ({r.error.code})" for r in others])
     words = f"{clean(first.message, 160)}; {len(others)} more cannot be used: {named}"
     code, where = first.code.removeprefix("RRID-"), first.where or rejected[0].path
-    return InputRejected(code, words, where=where, remedy=first.remedy)
+    return InputRejected(code, words, where, first.remedy)
 
 
 def _label(first: Path) -> str:
@@ -387,7 +384,7 @@ def of_one_session(inputs: Inputs) -> Inputs:
             "name logs of one robot alone for --identify, --validate and --reference; if it is one "
             "robot, described twice, give --robot FILE"
         )
-        raise UsageError("C02", words, where=inputs.label, remedy=remedy)
+        raise UsageError("C02", words, inputs.label, remedy)
     remedy = f"take one with --session '{several[0].name}', or all with "
     remedy += "'rrrid batch FOLDER [--stage COMMAND]'"
     if days:
@@ -460,7 +457,7 @@ def check_alike(inputs: Inputs) -> tuple[Check, ...]:
                 "if they are of two machines or sessions, give each folder by itself, or let "
                 "their logs say so: robot_name, recorded"
             )
-            found.append(Check.of("S21", "warn", words, where=where, remedy=remedy))
+            found.append(Check.of("S21", "warn", words, where, remedy))
         days: dict[bool, set[str]] = {True: set(), False: set()}
         for opened in logs:
             if opened.log.recorded:
@@ -469,5 +466,5 @@ def check_alike(inputs: Inputs) -> tuple[Check, ...]:
         if days[False] and alone:
             words = f"its logs of {max(alone)}, which all judge, were taken with it"
             remedy = "if that is another session, name its logs by --validate"
-            found.append(Check.of("S21", "warn", words, where=where, remedy=remedy))
+            found.append(Check.of("S21", "warn", words, where, remedy))
     return tuple(found)

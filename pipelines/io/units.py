@@ -207,12 +207,11 @@ def to_si(unit: str, quantity: str, *, where: object = "") -> Unit:
     found = UNITS.get(name)
     if share := of_rated(str(unit), quantity):
         words, remedy = f"'{unit}' is a share of what the drive is rated for", f"declare {share}"
-        raise InputRejected("S05", words, where=where, remedy=remedy)
+        raise InputRejected("S05", words, where, remedy)
     if found is None or found.quantity != quantity:
         words = f"unknown unit '{unit}'{did_you_mean(name, UNITS)}"
         if found is not None:
             words = f"'{unit}' is a unit of {found.quantity}"
         words = f"{words}; {quantity} needs one of {', '.join(accepted)}"
-        remedy = "declare the unit the numbers are in"
-        raise InputRejected("S05", words, where=where, remedy=remedy)
+        raise InputRejected("S05", words, where, "declare the unit the numbers are in")
     return found

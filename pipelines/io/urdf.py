@@ -91,7 +91,7 @@ class _Source:
 
     def wrong(self, words: str, remedy: str = "", code: str = "S17") -> RrridError:
         remedy = remedy or "correct the URDF there, or export it again"
-        return self.kind(code, f"URDF: {words}", where=self.where, remedy=remedy)
+        return self.kind(code, f"URDF: {words}", self.where, remedy)
 
     def xacro(self) -> RrridError:
         words = "this is a xacro macro file, which rrrid does not run"
@@ -522,7 +522,7 @@ def _impossible_links(tree: _Tree) -> tuple[Check, ...]:
         if words := inconsistency(mass, _tensor(element, place, tree.source)):
             words = f"no rigid body has the inertial parameters of {place}: {words}"
             remedy = "correct them in the URDF: what is known of its links is used"
-            found.append(Check.of("S17", "warn", words, where=tree.source.where, remedy=remedy))
+            found.append(Check.of("S17", "warn", words, tree.source.where, remedy))
     return tuple(found)
 
 
