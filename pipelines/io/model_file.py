@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -24,10 +23,10 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, did_you_mean
 from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.output import write_text
-from pipelines.io.results import json_text
+from pipelines.io.results import encode, json_text
 from pipelines.io.robot import shipped
 from pipelines.io.sandbox import read_small_text, regular_file
-from pipelines.io.schema import DRAFT, adapter, described
+from pipelines.io.schema import DRAFT, Strict, adapter, described
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -36,7 +35,6 @@ Array = npt.NDArray[np.float64]
 
 FORMAT = "rrrid-model"
 FORMAT_VERSION = 1  # numerics
-_STRICT: dict[str, object] = {"extra": "forbid", "strict": True, "allow_inf_nan": False}
 
 Origin = Literal["fitted", "known", "assumed"]
 # one [low, high] a joint, null where the logs do not say
@@ -44,10 +42,8 @@ Ranges = tuple[tuple[float, float] | None, ...]
 
 
 @dataclass(frozen=True)
-class StoredValue:
+class StoredValue(Strict):
     """A number of an effect."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
     value: float = described("the number, in its unit")
     std: float | None = described("one standard deviation; null where unknown")
@@ -56,10 +52,8 @@ class StoredValue:
 
 
 @dataclass(frozen=True)
-class StoredParameter:
+class StoredParameter(Strict):
     """A base parameter."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
     name: str = described("name, as logs and reports have it")
     value: float = described("the number, in its unit")
@@ -71,10 +65,8 @@ class StoredParameter:
 
 
 @dataclass(frozen=True)
-class StoredEffect:
+class StoredEffect(Strict):
     """A friction law or a further effect at its place."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
     effect: str = described("identifier of causes.md")
     joint: int | None = described("number of the joint, from 1; null: the whole arm")
@@ -82,10 +74,8 @@ class StoredEffect:
 
 
 @dataclass(frozen=True)
-class Validity:
+class Validity(Strict):
     """The range of the logs behind the model: beyond it, the model extrapolates."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
     speed: Ranges | None = described("[rad/s] lowest and highest of each joint", None)
     acceleration: Ranges | None = described("[rad/s^2] the same", None)
@@ -94,10 +84,8 @@ class Validity:
 
 
 @dataclass(frozen=True)
-class Source:
+class Source(Strict):
     """A log behind the model."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
     name: str = described("name of the log")
     sha256: str = described("SHA-256 of the file's bytes, hexadecimal")
@@ -106,10 +94,8 @@ class Source:
 
 
 @dataclass(frozen=True)
-class ModelFile:
+class ModelFile(Strict):
     """A model. Numbers are SI; a prismatic joint has m and N instead of rad and N m."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = _STRICT
 
     name: str = described("name of the model")
     robot: str = described("the robot description, TOML text")
@@ -229,7 +215,7 @@ def _fault_in_words(fault: ErrorDetails) -> str:
 
 def model_text(model: ModelFile) -> str:
     """Return the canonical JSON text: sorted keys, exact floats, null for what is not finite."""
-    table = _plain(model)
+    table = encode(model)[0]
     return json.dumps(table, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
@@ -238,21 +224,9 @@ def write_model(path: Path, model: ModelFile) -> None:
     write_text(path, model_text(model))
 
 
-def _plain(value: object) -> object:
-    if is_dataclass(value):
-        return {one.name: _plain(getattr(value, one.name)) for one in fields(value)}
-    if isinstance(value, Mapping):
-        return {str(key): _plain(member) for key, member in value.items()}
-    if isinstance(value, tuple | list):
-        return [_plain(member) for member in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value
-
-
 def write_covariance(path: Path, names: Sequence[str], covariance: Array) -> None:
     """Write the covariance (k, k) of the numbers `names` of a model, atomically."""
-    table = {"names": list(names), "covariance": _plain(covariance.tolist())}
+    table = {"names": list(names), "covariance": encode(covariance.tolist())[0]}
     write_text(path, json_text(table))
 
 

@@ -21,7 +21,7 @@ import numpy.typing as npt
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
 from pipelines.io.config import URDF
 from pipelines.io.sandbox import TomlError, parse_toml
-from pipelines.io.schema import STRICT, adapter, described
+from pipelines.io.schema import Strict, adapter, described
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
@@ -41,14 +41,12 @@ _ENDINGS = {"robots": ".toml", "recipes": ".toml", "models": ".json"}
 
 
 @dataclass(frozen=True)
-class LinkParameters:
+class LinkParameters(Strict):
     """Known parameters of one link, in its own frame (DH: the distal one; MDH, URDF: the joint's).
 
     `inertia` holds Ixx Iyy Izz Ixy Ixz Iyz about the frame's *origin*, products with positive
     sign, Ixy = +∫xy dm: the convention of Kostić et al. 2004, eq. (7).
     """
-
-    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
     mass: float = described("[kg]", ge=0.0)
     com: Vector = described("[m] centre of mass")
@@ -81,13 +79,11 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Drive:
+class Drive(Strict):
     """The motor side, kept for effects that live there; never applied on reading.
 
     q_motor = N q_joint, tau_joint = Nᵀ tau_motor with N = `transmission`.
     """
-
-    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
     transmission: tuple[tuple[float, ...], ...] | None = described("(n, n)", None)
     torque_constant: tuple[float, ...] | None = described("(n,) [N m/A], motor side", None)
@@ -120,10 +116,8 @@ class RobotDescription:
 
 
 @dataclass(frozen=True)
-class _Kinematics:
+class _Kinematics(Strict):
     """The table [kinematics]."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
     convention: Literal["dh", "mdh", "urdf"] = described("meaning of the joints' numbers")
     tool: Vector = described("[m] tip in the last frame", (0.0, 0.0, 0.0))
@@ -132,10 +126,8 @@ class _Kinematics:
 
 
 @dataclass(frozen=True)
-class _Table:
+class _Table(Strict):
     """The TOML text of a robot."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
     name: str = described("name of the robot", pattern=_TEXT)
     gravity: Vector = described("[m/s^2] in the base frame")

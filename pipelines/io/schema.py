@@ -114,14 +114,19 @@ def _words(words: str) -> Any:
     return described(f"a text in UTF-8 without NUL, not empty: {words}", pattern=_WORDS)
 
 
-STRICT: dict[str, object] = {"extra": "forbid", "strict": True, "allow_inf_nan": False}
+class Strict:
+    """A dataclass in a file: without unknown keys, other types, infinite or undefined numbers."""
+
+    __pydantic_config__: ClassVar[dict[str, object]] = {
+        "extra": "forbid",
+        "strict": True,
+        "allow_inf_nan": False,
+    }
 
 
 @dataclass(frozen=True)
-class LogAttributes:
+class LogAttributes(Strict):
     """The attributes of a log."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
     name: str = _words("name, as results and reports have it")
     experiment: Experiment = described("what was done")
@@ -141,10 +146,8 @@ class LogAttributes:
 
 
 @dataclass(frozen=True)
-class ControllerAttributes:
+class ControllerAttributes(Strict):
     """The controller that was in charge."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
     law: Law = described("control law")
     kp: list[float] | None = described(
@@ -176,10 +179,8 @@ class ControllerAttributes:
 
 
 @dataclass(frozen=True)
-class DerivedAttributes:
+class DerivedAttributes(Strict):
     """Where the samples of a derived log come from."""
-
-    __pydantic_config__: ClassVar[dict[str, object]] = STRICT
 
     command: str = _words("the command that has made it")
     settings: str = described("a JSON text: the settings of that command", pattern=_TEXT)
