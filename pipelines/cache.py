@@ -27,8 +27,8 @@ from typing import Any
 import pipelines
 from pipelines.errors import EnvironmentFault, clean
 from pipelines.io.hdf5 import read_series, write_series
-from pipelines.io.output import environment_faults, hash_file, slug
-from pipelines.io.results import encode, json_text, listed_outputs
+from pipelines.io.output import environment_faults, hash_file, listed_outputs, slug
+from pipelines.io.results import encode, json_text
 from pipelines.report.style import STYLE_FILE
 
 Key = Mapping[str, Mapping[str, Any]]  # group -> name -> value

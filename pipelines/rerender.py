@@ -21,6 +21,7 @@ from pipelines.io.output import (
     environment_faults,
     hash_file,
     keep_apart,
+    listed_outputs,
     refuse_foreign,
     tilde,
     write_text,
@@ -31,7 +32,6 @@ from pipelines.io.results import (
     decode,
     headed,
     json_text,
-    listed_outputs,
     read_foreign_series,
     read_result,
 )

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import glob
-import json
 import os
 import shlex
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -40,7 +39,14 @@ from pipelines.io.log import (
     select_joints,
     with_robot,
 )
-from pipelines.io.output import PROVENANCE, environment_faults, fault_of, hash_file, write_file
+from pipelines.io.output import (
+    PROVENANCE,
+    environment_faults,
+    fault_of,
+    hash_file,
+    listed_outputs,
+    write_file,
+)
 from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import Answer, guarded, regular_file
 from pipelines.io.units import to_si
@@ -245,9 +251,7 @@ def _refuse_unlisted(path: Path, sha256: str) -> None:
             lines = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
             listed = (line.partition(" ") for line in lines)
             expected = {entry.strip().lstrip("*"): value for value, _, entry in listed}.get(name)
-        with contextlib.suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
-            about = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))
-            expected = str(about["outputs"][name])
+        expected = listed_outputs(folder).get(name, expected)
         if expected not in (None, sha256):
             words = f"sha256 differs from the manifest in {folder.name or folder}"
             remedy = "copy the file again, or run the command that wrote it again"

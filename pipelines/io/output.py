@@ -258,9 +258,7 @@ def refuse_foreign(
     refuse_own_place(out)
     if not out.exists() or not any(out.iterdir()):
         return ()
-    about = provenance_of(out)
-    outputs = about.get("outputs")
-    ours = outputs if isinstance(outputs, dict) else {}
+    ours = listed_outputs(out)
     if ours and force:
         return ()
     known = {*ours, PROVENANCE} if ours else set()
@@ -268,8 +266,8 @@ def refuse_foreign(
     if foreign:
         words = f"holds files that rrrid did not write there: {', '.join(foreign)}"
         raise UsageError("C05", words, out, f"{_ELSEWHERE}, or move them")
-    if command and about.get("command") != command:
-        words = f"holds the earlier result of {clean(about.get('command'), 40)}"
+    if command and written_by(out) != command:
+        words = f"holds the earlier result of {clean(written_by(out), 40)}"
         raise UsageError("C05", words, out, f"{_ELSEWHERE}, or replace it with --force")
     edited = [
         name for name in _members(out) if name in ours and hash_file(out / name) != ours[name]
@@ -307,6 +305,12 @@ def provenance_of(folder: Path) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError):
         return {}
     return about if isinstance(about, dict) and about.get("tool") == "rrrid" else {}
+
+
+def listed_outputs(folder: Path) -> dict[str, str]:
+    """Map the files of rrrid's own output in `folder` to their SHA-256; empty for none."""
+    outputs = provenance_of(folder).get("outputs")
+    return outputs if isinstance(outputs, dict) else {}
 
 
 def written_by(folder: Path) -> str:

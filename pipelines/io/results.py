@@ -30,7 +30,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.hdf5 import read_series
-from pipelines.io.output import PROVENANCE, hash_file
+from pipelines.io.output import hash_file, listed_outputs
 from pipelines.io.sandbox import Answer, guarded, read_small_text, regular_file
 from pipelines.io.schema import DRAFT
 
@@ -232,15 +232,6 @@ def stored_result(path: Path, command: str) -> dict[str, Any] | None:
             raise
         return None  # of another program
     return found.object if found.command == command else None
-
-
-def listed_outputs(folder: Path) -> dict[str, str]:
-    """Map files to their SHA-256, as the provenance.json in `folder` has them; empty for none."""
-    try:
-        outputs = json.loads((folder / PROVENANCE).read_text(encoding="utf-8"))["outputs"]
-        return {str(name): str(value) for name, value in outputs.items()}
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        return {}
 
 
 def result_schema(kind: type[Any], command: str) -> dict[str, Any]:
