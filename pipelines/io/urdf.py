@@ -15,7 +15,7 @@ from xml.parsers import expat
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
+from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
 from pipelines.io.config import URDF
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription, inconsistency
 
@@ -82,22 +82,6 @@ class _Joint:
         return _rotation_of(self.rpy)
 
 
-@dataclass(frozen=True)
-class _Source:
-    """The file or text, and the kind of its errors."""
-
-    where: str
-    kind: type[RrridError]
-
-    def wrong(self, words: str, remedy: str = "", code: str = "S17") -> RrridError:
-        remedy = remedy or "correct the URDF there, or export it again"
-        return self.kind(code, f"URDF: {words}", self.where, remedy)
-
-    def xacro(self) -> RrridError:
-        words = "this is a xacro macro file, which rrrid does not run"
-        return self.wrong(words, "expand it first: xacro arm.urdf.xacro > arm.urdf", "X13")
-
-
 @dataclass(frozen=True, eq=False)
 class _Tree:
     """The links and joints of a file: each child has one parent, and all are under one root."""
@@ -107,7 +91,7 @@ class _Tree:
     into: dict[str, _Joint]  # by child link
     out: dict[str, list[_Joint]]  # by parent link
     root: str
-    source: _Source
+    where: str  # the file, or "urdf_text"
 
     def body(self, link: str) -> list[str]:
         """Return `link` and all links that are fixed to it, below it."""
@@ -145,32 +129,32 @@ def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescripti
     Raises:
         UsageError: no such file, not a URDF, or not a serial arm.
     """
-    source = _Source(str(path), UsageError)
-    tree = _tree_of(_read(Path(path), source), source)
-    way, tip = _way_to_tip(tree, tip_link)
-    moving = [joint for joint in way if joint.moves]
-    stop = {joint.name for joint in moving}
-    joints = []
-    for joint in moving:
-        slides = joint.type == "prismatic"
-        joints.append(
-            Joint(
-                joint.name,
-                "prismatic" if slides else "revolute",
-                position=joint.range,
-                velocity=joint.velocity,
-                torque=joint.effort,
-                link=_link(tree, joint.child, stop),
-            )
-        )
+    path = Path(path)
+    try:
+        tree = _tree_of(_read(path), str(path))
+        way, tip = _way_to_tip(tree, tip_link)
+        moving = [joint for joint in way if joint.moves]
+        stop = {joint.name for joint in moving}
+        joints = tuple(_described(joint, _link(tree, joint.child, stop)) for joint in moving)
+        checks = _impossible_links(tree)
+    except InputRejected as problem:
+        code = problem.code.removeprefix("RRID-")
+        raise UsageError(code, problem.message, path, problem.remedy) from None
+    text = _canonical(tree, way)
+    gravity = (0.0, 0.0, -9.81)
     return RobotDescription(
-        tree.name,
-        (0.0, 0.0, -9.81),
-        "urdf",
-        tuple(joints),
-        urdf_text=_canonical(tree, way),
-        tip_link=tip,
-        checks=_impossible_links(tree),
+        tree.name, gravity, "urdf", joints, urdf_text=text, tip_link=tip, checks=checks
+    )
+
+
+def _described(joint: _Joint, link: LinkParameters | None) -> Joint:
+    return Joint(
+        joint.name,
+        "prismatic" if joint.type == "prismatic" else "revolute",
+        position=joint.range,
+        velocity=joint.velocity,
+        torque=joint.effort,
+        link=link,
     )
 
 
@@ -180,7 +164,7 @@ def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
     Raises:
         InputRejected: the text is not the URDF of a serial arm.
     """
-    tree = _tree_of(urdf_text, _Source("urdf_text", InputRejected))
+    tree = _tree_of(urdf_text, "urdf_text")
     way, tip = _way_to_tip(tree, tip_link)
     placed: list[JointPlacement] = []
     rotation, position = np.eye(3), np.zeros(3)
@@ -193,39 +177,50 @@ def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
     return UrdfChain(tuple(placed), tip, rotation, position)
 
 
-def _read(path: Path, source: _Source) -> bytes:
+def _wrong(
+    words: str, remedy: str = "correct the URDF there, or export it again", code: str = "S17"
+) -> InputRejected:
+    return InputRejected(code, f"URDF: {words}", "urdf_text", remedy)
+
+
+def _xacro() -> InputRejected:
+    words = "this is a xacro macro file, which rrrid does not run"
+    return _wrong(words, "expand it first: xacro arm.urdf.xacro > arm.urdf", "X13")
+
+
+def _read(path: Path) -> bytes:
     if path.suffix.lower() == ".xacro":
-        raise source.xacro()
+        raise _xacro()
     try:
         if not path.is_file():  # a pipe or a device would hang
             words = "not a regular file" if path.exists() else "no such file"
-            raise source.wrong(words, "check the path", "C04")
+            raise _wrong(words, "check the path", "C04")
         with path.open("rb") as file:
             return file.read(URDF.size + 1)
     except (OSError, ValueError) as problem:
         remedy = "check the file and its permissions"
-        raise source.wrong(f"cannot be read: {problem}", remedy, "C04") from None
+        raise _wrong(f"cannot be read: {problem}", remedy, "C04") from None
 
 
-def _parse(text: bytes | str, source: _Source) -> Element:
+def _parse(text: bytes | str) -> Element:
     """Return the XML tree; a document type is refused before an entity could be declared."""
     if len(text) > URDF.size:
-        raise source.wrong(f"larger than {URDF.size // 1_000_000} MB", code="X13")
+        raise _wrong(f"larger than {URDF.size // 1_000_000} MB", code="X13")
     builder, parser, depth, elements = TreeBuilder(), expat.ParserCreate(), 0, 0
 
     def doctype(*_: object) -> None:
         words = "has a DOCTYPE or entity declaration, which is never followed"
-        raise source.wrong(words, "delete the <!DOCTYPE …> from the file", "X13")
+        raise _wrong(words, "delete the <!DOCTYPE …> from the file", "X13")
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth, elements
         depth, elements = depth + 1, elements + 1
         if tag.startswith("xacro:"):
-            raise source.xacro()
+            raise _xacro()
         if depth > URDF.depth:
-            raise source.wrong(f"elements nested more than {URDF.depth} deep", code="X13")
+            raise _wrong(f"elements nested more than {URDF.depth} deep", code="X13")
         if elements > URDF.elements:
-            raise source.wrong(f"more than {URDF.elements} elements", code="X13")
+            raise _wrong(f"more than {URDF.elements} elements", code="X13")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -238,26 +233,26 @@ def _parse(text: bytes | str, source: _Source) -> Element:
     try:
         parser.Parse(text.lstrip(), True)  # many a file begins with an empty line
     except (expat.ExpatError, LookupError, ValueError) as problem:
-        raise source.wrong(f"is not well-formed XML: {problem}") from None
+        raise _wrong(f"is not well-formed XML: {problem}") from None
     return builder.close()
 
 
-def _tree_of(text: bytes | str, source: _Source) -> _Tree:
-    robot = _parse(text, source)
+def _tree_of(text: bytes | str, where: str) -> _Tree:
+    robot = _parse(text)
     if robot.tag in _OTHER_FORMATS:
         remedy = "give the URDF that it was made from, or export a URDF of the arm"
-        raise source.wrong(f"this is {_OTHER_FORMATS[robot.tag]}, not a URDF", remedy)
+        raise _wrong(f"this is {_OTHER_FORMATS[robot.tag]}, not a URDF", remedy)
     if robot.tag != "robot":
-        raise source.wrong(f"the outermost element is <{robot.tag}>, not <robot>")
+        raise _wrong(f"the outermost element is <{robot.tag}>, not <robot>")
     elements, joints = robot.findall("link"), robot.findall("joint")
     if max(len(elements), len(joints)) > URDF.links:
         remedy = "give the URDF of the arm alone"
-        raise source.wrong(f"more than {URDF.links} links or joints", remedy, "X13")
+        raise _wrong(f"more than {URDF.links} links or joints", remedy, "X13")
     links: dict[str, Element] = {}
     for element in elements:
-        if links.setdefault(_name(element, source), element) is not element:
-            raise source.wrong(f"two links are called '{element.get('name')}'")
-    into, out = _connected(joints, links, source)
+        if links.setdefault(_name(element), element) is not element:
+            raise _wrong(f"two links are called '{element.get('name')}'")
+    into, out = _connected(joints, links)
     roots = [name for name in links if name not in into]
     if len(roots) != 1:
         words = (
@@ -266,32 +261,32 @@ def _tree_of(text: bytes | str, source: _Source) -> _Tree:
         loose = ", ".join(name for name in roots if not out[name])
         more = f", or delete those without joints: {loose}" if loose else ""
         remedy = f"connect all links into one tree{more}"
-        raise source.wrong(f"there must be one root link, but {words}", remedy)
-    tree = _Tree(robot.get("name") or "robot", links, into, out, roots[0], source)
+        raise _wrong(f"there must be one root link, but {words}", remedy)
+    tree = _Tree(robot.get("name") or "robot", links, into, out, roots[0], where)
     if len(tree.below(tree.root, set())) != len(links):
         words = "some joints form a closed loop apart from the root"
-        raise source.wrong(words, "only serial arms can be described")
+        raise _wrong(words, "only serial arms can be described")
     return tree
 
 
 def _connected(
-    elements: list[Element], links: dict[str, Element], source: _Source
+    elements: list[Element], links: dict[str, Element]
 ) -> tuple[dict[str, _Joint], dict[str, list[_Joint]]]:
     """Return the joints by their child link, and by their parent link."""
     into: dict[str, _Joint] = {}
     out: dict[str, list[_Joint]] = {name: [] for name in links}
     for element in elements:
-        joint = _joint(element, source)
+        joint = _joint(element)
         for end in (joint.parent, joint.child):
             if end not in links:
                 words = f"joint '{joint.name}' connects link '{end}', which is not defined"
-                raise source.wrong(f"{words}{did_you_mean(end, links)}")
+                raise _wrong(f"{words}{did_you_mean(end, links)}")
         if any(other.name == joint.name for other in into.values()):
-            raise source.wrong(f"two joints are called '{joint.name}'")
+            raise _wrong(f"two joints are called '{joint.name}'")
         if joint.child in into:
             both = f"'{into[joint.child].name}' and '{joint.name}'"
             words = f"link '{joint.child}' hangs on joints {both}: a closed loop"
-            raise source.wrong(words, "only serial arms can be described")
+            raise _wrong(words, "only serial arms can be described")
         into[joint.child] = joint
         out[joint.parent].append(joint)
     return into, out
@@ -302,7 +297,7 @@ def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
     tip = tip_link or _only_tip(tree)
     if tip not in tree.links:
         words = f"there is no link '{tip}' for tip_link{did_you_mean(tip, tree.links)}"
-        raise tree.source.wrong(words, code="C02")
+        raise _wrong(words, code="C02")
     way = tree.way(tip)
     for joint in way:
         if joint.moves and not joint.independent:
@@ -310,10 +305,10 @@ def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
             words = f"joint '{joint.name}' is {what}, and an arm has independent revolute, "
             words += "continuous and prismatic joints"
             remedy = f'make it type="fixed" in the URDF{_end_there(tree, ", or ")}'
-            raise tree.source.wrong(words, remedy)
+            raise _wrong(words, remedy)
     if not any(joint.moves for joint in way):
         remedy = _end_there(tree) or "give the URDF of an arm whose joints move"
-        raise tree.source.wrong(f"no joint moves between '{tree.root}' and '{tip}'", remedy)
+        raise _wrong(f"no joint moves between '{tree.root}' and '{tip}'", remedy)
     return way, tip
 
 
@@ -325,7 +320,7 @@ def _only_tip(tree: _Tree) -> str:
         if len(onwards) > 1:
             words = f"joints {', '.join(repr(joint.name) for joint in onwards)} branch off"
             remedy = _end_there(tree) or 'make those that are no joint of the arm type="fixed"'
-            raise tree.source.wrong(f"{words} the same body", remedy)
+            raise _wrong(f"{words} the same body", remedy)
         if not onwards:
             ends = [name for name in tree.body(link) if not tree.out[name]]
             return ends[0] if len(ends) == 1 else link
@@ -352,38 +347,38 @@ def _end_there(tree: _Tree, before: str = "") -> str:
     if not ends:
         return ""
     longest = sorted(ends, key=lambda end: -ends[end])
-    file = tree.source.where.rpartition("/")[2]
+    file = tree.where.rpartition("/")[2]
     named = ", ".join(f"{file}:{end}" for end in longest[:4])
     remedy = f"{before}say at which link the arm ends, after a colon: {named}"
     return f'{remedy}; in a description or a recipe also tip_link = "{longest[0]}"'
 
 
-def _joint(element: Element, source: _Source) -> _Joint:
-    name = _name(element, source)
+def _joint(element: Element) -> _Joint:
+    name = _name(element)
     kind, place = element.get("type", ""), f"joint '{name}'"
     if kind not in _TYPES:
         words = f"has type '{kind}', which must be one of {', '.join(_TYPES)}"
-        raise source.wrong(f"{place} {words}")
+        raise _wrong(f"{place} {words}")
     ends = []
     for side in ("parent", "child"):
         part = element.find(side)
         ends.append("" if part is None else part.get("link", ""))
     if not all(ends):
-        raise source.wrong(f"{place} lacks its parent or child link")
-    xyz, rpy = _origin(element, place, source)
-    axis = _vector(element.find("axis"), "xyz", (1.0, 0.0, 0.0), place, source)
+        raise _wrong(f"{place} lacks its parent or child link")
+    xyz, rpy = _origin(element, place)
+    axis = _vector(element.find("axis"), "xyz", (1.0, 0.0, 0.0), place)
     length = float(np.linalg.norm(axis))
     if kind in _MOVING and length < URDF.short:
-        raise source.wrong(f"{place} has an axis without direction")
+        raise _wrong(f"{place} has an axis without direction")
     limit = element.find("limit")
     low, high, velocity, effort = (
-        _limit(limit, key, place, source) for key in ("lower", "upper", "velocity", "effort")
+        _limit(limit, key, place) for key in ("lower", "upper", "velocity", "effort")
     )
     if kind == "continuous":
         low = high = 0.0
     if velocity < 0.0 or effort < 0.0 or low > high:
         words = "has a negative velocity or effort limit, or lower above upper"
-        raise source.wrong(f"{place} {words}")
+        raise _wrong(f"{place} {words}")
     ranged = (-math.inf, math.inf) if low == high else (low, high)
     axis = axis / length if length else axis
     mimics = element.find("mimic") is not None
@@ -392,64 +387,62 @@ def _joint(element: Element, source: _Source) -> _Joint:
     return _Joint(name, kind, parent, child, xyz, rpy, axis, ranged, velocity, effort, mimics)
 
 
-def _name(element: Element, source: _Source) -> str:
+def _name(element: Element) -> str:
     name = element.get("name", "")
     if not name.strip():
-        raise source.wrong(f"a <{element.tag}> has no name")
+        raise _wrong(f"a <{element.tag}> has no name")
     return name
 
 
-def _word(word: str, key: str, place: str, source: _Source) -> float:
+def _word(word: str, key: str, place: str) -> float:
     if "${" in word or "$(" in word:
-        raise source.xacro()
+        raise _xacro()
     try:
         return float(word.replace("_", "?"))  # Python reads 1_0 as 10, no other reader does
     except ValueError:
-        raise source.wrong(f"{place}: {key} holds '{word}', which is not a number") from None
+        raise _wrong(f"{place}: {key} holds '{word}', which is not a number") from None
 
 
-def _limit(element: Element | None, key: str, place: str, source: _Source) -> float:
+def _limit(element: Element | None, key: str, place: str) -> float:
     """Return a limit: 0 where it is missing, infinite where it is too large to be one."""
     if element is None or element.get(key) is None:
         return 0.0
-    value = _word(str(element.get(key)), key, place, source)
+    value = _word(str(element.get(key)), key, place)
     if math.isnan(value):
-        raise source.wrong(f"{place}: {key} is not a number")
+        raise _wrong(f"{place}: {key} is not a number")
     return value if abs(value) < URDF.number else math.copysign(math.inf, value)
 
 
-def _number(element: Element | None, key: str, place: str, source: _Source) -> float:
+def _number(element: Element | None, key: str, place: str) -> float:
     """Return a finite number, 0 where it is missing."""
     if element is None or element.get(key) is None:
         return 0.0
-    return _finite(str(element.get(key)), key, place, source)
+    return _finite(str(element.get(key)), key, place)
 
 
-def _finite(word: str, key: str, place: str, source: _Source) -> float:
-    value = _word(word, key, place, source)
+def _finite(word: str, key: str, place: str) -> float:
+    value = _word(word, key, place)
     if not abs(value) <= URDF.number:
         words = f"{key} holds {word}, which is not finite or absurdly large"
-        raise source.wrong(f"{place}: {words}")
+        raise _wrong(f"{place}: {words}")
     return value
 
 
-def _vector(
-    element: Element | None, key: str, default: tuple[float, ...], place: str, source: _Source
-) -> Array:
+def _vector(element: Element | None, key: str, default: tuple[float, ...], place: str) -> Array:
     text = None if element is None else element.get(key)
     if text is None:
         return np.array(default)
     words = text.split()
     if "$" not in text and len(words) != len(default):
-        raise source.wrong(f"{place}: {key} must hold three numbers, not {len(words)}")
-    return np.array([_finite(word, key, place, source) for word in words])
+        raise _wrong(f"{place}: {key} must hold three numbers, not {len(words)}")
+    return np.array([_finite(word, key, place) for word in words])
 
 
-def _origin(element: Element, place: str, source: _Source) -> tuple[Array, Array]:
+def _origin(element: Element, place: str) -> tuple[Array, Array]:
     """Return xyz [m] and rpy [rad]."""
     origin, zero = element.find("origin"), (0.0, 0.0, 0.0)
-    xyz = _vector(origin, "xyz", zero, place, source)
-    return xyz, _vector(origin, "rpy", zero, place, source)
+    xyz = _vector(origin, "xyz", zero, place)
+    return xyz, _vector(origin, "rpy", zero, place)
 
 
 def _rotation_of(rpy: Array) -> Array:
@@ -475,7 +468,7 @@ def _link(tree: _Tree, first: str, stop: set[str]) -> LinkParameters | None:
             placed[name] = (r @ joint.rotation, r @ joint.xyz + p)
         element = tree.links[name].find("inertial")
         if element is not None:
-            m, h, i = _inertial(element, *placed[name], f"link '{name}'", tree.source)
+            m, h, i = _inertial(element, *placed[name], f"link '{name}'")
             mass, moment, inertia, known = mass + m, moment + h, inertia + i, True
     if not known:
         return None
@@ -486,28 +479,26 @@ def _link(tree: _Tree, first: str, stop: set[str]) -> LinkParameters | None:
     return LinkParameters(float(mass), (x, y, z), six)
 
 
-def _tensor(element: Element, place: str, source: _Source) -> Array:
+def _tensor(element: Element, place: str) -> Array:
     """Return the inertia (3, 3) about the centre of mass, in the axes of <inertial>."""
     inertia = element.find("inertia")
     keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    xx, yy, zz, xy, xz, yz = (_number(inertia, key, place, source) for key in keys)
+    xx, yy, zz, xy, xz, yz = (_number(inertia, key, place) for key in keys)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _inertial(
-    element: Element, r: Array, p: Array, place: str, source: _Source
-) -> tuple[float, Array, Array]:
+def _inertial(element: Element, r: Array, p: Array, place: str) -> tuple[float, Array, Array]:
     """Return mass, first moment and inertia about the body's origin.
 
     I_o = R I_c Rᵀ + m (|c|² 1 - c cᵀ)
     """
-    mass = _number(element.find("mass"), "value", place, source)
+    mass = _number(element.find("mass"), "value", place)
     if mass < 0.0:
-        raise source.wrong(f"{place} has negative mass {mass}")
-    xyz, rpy = _origin(element, place, source)
+        raise _wrong(f"{place} has negative mass {mass}")
+    xyz, rpy = _origin(element, place)
     turn = r @ _rotation_of(rpy)
     c = r @ xyz + p
-    about_com = turn @ _tensor(element, place, source) @ turn.T
+    about_com = turn @ _tensor(element, place) @ turn.T
     return mass, mass * c, about_com + mass * (float(c @ c) * np.eye(3) - np.outer(c, c))
 
 
@@ -518,11 +509,11 @@ def _impossible_links(tree: _Tree) -> tuple[Check, ...]:
         element, place = link.find("inertial"), f"link '{name}'"
         if element is None:
             continue
-        mass = _number(element.find("mass"), "value", place, tree.source)
-        if words := inconsistency(mass, _tensor(element, place, tree.source)):
+        mass = _number(element.find("mass"), "value", place)
+        if words := inconsistency(mass, _tensor(element, place)):
             words = f"no rigid body has the inertial parameters of {place}: {words}"
             remedy = "correct them in the URDF: what is known of its links is used"
-            found.append(Check.of("S17", "warn", words, tree.source.where, remedy))
+            found.append(Check.of("S17", "warn", words, tree.where, remedy))
     return tuple(found)
 
 
