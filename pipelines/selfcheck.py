@@ -22,6 +22,8 @@ from pipelines.io.files import open_log, write_log
 from pipelines.io.processors import processors
 
 if TYPE_CHECKING:
+    from packaging.requirements import Requirement
+
     from pipelines.io.log import ExperimentLog
 
 __all__ = ["Finding", "examine", "self_test"]
@@ -79,25 +81,24 @@ def _libraries() -> Iterator[Finding]:
         found = "rrrid was not installed: nothing says what it needs"
         yield Finding("libraries", "warn", found, "pip install -e .")
         return
-    extras = {"", "bench", "cluster", "lmi"}
     for wanted in map(Requirement, lines):
-        marker = wanted.marker
-        extra = next((e for e in extras if marker is None or marker.evaluate({"extra": e})), None)
-        if extra is None or wanted.name == "rrrid":
-            continue
-        package = f"rrrid[{extra}]" if extra else f"{wanted.name}{wanted.specifier}"
-        remedy, level = f"pip install --upgrade '{package}'", "warn" if extra else "bad"
-        asked = f", {wanted.specifier} is required" if wanted.specifier else ""
-        try:
-            version = importlib.metadata.version(wanted.name)
-        except importlib.metadata.PackageNotFoundError:
-            missing = "not installed" + (f"; optional (extra '{extra}')" if extra else asked)
-            yield Finding(wanted.name, "ok" if extra else "bad", missing, remedy)
-            continue
-        if wanted.specifier.contains(version, prereleases=True):
-            yield Finding(wanted.name, "ok", version)
-        else:
-            yield Finding(wanted.name, level, f"{version}{asked}", remedy)  # type: ignore[arg-type]
+        for extra in ("", "bench", "cluster"):
+            if wanted.marker is None or wanted.marker.evaluate({"extra": extra}):
+                yield _library(wanted, extra)
+                break
+
+
+def _library(wanted: Requirement, extra: str) -> Finding:
+    missing: Level = "ok" if extra else "bad"
+    remedy = f"pip install --upgrade '{f'rrrid[{extra}]' if extra else wanted}'"
+    asked = f"{wanted.specifier} is required{f' by the extra {extra}' if extra else ''}"
+    try:
+        version = importlib.metadata.version(wanted.name)
+    except importlib.metadata.PackageNotFoundError:
+        return Finding(wanted.name, missing, f"not installed, {asked}", remedy)
+    if wanted.specifier.contains(version, prereleases=True):
+        return Finding(wanted.name, "ok", version)
+    return Finding(wanted.name, "warn" if extra else "bad", f"{version}, {asked}", remedy)
 
 
 def _folder(name: str, where: Callable[[], Path], otherwise: Level, remedy: str) -> Finding:
