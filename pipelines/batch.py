@@ -195,14 +195,13 @@ class _Batch:
         self.ledger = self.out / "ledger" / "{}-of-{}.jsonl".format(*plan.shard)
 
     def begin(self) -> None:
-        """Mark the folder, and read what is done; without --resume, nothing is."""
+        """Mark the folder, and read what was done in it."""
         about = {"tool": "rrrid", "command": "batch", "version": __version__}
         text = json_text(about | {"stage": self.plan.stage})
         if _stage_of(self.out) != self.plan.stage:  # replaced, as --force says
             for folder in ("items", "crashes"):
                 shutil.rmtree(self.out / folder, ignore_errors=True)
-        old = read_ledger(self.out) if self.plan.resume else {}
-        self.earlier = {slug: record for slug, record in old.items() if record.key == self.key}
+        self.earlier = read_ledger(self.out)
         write_text(self.out / _MARK, text)
         with environment_faults(self.out):
             (self.out / PROVENANCE).unlink(missing_ok=True)
@@ -246,7 +245,9 @@ class _Batch:
     def _keep(self, item: Item) -> bool:
         """Return whether the item's earlier result is as it was written, of the same logs (P07)."""
         record = self.earlier.get(item.slug)
-        if record is None or not record.provenance or self.heard:
+        if not self.plan.resume or self.heard or record is None or record.key != self.key:
+            return False
+        if not record.provenance:
             return False
         logs = sorted(relative(log, self.plan) for log in item.logs)
         inputs = {name: _hash(self.plan.root / name) for name in record.inputs}

@@ -44,8 +44,6 @@ from pipelines.stage import Outcome, Request, Stage, run_stage
 
 __all__ = ["Item", "Plan", "Record", "Status", "failed", "load_stage", "relative", "run_items"]
 
-Submit = Callable[["Item"], Future["Record"]]
-
 _ALONE = "run the stage on it alone"
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
@@ -105,6 +103,15 @@ class Record:
     key: str = ""  # of the plan
     trace: str = ""  # of an internal error
     sessions: tuple[str, ...] = ()  # of several robots or days: each is an item of its own
+
+
+@dataclass(frozen=True)
+class Workers:
+    """The processes of this machine, or of a cluster."""
+
+    submit: Callable[[Item], Future[Record]]
+    ahead: int  # items to keep in hand
+    alive: Callable[[], bool] = lambda: True
 
 
 def load_stage(module: str) -> Stage[Any, Any]:
@@ -195,8 +202,8 @@ def run_items(
     while waiting and not stopped():
         running: dict[Future[Record], Item] = {}
         try:
-            with pool(plan) as (submit, ahead):
-                for item, problem, record in _results(submit, ahead, waiting, running, stopped):
+            with pool(plan) as workers:
+                for item, problem, record in _results(workers, waiting, running, stopped):
                     deaths = 0
                     yield item, record or failed(plan, item, _fault(problem, plan))
         except RuntimeError as problem:  # pebble's pool broke: a worker died that had no item
@@ -209,17 +216,18 @@ def run_items(
 
 
 def _results(
-    submit: Submit,
-    ahead: int,
+    workers: Workers,
     waiting: deque[Item],
     running: dict[Future[Record], Item],
     stopped: Callable[[], bool],
     seconds: float = 0.1,
 ) -> Iterator[tuple[Item, BaseException | None, Record | None]]:
-    """Keep `ahead` items in hand: the next one is there when a worker is done with its last."""
+    """Keep some items in hand: the next one is there when a worker is done with its last."""
     while (waiting or running) and not stopped():
-        while waiting and len(running) < ahead:
-            running[submit(waiting[0])] = waiting[0]
+        if not workers.alive():
+            raise _gone()
+        while waiting and len(running) < workers.ahead:
+            running[workers.submit(waiting[0])] = waiting[0]
             waiting.popleft()
         for future in wait(running, timeout=seconds, return_when=FIRST_COMPLETED).done:
             if future.cancelled():
@@ -270,7 +278,7 @@ class _Context(SpawnContext):
 
 
 @contextlib.contextmanager
-def _local(plan: Plan) -> Iterator[tuple[Submit, int]]:
+def _local(plan: Plan) -> Iterator[Workers]:
     """Let processes of this machine do the items."""
     from pebble import ProcessPool
 
@@ -289,7 +297,7 @@ def _local(plan: Plan) -> Iterator[tuple[Submit, int]]:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     try:
-        yield submit, 2 * plan.jobs
+        yield Workers(submit, 2 * plan.jobs)
     finally:
         pool.stop()
         pool.join()
@@ -324,7 +332,7 @@ def _gone() -> EnvironmentFault:
 
 
 @contextlib.contextmanager
-def _cluster(plan: Plan, seconds: float = 10.0) -> Iterator[tuple[Submit, int]]:
+def _cluster(plan: Plan, seconds: float = 10.0) -> Iterator[Workers]:
     """Let a Dask cluster do the items; those of a worker that dies are done by the others."""
     scheme, _, place = plan.backend.partition("://")
     if scheme != "dask" or not place:
@@ -343,7 +351,11 @@ def _cluster(plan: Plan, seconds: float = 10.0) -> Iterator[tuple[Submit, int]]:
         raise EnvironmentFault("P04", words, where=plan.backend, remedy=remedy) from None
     executor = client.get_executor(pure=False)
     try:
-        yield lambda item: executor.submit(in_child, plan, item), sys.maxsize
+        yield Workers(
+            lambda item: executor.submit(in_child, plan, item),
+            ahead=sys.maxsize,
+            alive=lambda: bool(client.status == "running"),
+        )
     finally:
         if client.status == "running":
             with contextlib.suppress(OSError, RuntimeError):
