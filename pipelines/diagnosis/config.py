@@ -44,7 +44,7 @@ class DiagnosisConfig:
     deviations: float = 2.0  # by which a number may lie outside its range and be taken for possible
     # mean square residual of a joint over the baseline's, from which it is too large
     excess: float = 2.0
-    # share of a joint's torque that repeats, wanders or oscillates with no cause: a fault
+    # share of a joint's torque that repeats or wanders, and no cause explains: a fault
     misfit: float = 0.01
 
     def recipe(

@@ -109,19 +109,13 @@ def _rest(
         return _too_large(left, bound) + more
     if last.moment:
         return last.moment
-    return _wanders(later)
+    slow = _wandering(later)
+    return _wanders(slow) if slow.max() > later.config.misfit else ""
 
 
-def _wanders(later: Later) -> str:
-    """Return which part of a joint's torque wanders or oscillates, in words; "" if it is small."""
-    power, hz = _lasting(later)
-    share = np.sqrt(power / np.maximum(_torque_squared(later), 1e-300)[:, None])
-    joint, k = np.unravel_index(share.argmax(), share.shape)
-    if share[joint, k] <= later.config.misfit:
-        return ""
-    does = "wanders" if hz[k] < 1.0 / later.config.block else f"oscillates at {hz[k]:.2g} Hz"
-    part = f"{share[joint, k]:.1%} of the torque of joint {joint + 1}"
-    return f"{part} {does} independently of the motion"
+def _wanders(slow: Array) -> str:
+    joint = int(slow.argmax()) + 1
+    return f"{slow.max():.1%} of the torque of joint {joint} wanders independently of the motion"
 
 
 def _too_large(left: Array, bound: float) -> str:
@@ -154,23 +148,19 @@ def _missing(later: Later, state: State) -> Array:
     return np.where((common > bound * differing) & (share > config.misfit), share, 0.0)
 
 
-def _lasting(later: Later) -> tuple[Array, Array]:
-    """Return the power (joints, frequencies) [(N m)²] that noise keeps for a block, and f [Hz].
+def _wandering(later: Later) -> Array:
+    """Return the share of each joint's torque (joints,) that its noise keeps for a block of time.
 
-    Noise of level σ whitened by A has the density S(f) = σ² / |A(f)|² of a row: its means over n
-    rows have the variance S(0) / n, and its line at f > 0 the power 2 S(f) / n, of which only what
-    exceeds the median over f counts. With reference logs their noise is what is usual.
+    Noise of level σ whitened by A has the density σ² / A(1)² at the lowest frequencies: its means
+    over n rows have the variance σ² / (n A(1)²). With reference logs their noise is what is usual.
     """
-    rows, block = later.rows, later.config.block
+    rows = later.rows
     whitening = rows.data.logs[0].whitening
     if later.dataset.reference is not None or whitening is None:
-        return np.zeros((rows.n_joints, 1)), np.zeros(1)
+        return np.zeros(rows.n_joints)
     each = float(later.block_rows.mean()) / rows.n_joints
-    gain = np.abs(np.fft.rfft(whitening.weights[:, -1], 512)) ** 2  # (joints, f)
-    power = later.dataset.noise_power[:, None] / (each * gain)
-    hz = np.linspace(0.0, 0.5 * each / block, gain.shape[1])
-    lines = 2.0 * (power - np.median(power, axis=1, keepdims=True))
-    return np.where(hz < 1.0 / block, power, np.maximum(lines, 0.0)), hz
+    lasting = later.dataset.noise_power / (each * whitening.weights[:, -1].sum(axis=1) ** 2)
+    return np.asarray(np.sqrt(lasting / np.maximum(_torque_squared(later), 1e-300)))
 
 
 def _torque_squared(later: Later) -> Array:
@@ -184,16 +174,16 @@ def _confused(later: Later, end: State) -> dict[int, str]:
 
     Only one that is larger at its moment than chance allows is distinguished from it.
     """
-    why, config, found = _wanders(later), later.config, {}
-    lasting = _lasting(later)[0][:, 0]  # variance of means over a block
+    slow, config, found = _wandering(later), later.config, {}
+    lasting = slow**2 * _torque_squared(later)  # variance of means over a block
     bound = chi2_bound(config.alpha / config.event_candidates, DIRECTIONS)
-    for place, one in enumerate(end.model.effects if why else ()):
+    for place, one in enumerate(end.model.effects if slow.max() > config.misfit else ()):
         if one.log is not None:
             motion = later.rows.data.logs[one.log - later.rows.data.first].motion
             size = np.abs(one.effect.torque(motion, end.model.nominal, one.values)).max(axis=0)
             chance = 2.0 * lasting * config.block / one.values["duration"]  # of a half sine
             if np.sum(size**2 / chance) < bound:
-                found[place] = why
+                found[place] = _wanders(slow)
     return found
 
 
