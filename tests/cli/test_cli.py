@@ -199,11 +199,11 @@ def test_chosen_joints_are_converted(logs: Path) -> None:
 
 
 def test_an_estimate_loads_only_what_it_uses(tmp_path: Path) -> None:
-    """Neither masked arrays, URDF, tables nor plots: each costs 10 to 1000 ms.
+    """Neither URDF, tables nor plots: each costs 100 to 1000 ms.
 
     typer reads its options by pydantic; the verdict is a sentence, and sentences are jinja2 templates.
     """
-    unused = {"numpy.ma", "xml", "scipy", "pandas", "matplotlib", "pyarrow", "rich"}
+    unused = {"xml", "scipy", "pandas", "matplotlib", "pyarrow", "rich"}
     code = ("import sys, rrrid_cli.main as main\ntry:\n    main.entry()\nexcept SystemExit:\n    pass\n"
             f"print(sorted({unused} & set(sys.modules)))")
     log = REPO / "sample_logs/rrr-closed-form/excitation-1.h5"
