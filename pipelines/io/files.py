@@ -134,8 +134,9 @@ def open_log(
         sha256 = hash_file(path)
         container, checks = _container(path, os.pread(handle, 8, 0), status.st_size)
         _refuse_unlisted(path, sha256)
+        read = hdf5.read_parts if container == "hdf5" else parquet.read_parts
         try:
-            parts = guarded(lambda: _parts(path, container, wanted), path)
+            parts = guarded(lambda: read(path, wanted), path)
         finally:  # before its content is blamed
             _refuse_modified(path, handle, status)
     log = _verified(parts, path, whole=only is None)
@@ -153,17 +154,6 @@ def open_log(
     log = _conform(log, assume_units, checks)
     _refuse_bad_urdf(log)
     return Opened(path, sha256, log, tuple(checks), container)
-
-
-def read_unguarded(path: Path) -> ExperimentLog:
-    """Return the log in a file that is trusted, without any child process."""
-    container = ENDINGS[path.suffix.lower()]
-    return _verified(_parts(path, container, None), path, whole=True)
-
-
-def _parts(path: Path, container: str, only: Collection[str] | None) -> Answer:
-    read = hdf5.read_parts if container == "hdf5" else parquet.read_parts
-    return read(path, only)
 
 
 def _verified(parts: Answer, path: Path, *, whole: bool) -> ExperimentLog:
@@ -466,11 +456,11 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
         found += _below(path / "logs" if own else path, checks)
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
     if not found:
-        raise nothing_there(", ".join(map(str, inputs)), checks, folders)
+        raise _nothing_there(", ".join(map(str, inputs)), checks, folders)
     return tuple(dict.fromkeys(found)), tuple(checks)
 
 
-def nothing_there(
+def _nothing_there(
     where: object, checks: Sequence[Check], folders: Sequence[Path]
 ) -> NothingMatched:
     """Return the error that there is no log (C06), with what to give instead."""
@@ -507,39 +497,27 @@ def _within(folders: Sequence[Path], pattern: str) -> list[Path]:
 
 
 def _below(folder: Path, checks: list[Check]) -> list[Path]:
+    """Return the logs below `folder`, in order; X11 for links that are passed over."""
+    found: list[Path] = []
     try:
-        there = entries(folder, checks)
-    except FileNotFoundError:
-        return []
-    except OSError as problem:
-        raise fault_of(problem, folder) from None
-    found = []
-    for entry in there:
-        found += _below(entry, checks) if entry.is_dir() else [entry]
-    return found
-
-
-def entries(folder: Path, checks: list[Check]) -> list[Path]:
-    """Return logs in `folder` and folders to look into, in order; X11 for links passed over.
-
-    Raises:
-        OSError: the folder cannot be read.
-    """
-    found = []
-    for entry in sorted(folder.iterdir()):
-        log = entry.suffix.lower() in ENDINGS
-        if entry.name.startswith("."):
-            continue
-        if entry.is_symlink() and (entry.is_dir() or (log and not entry.exists())):
-            words = "link that leads nowhere, or in a circle, passed over"
-            remedy = "remove it, or let it lead to a log"
-            if entry.is_dir():
+        for entry in sorted(folder.iterdir()):
+            is_folder, is_log = entry.is_dir(), entry.suffix.lower() in ENDINGS
+            if entry.name.startswith("."):
+                continue
+            if entry.is_symlink() and is_folder:
                 words = "link to a folder passed over"
                 remedy = "give what it leads to by its own path, if that is meant"
-            checks.append(Check.of("X11", "warn", words, entry, remedy))
-        elif entry.is_dir():
-            if not (entry / PROVENANCE).is_file():
+                checks.append(Check.of("X11", "warn", words, entry, remedy))
+            elif entry.is_symlink() and is_log and not entry.exists():
+                words = "link that leads nowhere, or in a circle, passed over"
+                remedy = "remove it, or let it lead to a log"
+                checks.append(Check.of("X11", "warn", words, entry, remedy))
+            elif is_folder:
+                found += [] if (entry / PROVENANCE).is_file() else _below(entry, checks)
+            elif is_log and entry.exists():
                 found.append(entry)
-        elif log and entry.exists():
-            found.append(entry)
+    except FileNotFoundError:
+        pass  # removed meanwhile
+    except OSError as problem:
+        raise fault_of(problem, folder) from None
     return found

@@ -111,19 +111,28 @@ def read_series(path: Path) -> dict[str, Array]:
 
     def note(name: str, item: Any) -> None:
         if isinstance(item, h5py.Dataset):
-            refuse_bad_dataset(item, f"{path}, /{name}")
+            _refuse_bad_dataset(item, f"{path}, /{name}")
             found[f"/{name}"] = item
+
+    with _opened(path) as file:
+        file.visititems(note)
+        declared = sum(8 * math.prod(dataset.shape) for dataset in found.values())
+        refuse_oversize(declared, path.stat().st_size, "X05", path)
+        return {name: _reals(dataset, f"{path}, {name}") for name, dataset in found.items()}
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Open a file to read; what the library says of it becomes InputRejected."""
+    import h5py
 
     try:
         with h5py.File(path, "r", locking=False) as file:
-            file.visititems(note)
-            declared = sum(8 * math.prod(dataset.shape) for dataset in found.values())
-            refuse_oversize(declared, path.stat().st_size, "X05", path)
-            return {name: _reals(dataset, f"{path}, {name}") for name, dataset in found.items()}
+            yield file
     except InputRejected:
         raise
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError) as problem:
-        raise explain(problem, path) from None
+        raise _explain(problem, path) from None
 
 
 def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
@@ -134,58 +143,39 @@ def read_parts(path: Path, only: Collection[str] | None = None) -> Answer:
     Raises:
         InputRejected: with the row of the table of bad inputs that fits.
     """
-    import h5py
-
-    try:
-        with h5py.File(path, "r", locking=False) as file:
-            return _read_file(file, path, only)
-    except InputRejected:
-        raise
-    except (
-        OSError,
-        RuntimeError,
-        KeyError,
-        ValueError,
-        TypeError,
-        UnicodeError,
-        MemoryError,
-    ) as problem:
-        raise explain(problem, path) from None
-
-
-def _read_file(file: Any, path: Path, only: Collection[str] | None) -> Answer:
-    # First what could lead elsewhere, then what the file says it is, then its names.
     where = str(path)
-    _refuse_links(file, where)
-    head = [name for name in ("format", "format_version") if name in file.attrs]
-    refuse_version({name: _attribute(file.attrs, name, where) for name in head}, "HDF5", where)
-    _refuse_unknown(file, ("robot", "signals", *_GROUPS), where)
-    attributes = {k: v for k, v in _attributes(file, where).items() if k not in head}
-    digest = attributes.pop("digest", None)
-    groups: dict[str, Any] = {"attributes": attributes}
-    for name in _GROUPS:
-        if name in file:
-            place = f"{where}, /{name}"
-            group = _group(file, name, where)
-            _refuse_links(group, place)
-            _refuse_unknown(group, (), place)
-            groups[name] = _attributes(group, place)
-    if "robot" in file:
-        groups["robot"] = _robot_text(file["robot"], where)
-    signals = _group(file, "signals", where)
-    _refuse_links(signals, f"{where}, /signals")
-    _refuse_many(signals, f"{where}, /signals")
-    for name in signals:
-        refuse_bad_dataset(signals[name], f"{where}, /signals/{name}")
-    declared = sum(8 * math.prod(one.shape) for one in signals.values())
-    refuse_oversize(declared, path.stat().st_size, "X05", where)
-    read = [name for name in signals if only is None or name in only]
-    words, arrays = {}, {}
-    for name in read:
-        place = f"{where}, /signals/{name}"
-        words[name] = _attributes(signals[name], place)
-        arrays[name] = _reals(signals[name], place)
-    return Answer({"groups": groups, "digest": digest, "signals": words}, arrays)
+    with _opened(path) as file:
+        # First what could lead elsewhere, then what the file says it is, then its names.
+        _refuse_links(file, where)
+        head = [name for name in ("format", "format_version") if name in file.attrs]
+        refuse_version({name: _attribute(file.attrs, name, where) for name in head}, "HDF5", where)
+        _refuse_unknown(file, ("robot", "signals", *_GROUPS), where)
+        attributes = {k: v for k, v in _attributes(file, where).items() if k not in head}
+        digest = attributes.pop("digest", None)
+        groups: dict[str, Any] = {"attributes": attributes}
+        for name in _GROUPS:
+            if name in file:
+                place = f"{where}, /{name}"
+                group = _group(file, name, where)
+                _refuse_links(group, place)
+                _refuse_unknown(group, (), place)
+                groups[name] = _attributes(group, place)
+        if "robot" in file:
+            groups["robot"] = _robot_text(file["robot"], where)
+        signals = _group(file, "signals", where)
+        _refuse_links(signals, f"{where}, /signals")
+        _refuse_many(signals, f"{where}, /signals")
+        for name in signals:
+            _refuse_bad_dataset(signals[name], f"{where}, /signals/{name}")
+        declared = sum(8 * math.prod(one.shape) for one in signals.values())
+        refuse_oversize(declared, path.stat().st_size, "X05", where)
+        read = [name for name in signals if only is None or name in only]
+        words, arrays = {}, {}
+        for name in read:
+            place = f"{where}, /signals/{name}"
+            words[name] = _attributes(signals[name], place)
+            arrays[name] = _reals(signals[name], place)
+        return Answer({"groups": groups, "digest": digest, "signals": words}, arrays)
 
 
 def refuse_version(attributes: dict[str, Any], container: str, where: str) -> None:
@@ -296,7 +286,7 @@ def _foreign(dataset: Any) -> str:
     return "virtual data" if dataset.is_virtual else ""
 
 
-def refuse_bad_dataset(dataset: Any, where: str) -> None:
+def _refuse_bad_dataset(dataset: Any, where: str) -> None:
     """Refuse what is no array of real numbers in this very file, before one byte is read."""
     import h5py
 
@@ -344,7 +334,7 @@ def _reals(dataset: Any, where: str) -> Array:
     return np.asarray(stored, dtype=np.float64)
 
 
-def explain(problem: BaseException, path: Path) -> InputRejected:
+def _explain(problem: BaseException, path: Path) -> InputRejected:
     """Return the library's message in the words of the table of bad inputs."""
     text = str(problem)
     code, words, remedy = "F02", f"damaged: {text or type(problem).__name__}", _AGAIN

@@ -200,21 +200,16 @@ def attributes_of(log: ExperimentLog) -> dict[str, dict[str, Any]]:
     return groups
 
 
-def log_text(log: ExperimentLog) -> str:
-    """Return everything but the samples as canonical JSON: sorted keys, no blanks, ASCII."""
-    whole: dict[str, Any] = schema.plain(attributes_of(log))
-    whole["robot"] = log.robot_text
-    whole["signals"] = _words_of(log)
-    return json.dumps(whole, sort_keys=True, separators=(",", ":"), allow_nan=False)
-
-
 def _words_of(log: ExperimentLog) -> dict[str, dict[str, str]]:
     return {k: {"units": s.units, "long_name": s.long_name} for k, s in log.signals.items()}
 
 
 def digest_of(log: ExperimentLog) -> str:
     """Return the SHA-256 over the canonical attributes, the robot text and every sample."""
-    head = f"{schema.FORMAT}/{schema.FORMAT_VERSION}\n{log_text(log)}\n"
+    about: dict[str, Any] = schema.plain(attributes_of(log))
+    about |= {"robot": log.robot_text, "signals": _words_of(log)}
+    text = json.dumps(about, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    head = f"{schema.FORMAT}/{schema.FORMAT_VERSION}\n{text}\n"
     total = hashlib.sha256(head.encode())
     for name in sorted(log.signals):
         values = np.ascontiguousarray(log.signals[name].values, dtype="<f8")

@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -251,42 +251,33 @@ def format_robot(robot: RobotDescription) -> str:
     """Return the canonical TOML text of `robot`: `parse_robot` gives back an equal description."""
     import tomli_w
 
-    kinematics: dict[str, object] = {"convention": robot.convention, "tool": list(robot.tool)}
-    if robot.tip_link is not None:
-        kinematics["tip_link"] = robot.tip_link
-    if robot.urdf_text is not None:
-        kinematics["urdf_text"] = robot.urdf_text
-    table: dict[str, object] = {
+    kinematics = {"convention": robot.convention, "tool": robot.tool}
+    kinematics |= _given({"tip_link": robot.tip_link, "urdf_text": robot.urdf_text})
+    joints = [_joint_table(joint, robot.convention) for joint in robot.joints]
+    table = {
         "name": robot.name,
-        "gravity": list(robot.gravity),
+        "gravity": robot.gravity,
         "kinematics": kinematics,
-        "joint": [_joint_table(joint, robot.convention) for joint in robot.joints],
+        "joint": joints,
     }
     if robot.drive is not None:
-        drive: dict[str, object] = {}
-        if robot.drive.transmission is not None:
-            drive["transmission"] = [list(row) for row in robot.drive.transmission]
-        if robot.drive.torque_constant is not None:
-            drive["torque_constant"] = list(robot.drive.torque_constant)
-        table["drive"] = drive
+        table["drive"] = _given(asdict(robot.drive))
     return tomli_w.dumps(table, multiline_strings=True)
 
 
-def _joint_table(joint: Joint, convention: str) -> dict[str, object]:
-    table: dict[str, object] = {"name": joint.name, "type": joint.type}
-    if convention != "urdf":
-        table |= {"a": joint.a, "alpha": joint.alpha, "d": joint.d}
-    if convention != "urdf" or joint.offset:
-        table["offset"] = joint.offset
-    table["position"] = list(joint.position)
+def _given(values: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in values.items() if value is not None}
+
+
+def _joint_table(joint: Joint, convention: str) -> dict[str, Any]:
+    table = _given(asdict(joint))
+    if convention == "urdf":
+        del table["a"], table["alpha"], table["d"]
+        if not joint.offset:
+            del table["offset"]
     for key in ("velocity", "acceleration", "torque"):
-        if math.isfinite(limit := getattr(joint, key)):
-            table[key] = limit
-    if joint.encoder_resolution is not None:
-        table["encoder_resolution"] = joint.encoder_resolution
-    if joint.link is not None:
-        link = joint.link
-        table["link"] = {"mass": link.mass, "com": list(link.com), "inertia": list(link.inertia)}
+        if not math.isfinite(table[key]):
+            del table[key]
     return table
 
 

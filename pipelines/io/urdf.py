@@ -405,9 +405,7 @@ def _word(word: str, key: str, place: str) -> float:
 
 def _limit(element: Element | None, key: str, place: str) -> float:
     """Return a limit: 0 where it is missing, infinite where it is too large to be one."""
-    if element is None or element.get(key) is None:
-        return 0.0
-    value = _word(str(element.get(key)), key, place)
+    value = _word("0" if element is None else element.get(key, "0"), key, place)
     if math.isnan(value):
         raise _wrong(f"{place}: {key} is not a number")
     return value if abs(value) < URDF.number else math.copysign(math.inf, value)
@@ -415,9 +413,7 @@ def _limit(element: Element | None, key: str, place: str) -> float:
 
 def _number(element: Element | None, key: str, place: str) -> float:
     """Return a finite number, 0 where it is missing."""
-    if element is None or element.get(key) is None:
-        return 0.0
-    return _finite(str(element.get(key)), key, place)
+    return _finite("0" if element is None else element.get(key, "0"), key, place)
 
 
 def _finite(word: str, key: str, place: str) -> float:

@@ -20,7 +20,7 @@ from benchmarks.recorded_diagnosis import (
     searched,
 )
 from pipelines.diagnosis.selection import Selection
-from pipelines.io.files import read_unguarded
+from pipelines.io.files import open_log
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnosis.asking import answered
@@ -74,7 +74,7 @@ def test_a_rotor_of_seven_pole_pairs_cogs_seven_times_a_turn(shared: Path) -> No
 @pytest.mark.slow
 def test_a_joint_that_creeps_out_of_its_rest_was_not_touched(shared: Path) -> None:
     """Friction of joint 3 remembers how long it stood: a force at the tip would move the other joints in proportion."""
-    logs = [read_unguarded(path) for path in sorted((shared / "real" / "kr300" / "logs").glob("*.h5"))]
+    logs = [open_log(path).log for path in sorted((shared / "real" / "kr300" / "logs").glob("*.h5"))]
     found = answered(Logs.by_role(logs))
     assert found.verdict == "unknown"
     assert not found.findings

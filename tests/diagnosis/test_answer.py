@@ -14,7 +14,7 @@ from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.diagnosis.result import Diagnosis, Extended, Finding
-from pipelines.io.files import read_unguarded
+from pipelines.io.files import open_log
 from pipelines.model.effects import find_effect
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
@@ -38,7 +38,7 @@ def _arm(shared: Path, number: str, names: str = "*") -> _Arm:
     paths = sorted((shared / f"plant-b/arm-{number}").glob(f"{names}.h5"))
     config = DiagnosisConfig()
     settings = config.recipe()
-    prepared = prepare(Logs.by_role([read_unguarded(path) for path in paths]), settings)
+    prepared = prepare(Logs.by_role([open_log(path).log for path in paths]), settings)
     found = diagnose_prepared(prepared, config)
     told, extended = answer(prepared, found, lambda words: None, _BLOCKS, whole=False)
     limits = limits_of(found.look.later, found.look.selection.end, found.look.baseline)

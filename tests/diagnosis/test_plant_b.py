@@ -12,7 +12,7 @@ import pytest
 
 from pipelines.diagnosis.engine import Diagnosis, diagnose
 from pipelines.errors import InputRejected
-from pipelines.io.files import read_unguarded
+from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
 from tests.healthy import with_signal
 
@@ -22,7 +22,7 @@ _ALONE = ("01", "03", "05", "06", "07", "08", "09", "10", "12", "15", "16")
 
 def _found(shared: Path, arm: str, names: str = "*") -> tuple[Diagnosis, dict[str, Any]]:
     answers = json.loads((shared / "plant-b/answers.json").read_text(encoding="utf-8"))
-    logs = [read_unguarded(path) for path in sorted((shared / f"plant-b/arm-{arm}").glob(f"{names}.h5"))]
+    logs = [open_log(path).log for path in sorted((shared / f"plant-b/arm-{arm}").glob(f"{names}.h5"))]
     return diagnose(logs), answers[f"arm-{arm}"]
 
 
@@ -53,7 +53,7 @@ def test_an_effect_outside_the_library_has_no_name(shared: Path) -> None:
 
 def _healthy_with(shared: Path, more: Callable[[ExperimentLog], np.ndarray]) -> Diagnosis:
     """Diagnose a healthy arm whose logs have more torque [N m] (samples, joints)."""
-    logs = [read_unguarded(path) for path in sorted((shared / "plant-b/arm-14").glob("*.h5"))]
+    logs = [open_log(path).log for path in sorted((shared / "plant-b/arm-14").glob("*.h5"))]
     return diagnose([with_signal(log, tau=log.tau + more(log)) for log in logs])
 
 
@@ -91,7 +91,7 @@ def test_a_verdict_does_not_depend_on_what_was_asked_before(shared: Path) -> Non
 
 
 def test_a_joint_that_the_reference_never_moves_is_refused(shared: Path) -> None:
-    logs = [read_unguarded(path) for path in sorted((shared / "plant-b/arm-14").glob("*.h5"))]
+    logs = [open_log(path).log for path in sorted((shared / "plant-b/arm-14").glob("*.h5"))]
     held = [
         with_signal(log, q=np.column_stack([np.full(log.n_samples, log.q[0, 0]), log.q[:, 1:]]))
         if log.role == "reference"
@@ -105,7 +105,7 @@ def test_a_joint_that_the_reference_never_moves_is_refused(shared: Path) -> None
 @pytest.mark.slow
 def test_no_torque_scale_of_a_recorded_arm_is_named_that_may_be_none(shared: Path) -> None:
     """Its logs fit -6 % at joint 6, with a standard deviation of 5 % that holds what healthy joints have in small."""
-    found = diagnose([read_unguarded(path) for path in sorted((shared / "real/panda/logs").glob("*.h5"))])
+    found = diagnose([open_log(path).log for path in sorted((shared / "real/panda/logs").glob("*.h5"))])
     assert found.decision.verdict == "unknown"
     assert not found.decision.causes
     assert any("torque_gain:6 may be none" in one.stopped for one in found.look.selection.rounds)

@@ -114,7 +114,7 @@ def test_a_file_that_is_written_while_it_is_read_is_not_called_damaged(tmp_path:
             _crash()
         raise InputRejected("F02", "damaged", where="", remedy="copy it again")
 
-    monkeypatch.setattr(files, "_parts", meddled)
+    monkeypatch.setattr(files.hdf5, "read_parts", meddled)
     with pytest.raises(InputRejected, match="RRID-F14"):
         open_log(tmp_path / "a.h5")
 
