@@ -20,9 +20,16 @@ from pipelines.importers.patterns import fill
 from pipelines.importers.raw import RawTable
 from pipelines.importers.recipe import LogSpec, Recipe, TableSpec
 from pipelines.io import schema
-from pipelines.io.files import refuse_unlike_format
 from pipelines.io.limits import FEWEST, recorded_span, shorter_than_period
-from pipelines.io.log import Array, Controller, Derived, ExperimentLog, Signal, created
+from pipelines.io.log import (
+    Array,
+    Controller,
+    Derived,
+    ExperimentLog,
+    Signal,
+    created,
+    refuse_unlike_format,
+)
 from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import format_robot
 from pipelines.io.units import UNITS

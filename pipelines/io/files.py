@@ -24,18 +24,17 @@ from pipelines.errors import (
     NothingMatched,
     UsageError,
     clean,
-    did_you_mean,
 )
 from pipelines.io import hdf5, parquet, schema
 from pipelines.io.log import (
-    PER_JOINT,
     ExperimentLog,
     Signal,
     assembled,
-    attributes_of,
     columns_in,
     digest_of,
     parts_of,
+    refuse_bad_signals,
+    refuse_unlike_format,
     select_joints,
     with_robot,
 )
@@ -267,7 +266,7 @@ def _conform(log: ExperimentLog, assume_units: bool, checks: list[Check]) -> Exp
     Raises:
         InputRejected: it is not what the format says and has no single reading (S01-S20).
     """
-    _refuse_signals(log)
+    refuse_bad_signals(log)
     law = log.controller.law if log.controller else None
     signals = {}
     for name, signal in log.signals.items():
@@ -319,98 +318,6 @@ def _in_si(
         remedy = "store SI units, if results should not list the conversion"
         checks.append(Check.of("S06", "warn", words, where, remedy))
     return replace(signal, values=unit.factor * signal.values + unit.offset, units=wanted)
-
-
-def refuse_unlike_format(log: ExperimentLog) -> None:
-    """Refuse a log that is not exactly what the format says: what a writer may put on disk."""
-    where = log.source or log.name
-    for group, found in attributes_of(log).items():
-        schema.checked(group, found, where if group == "attributes" else f"{where}, {group}")
-    texts = {f"signal {name}, long_name": signal.long_name for name, signal in log.signals.items()}
-    for place, text in (texts | {"robot": log.robot_text}).items():
-        try:
-            bad = b"\0" in text.encode("utf-8")
-        except (UnicodeEncodeError, AttributeError):
-            bad = True
-        if bad:
-            words, remedy = "not a text in UTF-8 without NUL", "write it as plain text"
-            raise InputRejected("S20", words, f"{where}, {place}", remedy)
-    _refuse_signals(log)
-    _refuse_shapes(log, where)
-
-
-def _refuse_signals(log: ExperimentLog) -> None:
-    """Refuse a log that lacks a signal (S01), or has one that it cannot have (S19, S20)."""
-    where = log.source or log.name
-    known = schema.SIGNALS | (schema.DERIVED if log.derived is not None else {})
-    planned = log.origin == "planned"
-    required = ("t", "q_ref") if planned else ("t", "q", "tau")
-    missing = [name for name in required if name not in log.signals]
-    if missing:
-        unknown = set(log.signals) - set(known)
-        hints = "".join(did_you_mean(name, unknown) for name in missing)
-        there = ", ".join(sorted(log.signals)) or "none"
-        words = f"signal {', '.join(missing)} missing{hints}; there are {there}"
-        raise InputRejected("S01", words, where, "rename it, or import the recording with --map")
-    measured = [name for name in ("q", "tau") if name in log.signals]
-    if planned and measured:
-        words = f"a planned log has references only, but there is {', '.join(measured)}"
-        remedy = "remove them, or say where they come from: origin 'measured' or 'simulated'"
-        raise InputRejected("S20", words, where, remedy)
-    for name in log.signals:
-        if name not in known:
-            hint = did_you_mean(name, known)
-            more = " without a /derived group" if name in schema.DERIVED else hint
-            words = f"signal '{name}' is not in format version {schema.FORMAT_VERSION}{more}"
-            raise InputRejected("S19", words, where, "rename or remove it")
-
-
-def _refuse_shapes(log: ExperimentLog, where: str) -> None:
-    """Refuse wrong units (S05), shapes (S02, S11) and attributes that do not go together (S20)."""
-    n, samples = log.n_joints, log.signals["t"].values.shape
-    law = log.controller.law if log.controller else None
-    for name, signal in log.signals.items():
-        place, shape, wanted = f"{where}, signal {name}", signal.values.shape, (*samples, n)
-        if signal.units != (unit := schema.unit_of(name, law)):
-            words = f"units are '{signal.units}', the format wants '{unit}'"
-            raise InputRejected("S05", words, place, "convert the samples to SI")
-        if (name == "t" and len(shape) == 1) or (name != "t" and shape == wanted):
-            continue
-        if name != "t" and shape[:-1] == samples:
-            words = f"{shape[1]} columns for a robot of {n} joints"
-            remedy = "give the description of this robot, or choose the columns with --joints"
-            raise InputRejected("S02", words, place, remedy)
-        words = f"shape {shape}, neither ({samples[0]}, {n}) nor ({n}, {samples[0]})"
-        raise InputRejected("S11", words, place, "store (samples, joints), and t as a vector")
-    moves_one = log.experiment in schema.ONE_JOINT
-    faults = {
-        f"a {log.experiment} log {'needs' if moves_one else 'does not have'} the attribute joint": (
-            (log.joint is not None) != moves_one
-        ),
-        f"joint is {log.joint}, outside 1 … {n}": not 1 <= (log.joint or 1) <= n,
-    }
-    if log.posture is not None:
-        words = f"posture has {log.posture.size} values for {n} joints"
-        faults[words] = log.posture.shape != (n,)
-    if log.controller is not None:
-        for key in PER_JOINT:
-            value = getattr(log.controller, key)
-            shape = (n, 3) if key == "observer_gain" else (n,)
-            if value is not None:
-                faults[f"controller: {key} has shape {value.shape}, not {shape}"] = (
-                    value.shape != shape
-                )
-        limit = log.controller.output_limit
-        faults["controller: output_limit is not a list of limits above 0"] = (
-            limit is not None and not (limit > 0.0).all()
-        )
-        gains = log.controller.kp is not None and log.controller.kd is not None
-        closed = law in ("pd", "pd+feedforward", "computed-torque")
-        faults[f"controller: law {law} without kp and kd"] = closed and not gains
-    for words, wrong in faults.items():
-        if wrong:
-            remedy = "write one value a joint, joints counted from 1; gains, or law 'unknown'"
-            raise InputRejected("S20", words, where, remedy)
 
 
 def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
