@@ -176,10 +176,8 @@ def _reading(path: Path) -> Iterator[int]:
     """Open with a shared lock, which fails at once where a program is writing (F15)."""
     import fcntl
 
-    try:
+    with environment_faults(path):
         handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
-    except OSError as problem:
-        raise fault_of(problem, path) from None
     try:
         fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except BlockingIOError:

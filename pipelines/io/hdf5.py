@@ -11,14 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.sandbox import Answer
-from pipelines.io.schema import FORMAT, FORMAT_VERSION, plain
-
-Array = npt.NDArray[np.float64]
+from pipelines.io.schema import FORMAT, FORMAT_VERSION, Array, plain
 
 _GROUPS = ("controller", "derived")
 _AGAIN = "copy the file again from where it was recorded"
@@ -123,7 +120,7 @@ def read_series(path: Path) -> dict[str, Array]:
 
 @contextlib.contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """Open a file to read; what the library says of it becomes InputRejected."""
+    """Open a file to read; an error of the library becomes InputRejected."""
     import h5py
 
     try:

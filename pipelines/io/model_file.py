@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected, did_you_mean
 from pipelines.io.config import FORMAT as LIMITS
@@ -26,12 +25,11 @@ from pipelines.io.output import write_text
 from pipelines.io.results import encode, json_text
 from pipelines.io.robot import shipped
 from pipelines.io.sandbox import read_small_text, regular_file
-from pipelines.io.schema import DRAFT, Strict, adapter, described
+from pipelines.io.schema import DRAFT, Array, Strict, adapter, described
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-Array = npt.NDArray[np.float64]
 
 FORMAT = "rrrid-model"
 FORMAT_VERSION = 1  # numerics

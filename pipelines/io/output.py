@@ -68,11 +68,8 @@ def fault_of(problem: OSError, path: Path) -> RrridError:
 
 def hash_file(path: Path) -> str:
     """Return the SHA-256 of the bytes of `path`, in hexadecimal."""
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError as problem:
-        raise fault_of(problem, path) from None
+    with environment_faults(path), path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def write_file(path: Path, fill: Callable[[Path], object]) -> None:

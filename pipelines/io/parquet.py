@@ -10,19 +10,17 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected
 from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.hdf5 import refuse_oversize, refuse_version
 from pipelines.io.output import write_file
 from pipelines.io.sandbox import Answer
-from pipelines.io.schema import FORMAT, FORMAT_VERSION, plain
+from pipelines.io.schema import FORMAT, FORMAT_VERSION, Array, plain
 
 # its other allocators reserve more address space than a guarded child may use
 os.environ.setdefault("ARROW_DEFAULT_MEMORY_POOL", "system")
 
-Array = npt.NDArray[np.float64]
 
 _KEY = b"rrrid"
 _COLUMN = re.compile(r"(?P<signal>[a-z_]+?)(?:_(?P<joint>[1-9]\d{0,2}))?")

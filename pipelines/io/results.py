@@ -25,16 +25,14 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.hdf5 import read_series
 from pipelines.io.output import hash_file, listed_outputs
 from pipelines.io.sandbox import Answer, guarded, read_small_text, regular_file
-from pipelines.io.schema import DRAFT
+from pipelines.io.schema import DRAFT, Array
 
-Array = npt.NDArray[np.float64]
 T = TypeVar("T")
 
 NOT_STORED: Mapping[str, object] = {"stored": False}

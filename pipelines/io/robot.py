@@ -16,17 +16,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
 from pipelines.io.config import URDF
 from pipelines.io.sandbox import TomlError, parse_toml
-from pipelines.io.schema import Strict, adapter, described
+from pipelines.io.schema import Array, Strict, adapter, described
 
 if TYPE_CHECKING:
     from pydantic_core import ErrorDetails
 
-Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
@@ -158,8 +156,8 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     except ValidationError as problem:
         code, words = _fault_in_words(problem.errors(include_url=False)[0])
         raise fail(code, f"robot description, {words}", where, _CORRECT) from None
-    except _Wrong as wrong:
-        raise fail("C02", f"robot description, {wrong.words}", where, wrong.remedy) from None
+    except UsageError as problem:
+        raise fail("C02", problem.message, where, problem.remedy) from None
     own = found.kinematics
     urdf_text = own.urdf_text if own.convention == "urdf" else None
     return RobotDescription(
@@ -174,12 +172,8 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     )
 
 
-class _Wrong(Exception):
-    """A fault that pydantic does not find."""
-
-    def __init__(self, words: str, remedy: str = _CORRECT) -> None:
-        super().__init__(words)
-        self.words, self.remedy = words, remedy
+def _wrong(words: str, remedy: str = _CORRECT) -> UsageError:
+    return UsageError("C02", f"robot description, {words}", remedy=remedy)
 
 
 def _refuse_incomplete(table: Mapping[str, Any]) -> None:
@@ -191,9 +185,9 @@ def _refuse_incomplete(table: Mapping[str, Any]) -> None:
     if "urdf" in kinematics:
         words = "kinematics.urdf: names a file, which a text on its own cannot reach"
         remedy = "load the description from its file, so that the URDF can be embedded"
-        raise _Wrong(words, remedy)
+        raise _wrong(words, remedy)
     if urdf and "urdf_text" not in kinematics:
-        raise _Wrong("kinematics.urdf_text: is missing with convention 'urdf'")
+        raise _wrong("kinematics.urdf_text: is missing with convention 'urdf'")
     wanted = ("name", "type") if urdf else ("name", "type", *_GEOMETRY)
     for index, joint in enumerate(joints, 1):
         missing = [key for key in wanted if isinstance(joint, dict) and key not in joint]
@@ -202,7 +196,7 @@ def _refuse_incomplete(table: Mapping[str, Any]) -> None:
             words += "is missing" if len(missing) == 1 else "are missing"
             example = {"name": '"elbow"', "type": '"revolute"', "a": "0.4"}
             least = ", ".join(f"{key} = {example.get(key, '0.0')}" for key in wanted)
-            raise _Wrong(words, f"write at least: [[joint]] {least}, a line each")
+            raise _wrong(words, f"write at least: [[joint]] {least}, a line each")
 
 
 def _refuse_impossible(table: _Table) -> None:
@@ -211,23 +205,23 @@ def _refuse_impossible(table: _Table) -> None:
         place = f"joint[{index}]"
         if abs(joint.alpha) > 2 * math.pi:
             words = f"{place}.alpha: is {joint.alpha:g} rad: looks like degrees"
-            raise _Wrong(words, "write it in rad")
+            raise _wrong(words, "write it in rad")
         for key in ("a", "d"):
             if abs(getattr(joint, key)) > URDF.longest:
                 words = f"{place}.{key}: is {getattr(joint, key):g} m: looks like mm"
-                raise _Wrong(words, "write it in m")
+                raise _wrong(words, "write it in m")
         low, high = joint.position
         if not low < high:
             words = f"{place}.position: its lower end {low} is not below its upper end {high}"
-            raise _Wrong(words)
+            raise _wrong(words)
     n = len(table.joint)
     if table.drive is not None:
         rows = table.drive.transmission or ((0.0,) * n,) * n
         constants = table.drive.torque_constant or (0.0,) * n
         if len(rows) != n or any(len(row) != n for row in rows):
-            raise _Wrong(f"drive.transmission: must hold {n} rows of {n} numbers")
+            raise _wrong(f"drive.transmission: must hold {n} rows of {n} numbers")
         if len(constants) != n:
-            raise _Wrong(f"drive.torque_constant: must be a list of {n} numbers")
+            raise _wrong(f"drive.torque_constant: must be a list of {n} numbers")
 
 
 def _fault_in_words(fault: ErrorDetails) -> tuple[str, str]:

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from pipelines.errors import EnvironmentFault, InputRejected, RrridError, UsageError
 from pipelines.io.config import SANDBOX, TEXT
-from pipelines.io.output import fault_of
+from pipelines.io.output import environment_faults, fault_of
 
 if TYPE_CHECKING:  # --help needs no NumPy
     import numpy as np
@@ -99,12 +99,10 @@ def read_small_text(path: Path, limit: int = TEXT.size, *, what: str = "a TOML f
         InputRejected: F12, not a regular file. EnvironmentFault: F13, no permission.
     """
     regular_file(path, what=what, empty=True)
-    try:
-        # the path may have become a pipe meanwhile, and opening one would wait for ever
-        with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:
-            data = file.read(limit + 1)
-    except OSError as problem:
-        raise fault_of(problem, path) from None
+    # the path may have become a pipe meanwhile, and opening one would wait for ever
+    flags = os.O_RDONLY | os.O_NONBLOCK
+    with environment_faults(path), os.fdopen(os.open(path, flags), "rb") as file:
+        data = file.read(limit + 1)
     if len(data) > limit:
         words = f"longer than the {limit} bytes that such a text may have"
         raise UsageError("C02", words, path, f"give {what}")

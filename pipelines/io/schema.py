@@ -15,12 +15,15 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, ClassVar, Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 
 from pipelines.errors import InputRejected, did_you_mean
 
 if TYPE_CHECKING:
     from pydantic import TypeAdapter
     from pydantic_core import ErrorDetails
+
+Array = npt.NDArray[np.float64]
 
 FORMAT = "rrrid-log"
 FORMAT_VERSION = 1  # numerics

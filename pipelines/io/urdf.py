@@ -13,13 +13,11 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.errors import Check, InputRejected, UsageError, did_you_mean
 from pipelines.io.config import URDF
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription, inconsistency
-
-Array = npt.NDArray[np.float64]
+from pipelines.io.schema import Array
 
 _MOVING = ("revolute", "continuous", "prismatic")
 _TYPES = (*_MOVING, "fixed", "planar", "floating")
