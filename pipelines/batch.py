@@ -80,7 +80,8 @@ def module_of(stage: str) -> str:
 def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tuple[Check, ...]]:
     """Return the items below `root`, sorted by name, and what was passed over.
 
-    Every folder that holds logs is an item; what is a log, `find_logs` says.
+    Every folder that holds logs is an item; what is a log, `find_logs` says. So is a folder that
+    cannot be listed: it fails alone.
 
     Args:
         each_log: every log is an item.
@@ -94,8 +95,9 @@ def find_items(root: Path, each_log: bool = False) -> tuple[tuple[Item, ...], tu
         regular_file(root)
         words = "is a log, not a folder of folders"
         raise UsageError("C02", words, where=root, remedy="run the stage on it alone")
-    logs, checks = find_logs([root])
-    folders: dict[Path, list[Path]] = {}
+    unreadable: list[Path] = []
+    logs, checks = find_logs([root], unreadable)
+    folders: dict[Path, list[Path]] = {folder: [] for folder in unreadable}
     for log in logs:
         folders.setdefault(log if each_log else log.parent, []).append(log)
     items = []

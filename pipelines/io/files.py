@@ -337,15 +337,21 @@ def expanded(inputs: Iterable[Path]) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(found))
 
 
-def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
+def find_logs(
+    inputs: Iterable[Path], unreadable: list[Path] | None = None
+) -> tuple[tuple[Path, ...], tuple[Check, ...]]:
     """Return the logs named by `inputs`: files as they are, folders searched below.
 
     Hidden files, and folders that rrrid itself wrote, are passed over, unless such a folder is
     named: then its logs are meant. A link to a log is that log; links to folders, and those that
     lead nowhere, are passed over with a warning.
 
+    Args:
+        unreadable: takes the folders that cannot be listed; None: the first one is an error.
+
     Raises:
         UsageError: an input does not exist.
+        EnvironmentFault: F13, a folder cannot be listed.
         NothingMatched: there is no log at all.
     """
     found: list[Path] = []
@@ -358,9 +364,9 @@ def find_logs(inputs: Iterable[Path]) -> tuple[tuple[Path, ...], tuple[Check, ..
             found.append(path)
             continue
         own = (path / PROVENANCE).is_file()
-        found += _below(path / "logs" if own else path, checks)
+        found += _below(path / "logs" if own else path, checks, unreadable)
         found += [plan for plan in (path / name for name in PLANS) if own and plan.is_file()]
-    if not found:
+    if not found and not unreadable:
         raise _nothing_there(", ".join(map(str, inputs)), checks, folders)
     return tuple(dict.fromkeys(found)), tuple(checks)
 
@@ -401,7 +407,7 @@ def _within(folders: Sequence[Path], pattern: str) -> list[Path]:
     return found
 
 
-def _below(folder: Path, checks: list[Check]) -> list[Path]:
+def _below(folder: Path, checks: list[Check], unreadable: list[Path] | None) -> list[Path]:
     """Return the logs below `folder`, in order; X11 for links that are passed over."""
     found: list[Path] = []
     try:
@@ -418,11 +424,14 @@ def _below(folder: Path, checks: list[Check]) -> list[Path]:
                 remedy = "remove it, or let it lead to a log"
                 checks.append(Check.of("X11", "warn", words, entry, remedy))
             elif is_folder:
-                found += [] if (entry / PROVENANCE).is_file() else _below(entry, checks)
+                own = (entry / PROVENANCE).is_file()
+                found += [] if own else _below(entry, checks, unreadable)
             elif is_log and entry.exists():
                 found.append(entry)
     except FileNotFoundError:
         pass  # removed meanwhile
     except OSError as problem:
-        raise fault_of(problem, folder) from None
+        if unreadable is None:
+            raise fault_of(problem, folder) from None
+        unreadable.append(folder)
     return found

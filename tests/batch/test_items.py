@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -75,3 +76,20 @@ def test_what_is_no_shard_is_refused(text: str) -> None:
     assert refused.value.code == "RRID-C02"
     assert read_shard("2/4") == (2, 4)
     assert read_shard(None) == (1, 1)
+
+
+def test_a_folder_that_cannot_be_listed_is_an_item_of_its_own(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It fails alone (F13), and the logs beside it are not given with it."""
+    _touch(tmp_path, "a/1.h5", "a/shut/2.h5", "b/3.h5")
+    listed = Path.iterdir
+
+    def iterdir(folder: Path) -> Iterator[Path]:
+        if folder.name == "shut":
+            raise PermissionError(13, "Permission denied", str(folder))
+        return listed(folder)
+
+    monkeypatch.setattr(Path, "iterdir", iterdir)
+    items, _ = find_items(tmp_path)
+    given = {item.name: [path.relative_to(tmp_path).as_posix() for path in item.paths] for item in items}
+    assert given == {"a": ["a/1.h5"], "a/shut": ["a/shut"], "b": ["b"]}
