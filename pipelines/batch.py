@@ -17,6 +17,7 @@ import json
 import os
 import shutil
 import signal
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
@@ -187,6 +188,7 @@ class _Batch:
 
     def __init__(self, plan: Plan, heard: list[int]) -> None:
         self.plan, self.heard, self.out = plan, heard, plan.out
+        self.started = time.time()
         self.key = _key(plan)
         self.records: dict[str, Record] = {}
         self.divided: dict[str, tuple[Item, ...]] = {}  # sessions of the items that hold several
@@ -268,7 +270,8 @@ class _Batch:
     def _take(self, item: Item, record: Record) -> None:
         """Remember the outcome of an item; one without a result leaves no older one behind."""
         error = record.item.error
-        if error is not None and error.where.startswith(tilde(f"{self.out}/")):
+        is_ours = error is not None and error.where.startswith(tilde(f"{self.out}/"))
+        if error is not None and is_ours and record.item.exit == EnvironmentFault.exit_code:
             code, remedy = error.code.removeprefix("RRID-"), "free it, and go on with --resume"
             self.fault = EnvironmentFault(code, error.message, where=error.where, remedy=remedy)
             return
@@ -365,7 +368,11 @@ class _Batch:
             "key": self.key,
             "kept": self.kept,
             "options": _options(plan) | options,
+            "settings": encode(plan.settings)[0],
+            "libraries": libraries(*_LIBRARIES),
             "notices": [check.as_dict() for check in self.notices],
+            "started": time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime(self.started)),
+            "duration": time.time() - self.started,
             "inputs": {name: sha for record in records for name, sha in record.inputs.items()},
             "outputs": {path.relative_to(self.out).as_posix(): hash_file(path) for path in files},
             "items": {record.slug: record.provenance for record in records if record.provenance},

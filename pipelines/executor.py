@@ -129,6 +129,7 @@ def attempt(plan: Plan, item: Item) -> Record:
     """Run the stage on one item; an error becomes its record."""
     out = plan.out / "items" / item.slug
     request = replace(plan.request, paths=item.paths, out=out, session=item.session, check=True)
+    request = replace(request, force=True)  # all below `out` is the batch's own
     try:
         return _record(plan, item, run_stage(load_stage(plan.module), request, plan.settings))
     except SeveralSessions as problem:
@@ -202,7 +203,8 @@ def run_items(
     while waiting and not stopped():
         running: dict[Future[Record], Item] = {}
         try:
-            with pool(plan) as workers:
+            most = sum(len(item.logs) for item in waiting)  # as many as there are sessions, at most
+            with pool(plan, max(1, min(plan.jobs, most))) as workers:
                 for item, problem, record in _results(workers, waiting, running, stopped):
                     deaths = 0
                     yield item, record or failed(plan, item, _fault(problem, plan))
@@ -242,7 +244,7 @@ def _results(
 
 def _fault(problem: Any, plan: Plan) -> Any:
     """Return the fault behind an exception of pebble or Dask (P04, P05)."""
-    if isinstance(problem, TimeoutError):
+    if isinstance(problem, TimeoutError) and plan.timeout is not None:
         words = f"timeout: not done within {plan.timeout:g} s"
         return EnvironmentFault("P05", words, remedy="raise --timeout, or look at the item alone")
     if type(problem).__name__ == "ProcessExpired":
@@ -278,11 +280,11 @@ class _Context(SpawnContext):
 
 
 @contextlib.contextmanager
-def _local(plan: Plan) -> Iterator[Workers]:
+def _local(plan: Plan, jobs: int) -> Iterator[Workers]:
     """Let processes of this machine do the items."""
     from pebble import ProcessPool
 
-    pool: Any = ProcessPool(plan.jobs, initializer=_begin, initargs=(plan,), context=_Context())
+    pool: Any = ProcessPool(jobs, initializer=_begin, initargs=(plan,), context=_Context())
 
     def submit(item: Item) -> Future[Record]:
         before = signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)  # workers do not hear Ctrl-C
@@ -297,7 +299,7 @@ def _local(plan: Plan) -> Iterator[Workers]:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     try:
-        yield Workers(submit, 2 * plan.jobs)
+        yield Workers(submit, 2 * jobs)
     finally:
         pool.stop()
         pool.join()
@@ -332,8 +334,9 @@ def _gone() -> EnvironmentFault:
 
 
 @contextlib.contextmanager
-def _cluster(plan: Plan, seconds: float = 10.0) -> Iterator[Workers]:
+def _cluster(plan: Plan, jobs: int, seconds: float = 10.0) -> Iterator[Workers]:
     """Let a Dask cluster do the items; those of a worker that dies are done by the others."""
+    del jobs  # the scheduler has its own workers
     scheme, _, place = plan.backend.partition("://")
     if scheme != "dask" or not place:
         words = f"'{plan.backend}' is no cluster"
@@ -406,5 +409,6 @@ def _end_children(out: str) -> None:
     import psutil
 
     for child in psutil.Process().children():
-        if child.cmdline()[-1:] == [out]:
-            child.kill()
+        with contextlib.suppress(psutil.NoSuchProcess):
+            if child.cmdline()[-1:] == [out]:
+                child.kill()

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import os
 import shutil
 from importlib import import_module
 from pathlib import Path, PurePath
@@ -23,6 +24,8 @@ from pipelines.io.output import (
     keep_apart,
     listed_outputs,
     refuse_foreign,
+    remove_folder,
+    staging_folder,
     tilde,
     write_text,
     written_by,
@@ -88,10 +91,18 @@ def rerender(folder: Path, out: Path | None = None, force: bool = False) -> Repo
 
 
 def _draw(report: Report, folder: Path, footer: dict[str, str]) -> None:
+    """Draw beside the folder, and move what is drawn into it when all of it is there."""
     with environment_faults(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        shutil.rmtree(folder / "figures", ignore_errors=True)
-    write_report(report, folder, footer)
+        staging = staging_folder(folder)
+    try:
+        write_report(report, staging, footer)
+        with environment_faults(folder):
+            shutil.rmtree(folder / "figures", ignore_errors=True)
+            for path in sorted(staging.iterdir()):
+                os.replace(path, folder / path.name)
+    finally:
+        remove_folder(staging)
 
 
 def _drawn(folder: Path) -> dict[str, str]:

@@ -60,7 +60,7 @@ def examine(with_self_test: bool = True) -> Iterator[Finding]:
     else:
         yield Finding("BLAS", "ok", "one thread")
     usable = f"{processors()} of {os.cpu_count()} cores may be used"
-    yield Finding("processor", "ok", f"{usable}; a run takes two at most, rrrid batch all")
+    yield Finding("processor", "ok", f"{usable}; rrrid batch takes them all")
     remedy = "set TMPDIR to a folder that can be written"
     yield _folder("temporary folder", lambda: Path(tempfile.gettempdir()), "bad", remedy)
     remedy = "rrrid does not need it; matplotlib keeps its cache in the temporary folder"

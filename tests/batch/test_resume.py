@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import shutil
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -66,7 +65,7 @@ def test_a_corrupted_result_is_done_again(lay: Lay) -> None:
     stored = out / "items/a/words.txt"
     stored.write_bytes(b"F" + stored.read_bytes()[1:])
     (out / "items/b/words.txt").unlink()
-    outcome = obey(root, request=replace(QUIET, force=True), resume=True)
+    outcome = obey(root, resume=True)
     assert contents(out) == whole
     assert [(check.code, check.level, check.where) for check in outcome.checks] == [
         ("RRID-P10", "warn", "a"), ("RRID-P10", "warn", "b")]

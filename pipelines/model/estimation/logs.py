@@ -82,7 +82,7 @@ def motions_of(logs: Sequence[ExperimentLog], how: Reconstruction) -> Motions:
 
 
 def of_each(logs: Sequence[ExperimentLog], work: Callable[[int], Reconstructed]) -> Motions:
-    """Each log with the motion that `work` makes for its place, by two processes, the longest first; raises what comes first."""
+    """Each log with the motion that `work` makes for its place, in order; raises what comes first."""
     def moved(place: int) -> Reconstructed | UsageError | InputRejected:
         try:
             return work(place)
