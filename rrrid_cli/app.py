@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from pipelines import __version__
-from pipelines.errors import EnvironmentFault, UsageError, did_you_mean, escaped
+from pipelines.errors import EnvironmentFault, RrridError, UsageError, did_you_mean, escaped
 from pipelines.io.option import option
 from rrrid_cli import console
 from rrrid_cli.options import (
@@ -50,6 +50,7 @@ IDLE |= {"demo": ("robot", "assume_units")}
 IDLE |= {"compare": ("robot", "assume_units", "format", "strict")}
 # Shared options of commands that do not take them all.
 SHARED = {"report": ("out", "force", "quiet", "debug"), "schema": (), "doctor": ("json", "debug")}
+_MOST_ERRORS = 12  # numerics: lines of a batch; its report lists all
 OUT = {"demo": "demo", "batch": "runs/several/ROOT/batch", "report": "DIR"}
 
 
@@ -320,6 +321,13 @@ def _batch(name: str, given: Mapping[str, Any]) -> int:
         plan = Plan(module, settings, request, **_fields_of(Plan, values))
         outcome = run_batch(plan, progress)
     console.print_outcome(outcome, common)
+    failing = [(item.name, item.error) for item in outcome.result.items if item.error is not None]
+    for name, one in failing[:_MOST_ERRORS]:
+        code, where = (
+            one.code.removeprefix("RRID-"),
+            f"{name}: {one.where}".removesuffix(f": {name}"),
+        )
+        console.print_error(RrridError(code, one.message, where, one.remedy))
     return outcome.exit_code
 
 

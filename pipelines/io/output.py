@@ -141,7 +141,9 @@ def replace_folder(staging: Path, target: Path) -> None:
     with environment_faults(target):
         for path in (*staging.rglob("*"), staging):
             _sync(path)
-        old = staging.with_name(f"{staging.name}{_OLD}{target.name}")
+        name = f"{staging.name}{_OLD}{target.name}"
+        fits = len(os.fsencode(name)) <= os.pathconf(target.parent, "PC_NAME_MAX")
+        old = staging.with_name(name if fits else f"{staging.name}-")  # that is not brought back
         if target.exists():
             os.replace(target, old)
         try:
@@ -178,7 +180,8 @@ def sweep(folder: Path) -> None:
             continue
         target = folder / left.name.partition(_OLD)[2]
         if target != folder and not target.exists():
-            os.replace(left, target)
+            with contextlib.suppress(FileNotFoundError):  # another process has done so
+                os.replace(left, target)
         elif left.is_dir():
             shutil.rmtree(left, ignore_errors=True)
         else:

@@ -297,8 +297,10 @@ def _received(
         raise RuntimeError(f"reading {path}: {reply['internal']}")
     if "error" in reply:
         raise _error(reply["error"], path)
-    if sum(8 * math.prod(shape) for shape in reply["shapes"].values()) > memory:
-        raise ValueError("more samples than memory")
+    shapes = reply["shapes"].values()
+    negative = any(size < 0 for shape in shapes for size in shape)
+    if negative or sum(8 * math.prod(shape) for shape in shapes) > memory:
+        raise ValueError("more samples than memory, or fewer than none")
     arrays = {}
     for name, shape in reply["shapes"].items():
         values = np.empty(shape)

@@ -53,7 +53,8 @@ def torque_scale(e: Evidence) -> TorqueScale | None:
     found = sorted((*_least(rows, place, len(told)), joint) for place, joint in enumerate(told))
     after, factor, joint = found[0]
     apart = max(factor, 1.0 / factor)
-    if not _LEAST < apart < _MOST or after > _BETTER * before:
+    inside = _LEAST < apart < _MOST * (1.0 - 1e-9)  # the end of the search is no finding
+    if not inside or after > _BETTER * before:
         return None
     others = tuple((other, by) for left, by, other in found[1:] if left < _AS_GOOD * after)
     return TorqueScale(joint, factor, before, after, others)
