@@ -41,8 +41,14 @@ def economise() -> None:
 def entry() -> NoReturn:
     """Run the program: an error becomes one line and an exit code, with --debug a traceback."""
     economise()
-    signal.signal(signal.SIGTERM, _interrupt)
-    signal.signal(signal.SIGINT, _interrupt)
+    heard: list[int] = []
+
+    def interrupt(number: int, _frame: FrameType | None) -> NoReturn:
+        heard.append(number)
+        raise Interrupted(number)
+
+    signal.signal(signal.SIGTERM, interrupt)
+    signal.signal(signal.SIGINT, interrupt)
     sys.unraisablehook = _raise_again
     words = sys.argv[1:]
     _prepare_streams("--json" in words)
@@ -53,8 +59,10 @@ def entry() -> NoReturn:
             sys.stdout, sys.stderr
         )  # the reader of a pipe has left: without a second complaint at exit
         code = 0
-    except (Exception, Interrupted) as problem:
+    except (Exception, Interrupted) as caught:
         _ignore_signals()
+        # a library in whose call the signal came may have made another error of it
+        problem = Interrupted(heard[0]) if heard else caught
         if "--debug" in words:
             raise
         error = _as_error(problem, words)
@@ -202,10 +210,6 @@ def _discard(*streams: TextIO) -> None:
     """Discard further output: the reader of the pipe has left, or the disk is full."""
     for stream in streams:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def _interrupt(number: int, _frame: FrameType | None) -> NoReturn:
-    raise Interrupted(number)
 
 
 def _ignore_signals() -> None:

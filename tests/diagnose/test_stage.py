@@ -172,7 +172,7 @@ def test_settings_that_make_no_sense_are_refused(settings: dict[str, object], wo
 
 
 def test_a_run_refuses_them_before_its_first_stage(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run, "_stages", lambda *given: pytest.fail("was not refused at once"))
+    monkeypatch.setattr(run, "_computed", lambda *given: pytest.fail("was not refused at once"))
     folder = written(tmp_path / "logs", session())
     settings = run.Settings(stages={"diagnose": diagnose.Settings(min_speed=(-1.0,))})
     with pytest.raises(UsageError, match="--min-speed"):

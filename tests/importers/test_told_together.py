@@ -52,7 +52,7 @@ def test_each_failure_is_one_line_and_in_the_json(tmp_path: Path) -> None:
     write(tmp_path, text(good()).replace("q_2", "x", 1), "a.csv")
     write(tmp_path, text(good()).replace("q_3", "y", 1), "b.csv")
     write(tmp_path, RECIPE, "recipe.toml")
-    command = [sys.executable, "-m", "rrrid_cli.main", "import", "recipe.toml", "--out", str(tmp_path.parent / "out"), "--json"]
+    command = [sys.executable, "-m", "rrrid_cli.main", "import", "recipe.toml", "--out", str(tmp_path.with_name(f"{tmp_path.name}-out")), "--json"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False,
                           env={"PYTHONPATH": str(Path(__file__).parents[2]), "PATH": ""})
     assert done.returncode == 3
