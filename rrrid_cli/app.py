@@ -56,7 +56,7 @@ OUT = {"demo": "demo", "batch": "runs/several/ROOT/batch", "report": "DIR"}
 
 @dataclass(frozen=True)
 class Inputs:
-    """What commands work on."""
+    """Hold the logs, results and names that a command takes."""
 
     logs: tuple[Path, ...] = option((), "Logs, or folders of logs.", "LOGS")
     a: Path = option(Path(), "A command's folder, result.json or model.json.", "A")

@@ -143,7 +143,7 @@ def test_compute_opens_no_file_and_prints_nothing(module: str) -> None:
 
 
 def _outlined(figure: Figure, name: str) -> tuple[str, bytes]:
-    """What a figure shows, as numbers: to put it on paper costs fifty times as much, and tests/stored does that."""
+    """What a figure shows, as numbers: to put it on paper costs fifty times as much, and tests/rerender does that."""
     with figure_style(name):
         figure.draw(drawing := Drawing(figsize=figure.size))
         shown = [part for axes in drawing.axes for part in (*axes.lines, *axes.patches, *axes.collections)]

@@ -185,7 +185,6 @@ def test_friction_that_differs_by_direction_is_no_offset() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="without motion that comes again it is taken for noise")
 def test_a_drive_that_hunts_is_unknown() -> None:
     """A line of 5.3 Hz, whose rate is pulled by a tenth to and fro, follows no signal of the arm."""
 
@@ -200,7 +199,6 @@ def test_a_drive_that_hunts_is_unknown() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="a form of friction that all joints have is taken as usual")
 def test_every_joint_of_three_sigmoids_has_its_hump(samples: Path) -> None:
     """By Coulomb and viscous friction, which have no hump at low speed."""
     names = ("excitation-1", "free-1", "excitation-2")
@@ -247,7 +245,6 @@ def test_a_torque_that_follows_nothing_has_no_name(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="unknown: the ripple does not pay on blocks of this wander")
 def test_a_ripple_is_found_beside_it() -> None:
     """Of the same power: one of seven waves a turn, 0.014 N m, whose square is twice that of the wander."""
     found = diagnosed(wandering(1, 0.01, 0.014), wandering(2, 0.01, 0.014), cutoff_hz=40.0)
