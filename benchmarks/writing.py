@@ -29,8 +29,8 @@ from benchmarks.regressor import rrr
 from pipelines.io.log import Array
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.rrr_kinematics import BRANCHES, Geometry, inverse, rrr_geometry, tip
-from pipelines.model.writing.inverse import ClosedForm, Numerical
-from pipelines.model.writing.reference import writing_task
+from pipelines.writing.inverse_kinematics import ClosedForm, Numerical
+from pipelines.writing.task import writing_task
 
 _TOOLBOX_SAMPLES = 1000  # it takes about as long for one sample as the closed form for all
 

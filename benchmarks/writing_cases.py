@@ -30,9 +30,9 @@ from pipelines.model.arm import Arm
 from pipelines.model.estimation.in_folder import fitted_in_folder
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.writing.cases import tip_std
-from pipelines.model.writing.first_validation import first_validation
-from pipelines.model.writing.reference import writing_task
+from pipelines.writing.control_cases import tip_std
+from pipelines.writing.task import writing_task
+from pipelines.writing.validation import torque_validation
 from sample_logs.bench_session import arm_of, controller_model
 
 PAPER_MM = (1.0586183, 1.7499008, 4.5700627)  # Kostić et al. 2004, Table IV, case 1
@@ -78,7 +78,7 @@ def identify(
 def missed(log: ExperimentLog, arm: Arm) -> Array:
     """Relative torque error of `arm` on `log`, joint by joint."""
     motion = reconstruct(log, Reconstruction())
-    return first_validation(log, motion, arm, torques(arm, log, motion), None, False).relative_error
+    return torque_validation(log, motion, arm, torques(arm, log, motion), False).relative_error
 
 
 def campaign(

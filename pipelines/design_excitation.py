@@ -42,10 +42,10 @@ from pipelines.model.excitation.rehearse import rehearsed
 from pipelines.model.excitation.result import CostOfLimit, Result
 from pipelines.model.excitation.task import Task, Wishes, plan_task
 from pipelines.model.named_cause import wanted_cause
-from pipelines.model.writing.planned import planned_log
 from pipelines.report.excitation_report import excitation_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug
+from pipelines.writing.task import planned_log
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 

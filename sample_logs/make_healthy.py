@@ -13,7 +13,7 @@ from bench.experiments import Experiment
 from bench.machine import Machine
 from bench.motions import Reference
 from pipelines.io.log import ExperimentLog
-from pipelines.model.writing.reference import writing_task
+from pipelines.writing.task import writing_task
 from sample_logs.bench_session import controllers_model, machine, recorded
 
 RECORDED = datetime(2026, 3, 2, 9, 0)  # UTC

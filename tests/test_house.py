@@ -17,8 +17,7 @@ CONSTANTS = {
     "pipelines/design_excitation.py": 1,
     "pipelines/diagnose.py": 1, "pipelines/diagnosis": 11, "pipelines/estimate_bps.py": 1,
     "pipelines/estimation": 30, "pipelines/fit": 69,
-    "pipelines/model": 458, "pipelines/report": 64, "pipelines/signal": 41,
-    "pipelines/validate_writing.py": 1,
+    "pipelines/model": 421, "pipelines/report": 63, "pipelines/signal": 41,
 }
 
 

@@ -22,6 +22,7 @@ LAYERS = {
     "pipelines.model.effects": 6,
     "pipelines.model": 7,
     "pipelines.model.rows": 8,
+    "pipelines.writing": 9, "pipelines.model.excitation": 10,
     "pipelines.estimation": 9,  # what is checked before any model is fitted
     "pipelines.model.estimation.result": 10, "pipelines.diagnosis": 11,
     "pipelines.report": 12,

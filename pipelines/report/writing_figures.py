@@ -8,9 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.model.simulation.course import Course as SimulatedCourse
-from pipelines.model.writing.cases import Case
-from pipelines.model.writing.design import Designed
-from pipelines.model.writing.first_validation import Course, FirstValidation
 from pipelines.report import style
 from pipelines.report.figures import (
     Array,
@@ -22,12 +19,14 @@ from pipelines.report.figures import (
     legend_above,
     one_figure,
     rows_figure,
-    true_spans,
 )
 from pipelines.report.report import Figure
 from pipelines.report.sentences import sentence
 from pipelines.report.style import format_unit, printable
 from pipelines.report.words import each, joined
+from pipelines.writing.control_cases import Case
+from pipelines.writing.task import Designed
+from pipelines.writing.validation import Course, TorqueValidation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 
 _AXES = ("x", "y", "z")
 _SEGMENTS = 600  # of a coloured path
-_FAINT = 0.6  # [pt] of a line on the way between strokes
 _WIDTH = 5.2  # [inch] of a path in a figure
 _LEFT = (1, 2, 3, 4)  # Fig. 16 has the first four cases on one side
 _PARTS = {
@@ -43,7 +41,7 @@ _PARTS = {
     "coriolis": style.PURPLE,
     "gravity": style.ORANGE,
     "friction": style.GREEN,
-    "left": style.VERMILLION,
+    "residual": style.VERMILLION,
 }
 
 
@@ -58,7 +56,7 @@ def plane(tip: Array) -> tuple[int, int]:
     return int(first), int(second)
 
 
-def split_figure(found: FirstValidation, course: Course, joints: Sequence[str]) -> Figure:
+def split_figure(found: TorqueValidation, course: Course, joints: Sequence[str]) -> Figure:
     """Inertial, Coriolis, gravity and friction torque of the model, and the residual."""
 
     def draw_row(axis: Axes, j: int) -> None:
@@ -76,32 +74,26 @@ def split_figure(found: FirstValidation, course: Course, joints: Sequence[str]) 
     )
 
 
-def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | None:
+def error_map_figure(found: TorqueValidation, joints: Sequence[str]) -> Figure | None:
     """The path of the tip, darker where the model leaves more torque, one picture a joint."""
     course = found.course
-    if course is None or found.marks == "time":
+    if course is None or found.split == "time":
         return None
     a, b = plane(course.tip)
     every = max(1, -(-len(course.t) // _SEGMENTS))
-    old = course.missed is None  # a result of an earlier version
-    missed = course.left if course.missed is None else course.missed
-    filtered = (
-        "" if old or found.low_pass_hz is None else ", after the low-pass as in the text above"
-    )
+    residual = course.low_passed
+    filtered = "" if found.low_pass_hz is None else ", after the low-pass as in the text above"
     points = course.tip[::every, [a, b]]
-    drawn = np.ones(len(course.tip)) if course.drawn is None else course.drawn
-    down = drawn[::every][: len(points) - 1] > 0.0
 
     def draw(drawing: Drawing) -> None:
         from matplotlib.collections import LineCollection
 
         axes = joint_axes(drawing, len(joints))
         lines = np.stack([points[:-1], points[1:]], axis=1)
-        widths = np.where(down, 2.0, _FAINT).tolist()
         for j, axis in enumerate(axes):
-            size = _largest_of(np.nan_to_num(np.abs(missed[:, j])), every)
+            size = _largest_of(np.nan_to_num(np.abs(residual[:, j])), every)
             top = float(size.max()) or 1.0  # the largest sample that the text names
-            path = LineCollection(list(lines), cmap="magma_r", linewidths=widths)
+            path = LineCollection(list(lines), cmap="magma_r", linewidths=2.0)
             path.set_array(size[: len(lines)])
             path.set_clim(-0.15 * top, top)  # the lightest colour is no colour on white
             axis.add_collection(path)
@@ -113,19 +105,11 @@ def error_map_figure(found: FirstValidation, joints: Sequence[str]) -> Figure | 
             axis.set_ylabel(f"{_AXES[b]} [m]")
             bar = drawing.colorbar(path, ax=axis, pad=0.02)
             bar.ax.set_ylim(0.0, top)
-            bar.set_label(f"|left| [{found.torque_units[j]}]")
+            bar.set_label(f"|residual| [{found.torque_units[j]}]")
         axes[-1].set_xlabel(f"{_AXES[a]} [m]")
 
-    where = f"Where on its way the tip is when the model misses torque{filtered}"
-    caption = f"{where}{_ways(course.drawn, 'thin')}."
+    caption = f"Where on its way the tip is when the model misses torque{filtered}."
     return Figure(f"where-{found.name}", caption, draw, (6.0, 0.7 + 1.35 * len(joints)))
-
-
-def _ways(drawn: Array | None, how: str) -> str:
-    """What a caption says of ways between strokes, where the reference tells them."""
-    if drawn is None or drawn.all():
-        return ""
-    return f"; {how} on the way between strokes, where a pen would be up"
 
 
 def _largest_of(size: Array, every: int) -> Array:
@@ -140,43 +124,25 @@ def executed_figure(cases: Sequence[Case]) -> Figure | None:
     panels = [part for part in both if part]
     if not panels:
         return None
-    wanted, drawn = shown[0][1].wanted, shown[0][1].drawn
+    wanted = shown[0][1].wanted
     a, b = plane(wanted)
 
     def draw(drawing: Drawing) -> None:
         for axis, part in zip(joint_axes(drawing, len(panels)), panels, strict=True):
-            draw_strokes(axis, wanted[:, [a, b]], drawn, style.BLACK, 2.6, "wanted", 0.25)
+            look: Look = {"color": style.BLACK, "alpha": 0.25, "label": "wanted"}
+            axis.plot(*wanted[:, [a, b]].T, linewidth=2.6, **look)
             for one, track in part:
                 color, path = style.COLOURS[(one.case - 1) % 6], track.executed[:, [a, b]]
-                draw_strokes(axis, path, track.drawn, color, 0.8, f"case {one.case}")
+                axis.plot(*path.T, color=color, linewidth=0.8, label=f"case {one.case}")
             legend_above(axis, 5)
             _finish_path(axis, a, b)
 
     width, height = float(np.ptp(wanted[:, a])), float(np.ptp(wanted[:, b]))
     simulated = [str(one.case) for one, _ in shown if one.origin == "simulated"]
     every = bool(simulated) and len(simulated) == len(shown)
-    caption = sentence("writing", "executed", _ways(drawn, "dashed"), simulated, every)
+    caption = sentence("writing", "executed", simulated, every)
     high = len(panels) * (0.9 + _WIDTH * height / max(width, 1e-9))
     return Figure("executed", caption, draw, (6.0, min(high, 9.0)))
-
-
-def draw_strokes(
-    axis: Axes,
-    path: Array,
-    drawn: Array | None,
-    color: str,
-    width: float,
-    label: str,
-    alpha: float = 1.0,
-) -> None:
-    """A path (points, 2): strokes as they are written, ways between them dashed and faint."""
-    if drawn is not None:
-        for first, last in true_spans(np.arange(len(path), dtype=np.float64), drawn <= 0.0):
-            part = path[max(0, int(first) - 1) : int(last) + 2]  # from stroke to stroke
-            faint: Look = {"linewidth": min(width, _FAINT), "alpha": 0.5 * alpha}
-            axis.plot(*part.T, color=color, linestyle=(0, (4, 3)), **faint)
-        path = np.where(drawn[:, None] > 0.0, path, np.nan)
-    axis.plot(*path.T, color=color, linewidth=width, alpha=alpha, label=label)
 
 
 def _finish_path(axes: Axes, a: int, b: int) -> None:

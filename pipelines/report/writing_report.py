@@ -7,15 +7,11 @@ from functools import partial
 
 import numpy as np
 
-from pipelines.model.writing.cases import Case
-from pipelines.model.writing.design import Designed
-from pipelines.model.writing.first_validation import FirstValidation
-from pipelines.model.writing.result import Result
 from pipelines.report import style
 from pipelines.report.figures import compared_figure
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
 from pipelines.report.sections import NO_COLLISION_CHECK
-from pipelines.report.sentences import capital, format_numbers, paragraphs, sentence
+from pipelines.report.sentences import capital, paragraphs, sentence
 from pipelines.report.style import format_decimals, format_number, format_unit, three_digits
 from pipelines.report.words import each, joined
 from pipelines.report.writing_figures import (
@@ -26,8 +22,11 @@ from pipelines.report.writing_figures import (
     split_figure,
     task_figures,
 )
+from pipelines.writing.control_cases import Case
+from pipelines.writing.task import Designed
+from pipelines.writing.validation import Result, TorqueValidation
 
-_MOST_LETTERS = 40  # rows of the table of letters
+_MOST_ROWS = 40  # of the table of stretches
 _FELT = 0.5  # of what is left, from which on further effects are worth a column
 _PARTS = ("inertia", "coriolis", "gravity", "friction", "effects")
 
@@ -41,7 +40,6 @@ def writing_report(result: Result) -> Report:
     sections = (
         _torque_section(result),
         _where_section(result),
-        _online_section(result),
         _cases_section(result),
         _simulation_section(result),
     )
@@ -144,7 +142,7 @@ def _torque_figures(result: Result) -> tuple[Figure, ...]:
         f"torque [{log.torque_units[0]}]",
         "model",
         result.joints,
-        (("friction", c.friction, style.GREEN), ("left", c.left, style.BLACK)),
+        (("friction", c.friction, style.GREEN), ("residual", c.residual, style.BLACK)),
     )
     return measured, split_figure(log, c, result.joints)
 
@@ -166,7 +164,7 @@ def _where_section(result: Result) -> Section:
     ]
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (one.label, one.start, one.end, *(three_digits(100 * x) for x in one.relative_error))
-        for one in log.letters[:_MOST_LETTERS]
+        for one in log.stretches[:_MOST_ROWS]
     )
     heads = ("where", "from [s]", "to [s]", *(f"{name} [%]" for name in result.joints))
     caption = "What the model leaves in each, rms, over the torque of the whole log."
@@ -178,34 +176,14 @@ def _where_section(result: Result) -> Section:
     )
 
 
-def _at_the_edge(log: FirstValidation, t: float) -> str:
+def _at_the_edge(log: TorqueValidation, t: float) -> str:
     """Which end of the log `t` [s] is nearer to than one period of the low-pass; "" for none."""
-    if log.low_pass_hz is None or not log.letters:
+    if log.low_pass_hz is None or not log.stretches:
         return ""
     near = 1.0 / log.low_pass_hz
-    if t - log.letters[0].start < near:
+    if t - log.stretches[0].start < near:
         return "beginning"
-    return "end" if log.letters[-1].end - t < near else ""
-
-
-def _online_section(result: Result) -> Section:
-    rows = tuple(
-        (
-            log.name,
-            log.online.observer,
-            format_numbers(100 * log.online.relative_error),
-            format_numbers(100 * log.online.relative_error_low_pass),
-        )
-        for log in result.logs
-        if log.online is not None
-    )
-    names = ", ".join(result.joints)
-    caption = (
-        f"Relative errors as above ({names}), with the motion that an observer sees meanwhile."
-    )
-    table = Table(("log", "motion of", "left [%]", "left, low-passed [%]"), rows, caption)
-    title = "Sample by sample, as it would run online"
-    return Section(title, _paragraphs("online"), (table,))
+    return "end" if log.stretches[-1].end - t < near else ""
 
 
 def _cases_section(result: Result) -> Section:
@@ -260,7 +238,7 @@ def _with_spread(value: float, spread: float | None) -> str:
 
 
 def _simulation_section(result: Result) -> Section:
-    found = result.imitation
+    found = result.simulation
     if found is None:
         return Section("The task simulated", (f"Left out: {result.simulation_left_out}.",))
     figures = (found.position_rms, found.position_max, found.speed_rms, found.torque_rms)
@@ -306,14 +284,9 @@ def _task_report(result: Result, task: Designed) -> Report:
         tuple(rows),
         "The most that the task asks. Anything beyond a limit would have been refused.",
     )
-    page = [(name, value, format_unit(unit)) for name, value, unit in task.page]
-    made = Table(
-        ("what", "value", "unit"),
-        (("joints found", task.inverse, ""), ("sample time", task.sample_time, "s"), *page),
-    )
     sections = (
         Section("Before the robot moves", tables=(limits,), warning=NO_COLLISION_CHECK),
         Section("The task", figures=tuple(task_figures(task, result.joints))),
     )
     tone: Tone = "good" if task.torque_checked else "attention"
-    return Report("Writing task", _say("task", task, nearest), tone, made, sections)
+    return Report("Writing task", _say("task", task, nearest), tone, None, sections)

@@ -11,7 +11,7 @@ from pipelines.model.excitation.others import Plan
 from pipelines.model.excitation.task import Task
 from pipelines.model.excitation.trajectory import Trajectory
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.writing.planned import planned_log
+from pipelines.writing.task import planned_log
 
 __all__ = ["coefficients", "joint_motion", "log_of_plan"]
 

@@ -10,7 +10,7 @@ import pytest
 from pipelines.model.rigid.rrr_kinematics import rrr_geometry
 from pipelines.model.rigid.rrr_rates import joint_rates
 from tests.model.rigid.serial_arms import ARMS
-from tests.model.writing.judge import TipJudge
+from tests.writing.judge import TipJudge
 
 
 def test_pinocchio_moves_the_tip_as_asked(shared: Path, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ from pipelines.model.simulation.imitate import How, imitate
 from pipelines.model.simulation.integrate import HeldBody
 from pipelines.model.simulation.plant import Plant
 from pipelines.model.simulation.replicas import run_together
-from pipelines.model.writing.planned import planned_log
+from pipelines.writing.task import planned_log
 from tests.model.simulation.arms import TS, Case, rrr, serial
 from tests.model.simulation.pinocchio_loop import Loop
 from tests.model.simulation.test_forward_dynamics import follow, offsets

@@ -13,14 +13,13 @@ from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
 from pipelines.model.rigid.body import Array
-from pipelines.model.writing.inverse import Elbow
-from pipelines.model.writing.limits import demands
-from pipelines.model.writing.path import Page
-from pipelines.model.writing.profile import Pace
-from pipelines.model.writing.reference import WritingReference, WritingTask, writing_task
+from pipelines.writing.inverse_kinematics import Elbow
+from pipelines.writing.path import Page
+from pipelines.writing.task import WritingReference, WritingTask, demands, writing_task
+from pipelines.writing.timing import Pace
 from sample_logs.make_model import synthetic_arm
 from tests.model.rigid.serial_arms import ARMS
-from tests.model.writing.judge import OFFSETS, WEIGHTS, TipJudge
+from tests.writing.judge import OFFSETS, WEIGHTS, TipJudge
 
 TEXT = "RRRID 2004 SG"
 
@@ -48,7 +47,7 @@ def reference(task: WritingTask) -> WritingReference:
 def spread(task: WritingTask, samples: int) -> Array:
     """Random times of the task, none within half a millisecond of a corner, a bend or the end of a phase."""
     t = np.sort(np.random.default_rng(5).uniform(0.0, task.duration, samples))
-    jumps = np.concatenate([task.corners, task.bends, task.rest + task.law.start])
+    jumps = np.concatenate([task.passings("corner"), task.passings("bend"), task.rest + task.law.start])
     return t[np.abs(t[:, None] - jumps).min(axis=1) > 5e-4]
 
 
@@ -99,7 +98,7 @@ def test_it_starts_and_ends_at_rest(task: WritingTask, reference: WritingReferen
     assert (motion.dq[still] == 0.0).all()
     assert (motion.ddq[still] == 0.0).all()
     assert not reference.drawn[still].any()
-    assert np.abs(task.motion(task.corners).dq).max() <= 1e-12
+    assert np.abs(task.motion(task.passings("corner")).dq).max() <= 1e-12
     assert reference.tip.speed.max() == pytest.approx(task.pace.fast, rel=1e-12)
 
 
@@ -109,11 +108,11 @@ def test_what_jumps_where_the_tip_passes_a_bend(robot: RobotDescription, task: W
         return np.linalg.norm(task.tip(t + 1e-9).acceleration - task.tip(t - 1e-9).acceleration, axis=1)
 
     smallest = min(piece.radius for piece in task.path.pieces)
-    assert len(task.bends) > 10
-    assert jump(task, task.corners).max() <= 1e-6
-    assert 1e-3 < jump(task, task.bends).max() <= 2 * task.pace.slow**2 / smallest * (1 + 1e-6)
+    assert len(task.passings("bend")) > 10
+    assert jump(task, task.passings("corner")).max() <= 1e-6
+    assert 1e-3 < jump(task, task.passings("bend")).max() <= 2 * task.pace.slow**2 / smallest * (1 + 1e-6)
     stopping = writing_task(robot, TEXT, Page(height=0.1), Pace(slow=0.0))
-    assert jump(stopping, stopping.bends).max() <= 1e-6
+    assert jump(stopping, stopping.passings("bend")).max() <= 1e-6
 
 
 def test_every_sample_knows_its_letter(reference: WritingReference) -> None:

@@ -14,12 +14,20 @@ from pipelines.io.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.writing.cases import CASES, case_of, measured_cases, one_task, tip_std
-from pipelines.model.writing.first_validation import residual
-from pipelines.model.writing.simulated_cases import Draws, possible, simulated_cases, why_not
+from pipelines.writing.control_cases import (
+    CASES,
+    case_of,
+    measured_cases,
+    one_task,
+    possible,
+    simulated_cases,
+    tip_std,
+    why_not,
+)
+from pipelines.writing.validation import residual
 from tests.healthy import rows, with_signal
 from tests.model.rigid.serial_arms import ARMS
-from tests.model.writing.judge import TipJudge
+from tests.writing.judge import TipJudge
 
 SAMPLES = 2200  # of the writing logs: the first letter
 
@@ -95,7 +103,7 @@ def simulated(logs: list[ExperimentLog]) -> dict[int, tuple[float, float, float]
     uncertain = replace(arm, base=tuple(replace(p, std=0.03 * max(abs(p.value), 0.02)) for p in arm.base))
     motion = reconstruct(logs[0], Reconstruction())
     left = residual(logs[0], motion, torques(arm, logs[0], motion))
-    found = simulated_cases(logs[0], uncertain, left, range(1, 7), Draws(3))
+    found = simulated_cases(logs[0], uncertain, left, range(1, 7), 3, 1)
     assert {one.origin for one in found.values()} == {"simulated"}
     return {case: one.tip_error_std.values for case, one in found.items()}
 

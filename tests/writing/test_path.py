@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.model.writing.path import Arc, Page, TipPath, lay_out
-from tests.model.writing.judge import OFFSETS, WEIGHTS
+from pipelines.writing.path import Arc, Page, TipPath, lay_out
+from tests.writing.judge import OFFSETS, WEIGHTS
 
 PAGE = Page(y=-0.37, x=0.05, z=0.6, height=0.11)
 TEXT = "QUICK BROWN 0123456789 JSG"
@@ -52,7 +52,7 @@ def test_pieces_are_parametrised_by_arc_length(path: TipPath) -> None:
 def test_a_circle_is_as_long_as_a_circle() -> None:
     """The round of the 6 is 2 π r long, r a quarter of the height; its straight part is 3/4 of the height."""
     line, circle = lay_out("6", PAGE).pieces
-    assert isinstance(circle.form, Arc)
+    assert isinstance(circle, Arc)
     assert circle.length == pytest.approx(2 * np.pi * PAGE.height / 4, rel=1e-14)
     assert line.length == pytest.approx(0.75 * PAGE.height, rel=1e-14)
 

@@ -11,12 +11,12 @@ from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.rrr_kinematics import rrr_geometry
-from pipelines.model.writing.inverse import ClosedForm, Numerical
-from pipelines.model.writing.path import Page
-from pipelines.model.writing.profile import Pace
-from pipelines.model.writing.reference import WritingTask, writing_task
+from pipelines.writing.inverse_kinematics import ClosedForm, Numerical
+from pipelines.writing.path import Page
+from pipelines.writing.task import WritingTask, writing_task
+from pipelines.writing.timing import Pace
 from tests.model.rigid.serial_arms import ARMS, PUMA, Arm, table
-from tests.model.writing.judge import OFFSETS, WEIGHTS, TipJudge
+from tests.writing.judge import OFFSETS, WEIGHTS, TipJudge
 
 POSTURES = {"tx40": (0.2, 0.4, 0.4, 0.1, 0.5, 0.0), "seven-joints": (0.3, 0.6, 0.2, -1.2, 0.3, 0.8, 0.0),
             "stanford": (0.2, 1.2, 0.2, 0.3, 0.5, 0.2), "puma-mdh": (0.1, -0.5, 0.6, 0.2, 0.5, 0.1),
@@ -49,7 +49,7 @@ def test_speeds_and_accelerations_are_derivatives(written: tuple[Arm, WritingTas
     _, task = written
     h = 2e-5
     t = np.sort(np.random.default_rng(6).uniform(0.0, task.duration, 600))
-    t = t[np.abs(t[:, None] - np.concatenate([task.corners, task.bends])).min(axis=1) > 5e-4]
+    t = t[np.abs(t[:, None] - np.concatenate([task.passings("corner"), task.passings("bend")])).min(axis=1) > 5e-4]
     motion = task.motion(t)
     there = [task.motion(t + k * h) for k in OFFSETS]
     for mine, theirs in ((motion.dq, [m.q for m in there]), (motion.ddq, [m.dq for m in there])):

@@ -12,13 +12,8 @@ from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
 from pipelines.model.rigid.body import Motion
-from pipelines.model.writing.first_validation import (
-    FirstValidation,
-    first_validation,
-    online_validation,
-)
-from pipelines.model.writing.marks import marks_of, reference_tip
-from pipelines.model.writing.reference import writing_task
+from pipelines.writing.task import writing_task
+from pipelines.writing.validation import TorqueValidation, stretches_of, torque_validation
 from sample_logs.make_model import synthetic_arm
 from tests.healthy import AMPLIFIER, Path, make_log, with_signal
 
@@ -53,8 +48,8 @@ def motion(log: ExperimentLog) -> Reconstructed:
     return reconstruct(log, Reconstruction())
 
 
-def judged(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> FirstValidation:
-    return first_validation(log, motion, arm, torques(arm, log, motion), None, False)
+def judged(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> TorqueValidation:
+    return torque_validation(log, motion, arm, torques(arm, log, motion), False)
 
 
 def test_the_true_model_leaves_noise(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
@@ -73,44 +68,28 @@ def test_a_share_that_is_missed_is_that_share(log: ExperimentLog, motion: Recons
     np.testing.assert_allclose(found.relative_error_low_pass, 0.05, rtol=0.05)
 
 
-@pytest.mark.parametrize(("joint", "letter"), [(1, 1), (2, 2), (3, 3)])
-def test_what_is_missed_in_one_letter_is_found_there(log: ExperimentLog, motion: Reconstructed, arm: Arm, joint: int,
-                                                     letter: int) -> None:
-    """A bump of torque halfway through a letter: the letter, the moment and the height are named."""
-    here = np.flatnonzero(marks_of(log, reference_tip(log)).at == letter - 1)
+@pytest.mark.parametrize(("joint", "stretch"), [(1, 1), (2, 4), (3, 7)])
+def test_what_is_missed_in_one_stretch_is_found_there(log: ExperimentLog, motion: Reconstructed, arm: Arm, joint: int,
+                                                      stretch: int) -> None:
+    """A bump of torque halfway from one standstill to the next: the stretch, the moment and the height are named."""
+    split, labels, at = stretches_of(log)
+    here = np.flatnonzero(at == stretch - 1)
     middle = float(log.t[here[len(here) // 2]])
     tau = log.tau.copy()
     tau[:, joint - 1] += 0.8 * np.exp(-0.5 * ((log.t - middle) / 0.03)**2)
     found = judged(with_signal(log, tau=tau), motion, arm)
     worst = found.largest[joint - 1]
-    assert (found.marks, found.text, worst.label) == ("letters", TEXT, f"letter {letter}, '{TEXT[letter - 1]}'")
+    assert (found.split, worst.label) == (split, labels[stretch - 1]) == ("standstills", f"stretch {stretch}")
     assert abs(worst.t - middle) < 0.01
     assert worst.error == pytest.approx(0.8, rel=0.15)
 
 
-def test_without_a_text_places_have_other_names(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
-    """A reference upside down: stretches between standstills; without a reference: stretches of time."""
-    joints = log["q_ref"] * [1.0, -1.0, -1.0]
-    assert marks_of(log, reference_tip(with_signal(log, q_ref=joints))).kind == "strokes"
+def test_without_a_reference_stretches_are_of_time(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
     bare = replace(log, signals={name: signal for name, signal in log.signals.items() if "ref" not in name})
-    marks = marks_of(bare, reference_tip(bare))
-    assert (marks.kind, len(marks.labels)) == ("time", 10)
+    split, labels, _ = stretches_of(bare)
+    assert (split, len(labels)) == ("time", 10)
     found = judged(bare, motion, arm)
-    assert found.letters[-1].end == pytest.approx(log.t[-1] - log.t[0])
-
-
-def test_one_sample_at_a_time_is_the_same_model(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:
-    """With the motion that a controller logged, the online torque is that of the arrays, and its error is that of that motion."""
-    exact = motion.motion
-    observed = replace(log, signals={**log.signals, **{
-        name: replace(log.signals["q"], values=values) for name, values in
-        (("q_obs", exact.q), ("dq_obs", exact.dq), ("ddq_obs", exact.ddq))}})
-    online, seconds = online_validation(observed, motion, arm)
-    assert (online.observer, seconds > 0.0) == ("the controller's", True)
-    assert online.differs <= 1e-12 * np.abs(log.tau).max()
-    later, _ = online_validation(log, motion, arm)
-    assert later.observer == "a Kalman observer after the fact"
-    assert (later.relative_error > online.relative_error).all()
+    assert found.stretches[-1].end == pytest.approx(log.t[-1] - log.t[0])
 
 
 def test_the_largest_miss_is_not_what_filters_make_of_an_end(log: ExperimentLog, motion: Reconstructed, arm: Arm) -> None:

@@ -11,10 +11,10 @@ from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
-from pipelines.model.writing.limits import demands
-from pipelines.model.writing.via_points import ViaPoints, via_point_motion, via_points
+from pipelines.writing.task import demands
+from pipelines.writing.via_points import ViaPoints, via_points
 from sample_logs.make_model import synthetic_arm
-from tests.model.writing.judge import OFFSETS, WEIGHTS
+from tests.writing.judge import OFFSETS, WEIGHTS
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +79,12 @@ def test_it_rests_at_every_via_point(points: ViaPoints) -> None:
 def test_postures_lie_within_the_ranges(robot: RobotDescription) -> None:
     """A joint with a range stays in it, in the moves too; one without within half a turn; equal seeds give equal motions."""
     narrow = replace(robot, joints=(replace(robot.joints[0], position=(-0.5, 0.2)), *robot.joints[1:]))
-    motion = via_point_motion(narrow, np.random.default_rng(3), moves=30)
+    motion = via_points(narrow, np.random.default_rng(3), moves=30).sampled(1e-3)
     assert motion.q[:, 0].min() >= -0.5
     assert motion.q[:, 0].max() <= 0.2
     assert np.abs(motion.q[:, 1:]).max() <= np.pi
     assert np.ptp(motion.q[:, 1]) > np.pi
-    again = via_point_motion(narrow, np.random.default_rng(3), moves=30)
+    again = via_points(narrow, np.random.default_rng(3), moves=30).sampled(1e-3)
     assert again.q.tobytes() == motion.q.tobytes()
 
 

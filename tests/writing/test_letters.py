@@ -10,8 +10,8 @@ import pytest
 
 from pipelines.errors import UsageError
 from pipelines.model.rigid.body import Array
-from pipelines.model.writing.letters import CHARACTERS, glyph
-from pipelines.model.writing.path import Arc, Page, lay_out
+from pipelines.writing.letters import CHARACTERS, glyph
+from pipelines.writing.path import Arc, Page, lay_out
 
 UNIT = Page(y=0.0, x=0.0, z=0.0, height=1.0)
 
@@ -78,11 +78,11 @@ def test_no_two_characters_look_alike() -> None:
 def test_arcs_continue_straight_lines(character: str) -> None:
     """These letters have arcs, and each meets what is drawn before it without a corner (the B in the middle apart)."""
     path = lay_out(character, UNIT)
-    into_arcs = [joint for joint, piece in zip(path.joints, path.pieces[1:], strict=True) if isinstance(piece.form, Arc)
+    into_arcs = [joint for joint, piece in zip(path.joints, path.pieces[1:], strict=True) if isinstance(piece, Arc)
                  and piece.drawn]
-    drawn_before = [path.pieces[k].drawn for k, piece in enumerate(path.pieces[1:]) if isinstance(piece.form, Arc)]
+    drawn_before = [path.pieces[k].drawn for k, piece in enumerate(path.pieces[1:]) if isinstance(piece, Arc)]
     assert all(joint == "bend" for joint, drawn in zip(into_arcs, drawn_before, strict=True) if drawn)
-    assert any(isinstance(piece.form, Arc) for piece in path.pieces)
+    assert any(isinstance(piece, Arc) for piece in path.pieces)
 
 
 @pytest.mark.parametrize(("text", "names"), [("RÖD", "letter 2 of the text, 'Ö'"), ("A-B", "'-'"), ("  ", "nothing"),

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.errors import UsageError
-from pipelines.model.writing.path import Page, TipPath, lay_out
-from pipelines.model.writing.profile import Pace, TimeLaw, time_law
-from tests.model.writing.judge import OFFSETS, WEIGHTS
+from pipelines.writing.path import Page, TipPath, lay_out
+from pipelines.writing.timing import Pace, TimeLaw, time_law
+from tests.writing.judge import OFFSETS, WEIGHTS
 
 PACES = (Pace(), Pace(slow=0.0), Pace(fast=2.0, slow=0.3, acceleration=20.0, jerk=2000.0), Pace(fast=0.05, slow=0.05))
 

@@ -1,0 +1,41 @@
+"""Numbers that decide in the writing task, each with its meaning and its source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["CONFIG", "WritingConfig"]
+
+
+@dataclass(frozen=True)
+class WritingConfig:
+    """Of the task, of its inverse kinematics and of the validation."""
+
+    # the task
+    longest: int = 200  # letters or moves: minutes of writing, seconds of planning
+    longest_sample_time: float = 0.1  # [s] of a reference
+    fewest_joints: int = 3  # the tip has three coordinates
+    authority: float = 0.95  # of each limit that a move uses; the rest is for the controller
+    move_points: int = 101  # of a move at which its torque is computed
+    # inverse kinematics
+    border: float = 0.005  # [m] from the border of the workspace, where joint speeds diverge
+    flattest: float = 0.02  # smallest to largest singular value of the Jacobian that is used
+    every: int = 80  # samples from one start of Newton's method to the next
+    reached: float = 1e-9  # [m] from a tip, above which it counts as out of reach
+    solved: float = 1e-12  # [m] of a solution: rounding of positions of about a metre
+    # control cases
+    same_reference: float = 1e-6  # [rad] by which references of one task differ: rounding
+    most_draws: int = 1000  # of models on which cases are simulated
+    shared: float = 0.9  # of the longer log: recorders start and stop by hand, while the arm rests
+    # where the torque is missed
+    still: float = 0.01  # of the largest speed of the tip, below which it stands still
+    briefest: float = 0.05  # [s] of a stretch between two standstills
+    most_stretches: int = 60  # between standstills; more of them name nothing
+    stretches: int = 10  # of equal time, without a reference that stops
+    # figures
+    points: int = 3000  # of a curve
+    track_points: int = 2000  # of a path of the tip
+    drawn_logs: int = 4  # whose torques are kept for figures
+
+
+CONFIG = WritingConfig()
