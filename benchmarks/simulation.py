@@ -25,7 +25,7 @@ import pinocchio as pin
 
 from benchmarks.regressor import rrr as rrr_model
 from pipelines.io.log import Array, Controller
-from pipelines.model.simulation import Experiment, Noise, Plant, choose_step, run
+from pipelines.simulation import Experiment, Noise, Plant, choose_step, run
 from sample_logs.make_model import FRICTION, synthetic_arm
 
 TS = 1e-3  # [s]

@@ -21,11 +21,11 @@ from pipelines.io.log import ExperimentLog
 from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
 from pipelines.model.effects import find_effect
-from pipelines.model.simulation.example import FAULT, example_session
 from pipelines.report.config import REPORT
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.style import format_number, unit_in_words
 from pipelines.report.words import format_values, in_order, named, spoken, without_keys
+from pipelines.simulation.example import FAULT, example_session
 from pipelines.stage import Inputs, Request, Stage
 
 __all__ = ["STAGE", "Recorded", "Result", "Settings", "compute", "ending", "hidden", "report"]

@@ -117,7 +117,7 @@ def _tilde(path: Path) -> str:
 
 def self_test() -> Iterator[Finding]:
     """Simulate a log, write it, read it, fit it and draw: small jobs whose answers are known."""
-    from pipelines.model.simulation.example import example_session
+    from pipelines.simulation.example import example_session
 
     with tempfile.TemporaryDirectory(prefix="rrrid-doctor-") as name:
         folder = Path(name)
@@ -168,7 +168,7 @@ def _fitted(log: ExperimentLog, close: float = 6.0) -> str:
     from pipelines.model.estimation.logs import Recipe, fit_logs, with_cutoff
     from pipelines.model.estimation.nominal import nominal_columns
     from pipelines.model.motion import Reconstruction, reconstruct
-    from pipelines.model.simulation.example import example_arm
+    from pipelines.simulation.example import example_arm
 
     how = Reconstruction()
     motions = ((log, reconstruct(log, how)),)

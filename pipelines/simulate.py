@@ -24,11 +24,11 @@ from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.model.arm import Arm
 from pipelines.model.named_cause import acting_cause
-from pipelines.model.simulation.imitate import How, Imitation, imitate
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.config import REPORT
 from pipelines.report.report import Report
 from pipelines.report.simulation_report import simulation_report
+from pipelines.simulation.imitate import How, Imitation, imitate
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]

@@ -13,7 +13,7 @@ from bench.plant import run
 from pipelines.io import schema
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import format_robot
-from tests.model.simulation.arms import waving
+from tests.simulation.arms import waving
 
 __all__ = ["TORQUE_NOISE", "controlled_log"]
 

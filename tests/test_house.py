@@ -17,7 +17,7 @@ CONSTANTS = {
     "pipelines/design_excitation.py": 1,
     "pipelines/diagnose.py": 1, "pipelines/diagnosis": 11, "pipelines/estimate_bps.py": 1,
     "pipelines/estimation": 30, "pipelines/fit": 69,
-    "pipelines/model": 421, "pipelines/report": 63, "pipelines/signal": 41,
+    "pipelines/model": 375, "pipelines/report": 63, "pipelines/signal": 41,
 }
 
 

@@ -35,7 +35,7 @@ from pipelines.model.rows.exact import Named
 from pipelines.model.rows.fit import Refined, TorqueGain, torque_gain_of
 from pipelines.model.rows.prepare import Prepared
 from pipelines.model.rows.residual_analysis import Proof, proof
-from pipelines.model.simulation.comparison import Simulation, simulation_errors
+from pipelines.simulation.comparison import Simulation, simulation_errors
 
 __all__ = ["Worth", "alternatives_of", "extension_of", "findings_of", "gain_of", "weigh"]
 

@@ -19,7 +19,7 @@ from pipelines.model.estimation.logs import Motions
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.prepare import FewerTerms
 from pipelines.model.rows.residual_analysis import Evidence, Proof
-from pipelines.model.simulation.comparison import SimulatedSpan
+from pipelines.simulation.comparison import SimulatedSpan
 
 __all__ = [
     "Alternative",

@@ -18,9 +18,9 @@ import numpy as np
 from pipelines.errors import Check, InputRejected
 from pipelines.io.log import ExperimentLog
 from pipelines.model.rigid.body import Array
-from pipelines.model.simulation import Experiment
-from pipelines.model.simulation.control import Controlling
 from pipelines.quality.subject import Subject
+from pipelines.simulation import Experiment
+from pipelines.simulation.controller import Controlling
 
 __all__ = ["against_command", "commanded"]
 

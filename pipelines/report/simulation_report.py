@@ -8,8 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.simulation.course import Course
-from pipelines.model.simulation.imitate import Imitation
 from pipelines.report.figures import (
     Array,
     compared_figure,
@@ -22,6 +20,8 @@ from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.report.sections import further_logs
 from pipelines.report.sentences import paragraphs, sentence
 from pipelines.report.style import format_number, format_unit, three_digits
+from pipelines.simulation.course import Course
+from pipelines.simulation.imitate import Imitation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.simulation.course import Course as SimulatedCourse
 from pipelines.report import style
 from pipelines.report.figures import (
     Array,
@@ -24,6 +23,7 @@ from pipelines.report.report import Figure
 from pipelines.report.sentences import sentence
 from pipelines.report.style import format_unit, printable
 from pipelines.report.words import each, joined
+from pipelines.simulation.course import Course as SimulatedCourse
 from pipelines.writing.control_cases import Case
 from pipelines.writing.task import Designed
 from pipelines.writing.validation import Course, TorqueValidation

@@ -25,10 +25,10 @@ from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.body import Motion
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
-from pipelines.model.simulation.accuracy import choose_step
-from pipelines.model.simulation.experiment import Experiment
-from pipelines.model.simulation.plant import Plant
-from pipelines.model.simulation.replicas import run
+from pipelines.simulation.experiment import Experiment
+from pipelines.simulation.plant import Plant
+from pipelines.simulation.run import run
+from pipelines.simulation.step import choose_step
 from pipelines.writing.config import CONFIG
 
 __all__ = ["CASES", "Case", "TipStd", "TipTrack", "case_of", "measured_cases", "one_task",

@@ -28,8 +28,8 @@ from pipelines.model.estimation.conditioning import condition
 from pipelines.model.motion import Reconstructed
 from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
-from pipelines.model.simulation.imitate import How, Imitation, imitate
 from pipelines.signal.filters import zero_phase
+from pipelines.simulation.imitate import How, Imitation, imitate
 from pipelines.writing.config import CONFIG
 from pipelines.writing.control_cases import (
     CASES,

@@ -20,7 +20,7 @@ from pipelines.diagnosis.result import Diagnosis, Finding, NotIdentifiable, Valu
 from pipelines.errors import InputRejected
 from pipelines.io.files import write_log
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.simulation.example import FAULT, example_arm, example_session
+from pipelines.simulation.example import FAULT, example_arm, example_session
 from pipelines.stage import Request
 from tests.cli.commands import REPO, rrrid
 from tests.io.logs import small_log

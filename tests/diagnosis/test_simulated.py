@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from pipelines.model.rows.residual_analysis import with_simulation
-from pipelines.model.simulation.comparison import Strayed
+from pipelines.simulation.comparison import Strayed
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import pytest
 
 from pipelines import estimate_bps
 from pipelines.io.files import write_log
-from pipelines.model.simulation import example
+from pipelines.simulation import example
 from pipelines.stage import Request, read_logs
 
 

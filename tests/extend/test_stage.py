@@ -17,7 +17,7 @@ from pipelines.io.files import open_log
 from pipelines.io.model_file import read_model
 from pipelines.model.arm import Arm
 from pipelines.model.named_cause import wanted_cause
-from pipelines.model.simulation import Experiment, simulate
+from pipelines.simulation import Experiment, simulate
 from pipelines.stage import Outcome, Request, run_stage
 from tests.diagnose.sessions import healthy_again, session, written
 from tests.seeds import rarely

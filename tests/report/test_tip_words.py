@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.result import BeforeAfter, Finding, TipError
-from pipelines.model.simulation.comparison import SimulatedSpan
 from pipelines.report.diagnosis_finding import all_together, gain_table, tip_change, tip_worth
 from pipelines.report.run_report import Line, stages_section
+from pipelines.simulation.comparison import SimulatedSpan
 from tests.report.test_diagnosis_finding import finding
 
 BOTH = (SimulatedSpan("writing-1", 5.0), SimulatedSpan("writing-2", 5.0))

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import (
     LARGE,
     SHARPNESSES,
     ArmModel,
-    Formula,
     OwnLoad,
     Parameters,
     Quantity,
@@ -63,7 +63,10 @@ class AsymmetricFriction(Fast):
 
     def own_load(self, values: Values) -> OwnLoad:
         (coulomb, viscous), sharpness = map(float, 0.5 * self.amplitudes(values)), values["sharpness"]
-        turned = f"tanh({sharpness!r} * {{v}})"
-        if not values["gradual"]:
-            return Formula(f"({coulomb!r}) * abs({turned}) + ({viscous!r}) * abs({{v}})")
-        return Formula(f"{turned} * (({coulomb!r}) * {turned} + ({viscous!r}) * {{v}})")
+        gradual = bool(values["gradual"])
+
+        def load(q: Any, v: Any, m: Functions) -> Any:
+            turned = m.tanh(sharpness * v)
+            return turned * (coulomb * turned + viscous * v) if gradual else coulomb * abs(turned) + viscous * abs(v)
+
+        return load

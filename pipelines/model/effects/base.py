@@ -41,12 +41,11 @@ from pipelines.model.effects.terms import (
     SAMPLED,
     SHARPNESSES,
     ArmModel,
-    Formula,
     Hooks,
+    OwnDrive,
     OwnLoad,
     OwnMemory,
     Parameters,
-    PlainDrive,
     Predict,
     Quantity,
     SpeedCurve,
@@ -55,12 +54,13 @@ from pipelines.model.effects.terms import (
     friction_at,
     predicted,
     summed,
+    waves,
 )
 from pipelines.model.rigid.body import Array, Motion
 
-__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Formula", "Hooks", "OwnLoad", "OwnMemory",
-           "Parameters", "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "adds", "everywhere",
-           "friction_at", "joints_of", "predicted"]
+__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Hooks", "OwnDrive", "OwnLoad", "OwnMemory",
+           "Parameters", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "adds", "everywhere",
+           "friction_at", "joints_of", "predicted", "waves"]
 
 E = TypeVar("E", bound="Effect")
 

@@ -12,12 +12,12 @@ import numpy as np
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
-    Formula,
     OwnLoad,
     Parameters,
     Quantity,
     Values,
     Words,
+    waves,
 )
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
@@ -68,8 +68,8 @@ class Cogging(Fast):
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         once = np.exp(1j * self.order * self.own(motion.q))
-        waves = [once**m for m in range(1, self.harmonics + 1)]
-        return self.on_own_row(arm, *(part for wave in waves for part in (wave.imag, wave.real)))
+        powers = [once**m for m in range(1, self.harmonics + 1)]
+        return self.on_own_row(arm, *(part for wave in powers for part in (wave.imag, wave.real)))
 
     def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
         """One wave from the one before: e^(i k' q) = e^(i k q) e^(i (k' - k) q), for orders come in equal steps."""
@@ -116,12 +116,12 @@ class Cogging(Fast):
     def own_load(self, values: Values) -> OwnLoad:
         shaped = self.at(values)
         parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
-        waves = [(m * shaped.order, in_phase, across) for m, (in_phase, across) in enumerate(parts, start=1)]
-        return Formula.of_waves(waves)
+        wave = waves([(k * shaped.order, in_phase, across) for k, (in_phase, across) in enumerate(parts, start=1)])
+        return lambda q, v, m: wave(q, m)
 
     def amplitudes(self, values: Values) -> Array:
-        waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in ("", "_2", "_3")[:self.harmonics]]
-        return np.array([part for wave in waves for part in (wave.real, wave.imag)])
+        each = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in ("", "_2", "_3")[:self.harmonics]]
+        return np.array([part for wave in each for part in (wave.real, wave.imag)])
 
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         pairs = [*np.reshape(np.asarray(amplitudes, dtype=float), (-1, 2)).tolist(), *[[0.0, 0.0]] * (3 - self.harmonics)]

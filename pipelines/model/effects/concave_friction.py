@@ -11,7 +11,6 @@ import numpy as np
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
-    Formula,
     OwnLoad,
     Parameters,
     Quantity,
@@ -77,8 +76,7 @@ class ConcaveFriction(FrictionLaw, Fast):
         amplitude, slow, knee = self.amplitudes(values).item(), 1.0 / values["speed"], values["knee"]
         if knee < _NONE:
             return None
-        power = -1.0 / knee
-        return Formula(f"({amplitude!r}) * {slow!r} * {{v}} * (1.0 + abs({slow!r} * {{v}}) ** {knee!r}) ** ({power!r})")
+        return lambda q, v, m: amplitude * slow * v * (1.0 + abs(slow * v) ** knee) ** (-1.0 / knee)
 
     def speed_curve(self, values: Values) -> SpeedCurve | None:
         if values["knee"] >= _NONE:

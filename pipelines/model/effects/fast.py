@@ -8,7 +8,7 @@ An effect that has some is a `Fast`, and overrides what it can do faster. Caller
     own_columns(shapes, motion, arm)            the same of effects on their own joint alone
     shape_slopes(effect, motion, amplitudes)    slopes by non-linear numbers in closed form
     speed_curve(effect, values)                 a torque that depends on the speed of its joint alone
-    own_load(effect, values)                    the load of `simulate` in plain numbers, for a simulation of one robot
+    own_load(effect, values)                    the load of `simulate` as a function of its joint's angle and speed
     own_memory(effect, values)                  the same of a load with one state
 """
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.functions import ARRAYS, Functions
 from pipelines.model.effects.base import (
     SHARPNESSES,
     ArmModel,
     Hooks,
     Parameters,
-    PlainDrive,
     Predict,
     Quantity,
     Values,
@@ -90,31 +90,25 @@ class LoadFriction(FrictionLaw):
 
         Solved for the load, because the load holds the acceleration that is being computed.
         """
-        def applied(command: Array, motion: Motion, _: Array) -> Array:
-            left, friction = command.copy(), (1.0 - values.get("behind", 0.0)) * self.own(arm.friction_torque(motion))
-            passed = self.own(command) - friction
-            lost = values["mu"] * np.sign(passed) * np.tanh(values["sharpness"] * self.own(motion.dq))
-            into = values.get("input_side", 0.0)
-            left[..., self._index] = friction + passed * (1.0 - into * lost) / (1.0 + (1.0 - into) * lost)
-            return left
-
-        return Hooks(actuator=applied, drive=self._plain(arm, values))
-
-    def _plain(self, arm: ArmModel, values: Values) -> PlainDrive | None:
-        """The same of numbers, where the joint's other friction follows from its speed."""
         curves, index, behind = arm.friction_curves(self._index + 1), self._index, values.get("behind", 0.0)
-        if curves is None:
-            return None
         mu, into, w = values["mu"], values.get("input_side", 0.0), values["sharpness"]
 
-        def plain(command: tuple[float, ...], speed: tuple[float, ...]) -> tuple[float, ...]:
-            v = speed[index]
-            friction = (1.0 - behind) * sum(curve.at(v) for curve in curves)
-            passed = command[index] - friction
-            lost = math.copysign(mu, passed) * math.tanh(w * v)
-            return self.with_own(command, friction + passed * (1.0 - into * lost) / (1.0 + (1.0 - into) * lost))
+        def reached(asked: Any, before: Any, v: Any, m: Functions) -> Any:
+            friction = (1.0 - behind) * before
+            passed = asked - friction
+            lost = mu * m.sign(passed) * m.tanh(w * v)
+            return friction + passed * (1.0 - into * lost) / (1.0 + (1.0 - into) * lost)
 
-        return plain
+        def drive(command: Sequence[Any], speed: Sequence[Any], m: Functions) -> Any:
+            v = speed[index]
+            return reached(command[index], sum(curve.of(v, m) for curve in curves or ()), v, m)
+
+        def actuator(command: Array, motion: Motion, _: Array) -> Array:
+            left = command.copy()
+            left[..., index] = reached(self.own(command), self.own(arm.friction_torque(motion)), self.own(motion.dq), ARRAYS)
+            return left
+
+        return Hooks(actuator=actuator) if curves is None else Hooks(drive=(index, drive))
 
 
 def _lost(load: Array, side: Array, values: Values) -> Array:

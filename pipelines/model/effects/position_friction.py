@@ -12,12 +12,12 @@ import numpy as np
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
-    Formula,
     OwnLoad,
     Parameters,
     Quantity,
     Values,
     Words,
+    waves,
 )
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import sign_curve
@@ -104,13 +104,12 @@ class PositionFriction(Fast):
     def own_load(self, values: Values) -> OwnLoad:
         shaped, curve = self.at(values), sign_curve(1.0, values["sharpness"], values.get("roundness", 1.0))
         parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
-        waves = [(m * shaped.order, in_phase, across) for m, (in_phase, across) in enumerate(parts, start=1)]
-        sides = (f"({h!r}) * tanh({w!r} * {{v}})" for h, w in zip(curve.heights, curve.sharpnesses, strict=True))
-        return Formula.of_waves(waves, f"({' + '.join(sides)}) * ")
+        wave = waves([(k * shaped.order, in_phase, across) for k, (in_phase, across) in enumerate(parts, start=1)])
+        return lambda q, v, m: curve.of(v, m) * wave(q, m)
 
     def amplitudes(self, values: Values) -> Array:
-        waves = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in _TAILS[:self.harmonics]]
-        return np.array([part for wave in waves for part in (wave.real, wave.imag)])
+        each = [values[f"amplitude{tail}"] * np.exp(1j * values[f"phase{tail}"]) for tail in _TAILS[:self.harmonics]]
+        return np.array([part for wave in each for part in (wave.real, wave.imag)])
 
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         pairs = [*np.reshape(np.asarray(amplitudes, dtype=float), (-1, 2)).tolist(), *[[0.0, 0.0]] * (3 - self.harmonics)]

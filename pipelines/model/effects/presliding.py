@@ -125,20 +125,17 @@ class Presliding(Fast):
             return contact.rate(states, self.own(motion.dq) / unit)
 
         def load(motion: Motion, states: Array) -> Array:
-            u = contact.bent(states)
-            if time:
-                u = u + time * contact.bent(rate(motion, u, states))
+            u = contact.bent(states) + time * contact.bent(rate(motion, states, states))
             return self.on_own_row(arm, amplitude * u)[..., 0]
 
         return Hooks(load=load, states=contact.states, rate=rate)
 
     def own_memory(self, values: Values) -> OwnMemory | None:
-        shaped, amplitude = self.at(values), values["amplitude"]
+        shaped, amplitude = self.at(values), float(values["amplitude"])
         contact, unit, time = shaped._contact, shaped._unit, shaped.damping_time
         if isinstance(contact, Slips):
             return None
-        rate = contact.number_rate()
-        return OwnMemory(lambda u, v: rate(u, v / unit), lambda u, du: amplitude * (u + time * du))
+        return OwnMemory(lambda u, v, m: contact.rate_of(u, v / unit, m), lambda u, du: amplitude * (u + time * du))
 
     @property
     def _contact(self) -> Bristles | Slips | Breaking:

@@ -9,7 +9,6 @@ import numpy as np
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
-    Formula,
     OwnLoad,
     Parameters,
     Quantity,
@@ -42,4 +41,4 @@ class QuadraticDrag(FrictionLaw, Fast):
 
     def own_load(self, values: Values) -> OwnLoad:
         coefficient = self.amplitudes(values).item()
-        return Formula(f"({coefficient!r}) * {{v}} * abs({{v}})")
+        return lambda q, v, m: coefficient * v * abs(v)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import ArmModel, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
 from pipelines.model.rigid.body import Array, Motion
@@ -83,8 +84,8 @@ class Spring(Fast):
         known, falling = self.parameters.complete(values), (*rest[::-1], slope, constant)
         low, high = known["seen_from"], known["seen_to"]
 
-        def load(angle: float, speed: float) -> float:
-            near, torque, steep = min(max(angle, low), high), 0.0, 0.0
+        def load(angle: Any, speed: Any, m: Functions) -> Any:
+            near, torque, steep = m.smaller(m.larger(angle, low), high), 0.0, 0.0
             for coefficient in falling:  # Horner, of the polynomial and of its slope
                 torque, steep = torque * near + coefficient, steep * near + torque
             return torque + steep * (angle - near)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
-    Formula,
     OwnLoad,
     Parameters,
     Quantity,
@@ -84,9 +84,10 @@ class Stribeck(FrictionLaw, Fast):
     def own_load(self, values: Values) -> OwnLoad:
         amplitude, sharpness, slow = self.amplitudes(values).item(), values["sharpness"], 1.0 / values["speed"]
         p, n = values["tail"], values["exponent"]
-        turned = f"tanh({sharpness!r} * {{v}})"
-        if p < _NONE and n == _GAUSSIAN:  # four times a step: a power costs as much as all else
-            return Formula(f"({amplitude!r}) * exp(-({slow!r} * {{v}}) * ({slow!r} * {{v}})) * {turned}")
-        if p < _NONE:
-            return Formula(f"({amplitude!r}) * exp(-abs({slow!r} * {{v}}) ** {n!r}) * {turned}")
-        return Formula(f"({amplitude!r}) * (1.0 + {math.expm1(p)!r} * abs({slow!r} * {{v}}) ** {n!r}) ** ({-1.0 / p!r}) * {turned}")
+
+        def load(q: Any, v: Any, m: Functions) -> Any:
+            over = slow * v * slow * v if n == _GAUSSIAN else abs(slow * v) ** n
+            left = m.exp(-over) if p < _NONE else (1.0 + math.expm1(p) * over) ** (-1.0 / p)
+            return amplitude * left * m.tanh(sharpness * v)
+
+        return load

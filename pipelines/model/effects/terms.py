@@ -6,7 +6,7 @@
     Numbered      their values by name and amplitudes, one from the other
     Words         what a report says of an effect
     SpeedCurve    a torque that follows from speed alone, which a simulation takes by itself
-    Formula       one that follows from angle and speed, which it writes out
+    OwnLoad       one that follows from angle and speed of its joint, in numbers or arrays
     Hooks         how an effect enters the forward simulation
 
 `pipelines.model.effects.base`, the contract of an effect, hands these on: an effect imports from there alone.
@@ -17,16 +17,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from pipelines.dynamics.functions import ARRAYS, Functions
 from pipelines.io.robot import RobotDescription
 from pipelines.model.rigid.body import Array, Motion, RigidBody
 
-__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "WRITTEN", "ArmModel", "Formula", "Hooks", "Numbered", "OwnLoad", "OwnMemory",
-           "Parameters", "PlainDrive", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "friction_at", "predicted", "summed"]
+__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Hooks", "Numbered", "OwnDrive", "OwnLoad", "OwnMemory",
+           "Parameters", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "friction_at", "predicted", "summed",
+           "waves"]
 
 Values = Mapping[str, float]
 
@@ -72,41 +73,29 @@ class ArmModel(Protocol):
 
 
 Predict = Callable[[Motion, ArmModel], Array]
-OwnLoad = Callable[[float, float], float]  # angle [rad], speed [rad/s] -> [N m]
-WRITTEN: Mapping[str, Any] = {name: getattr(math, name) for name in ("cos", "exp", "sin", "tanh", "inf", "nan")}  # in formulas
-PlainDrive = Callable[[tuple[float, ...], tuple[float, ...]], tuple[float, ...]]  # command [N m], speeds [rad/s] -> [N m], by joint
+# angle [rad] and speed [rad/s] of a joint -> [N m], all numbers or all arrays, as the functions are
+OwnLoad = Callable[[Any, Any, Functions], Any]
+# command [N m] and speed [rad/s] joint by joint -> what reaches one of them, the same
+OwnDrive = Callable[[Any, Any, Functions], Any]
 
 
 _TIMING = 0.1  # of a sample: as well as a log tells when something was, stamps of 0.1 ms at 1 kHz
 
 
-@dataclass(frozen=True)
-class Formula:
-    """An `OwnLoad` that a simulation can write out among its own sums: there a call costs more than the arithmetic."""
+def waves(parts: Sequence[tuple[float, float, float]]) -> Callable[[Any, Functions], Any]:
+    """Return the sum of a sin(k q) + b cos(k q) over all (k, a, b), as a function of q."""
+    def sum_at(q: Any, m: Functions) -> Any:
+        return sum(a * m.sin(k * q) + b * m.cos(k * q) for k, a, b in parts)
 
-    text: str  # Python over {q} [rad] and {v} [rad/s], with the names of `WRITTEN`
-
-    def __call__(self, angle: float, speed: float) -> float:
-        return self._called(angle, speed)
-
-    @classmethod
-    def of_waves(cls, waves: Sequence[tuple[float, float, float]], times: str = "") -> Formula:
-        """The sum of a sin(k q) + b cos(k q) over all (k, a, b), `times` what stands before it."""
-        each = (f"({a!r}) * sin({k!r} * {{q}}) + ({b!r}) * cos({k!r} * {{q}})" for k, a, b in waves)
-        return cls(f"{times}({' + '.join(each)})")
-
-    @cached_property
-    def _called(self) -> OwnLoad:
-        load: OwnLoad = eval(f"lambda q, v: {self.text.format(q='q', v='v')}", dict(WRITTEN))
-        return load
+    return sum_at
 
 
 @dataclass(frozen=True)
 class OwnMemory:
-    """A load of one joint that remembers one number, in plain numbers: where an `OwnLoad` knows angle and speed alone."""
+    """A load of one joint that remembers one number: where an `OwnLoad` knows angle and speed alone."""
 
-    rate: Callable[[float, float], float]  # memory, speed [rad/s] -> d(memory)/dt
-    load: Callable[[float, float], float]  # memory and its rate -> [N m]
+    rate: Callable[[Any, Any, Functions], Any]  # memory, speed [rad/s] -> d(memory)/dt
+    load: Callable[[Any, Any], Any]  # memory and its rate -> [N m]
 
 
 @dataclass(frozen=True)
@@ -276,15 +265,12 @@ class SpeedCurve:
 
     def torque(self, speed: Array) -> Array:
         """[N m] at each speed [rad/s]."""
-        tau = self.constant + self.viscous * speed
-        for height, sharpness in zip(self.heights, self.sharpnesses, strict=True):
-            tau += height * np.tanh(sharpness * speed)
-        return tau
+        return np.asarray(self.of(speed, ARRAYS))
 
-    def at(self, speed: float) -> float:
-        """The same of one number."""
+    def of(self, speed: Any, m: Functions) -> Any:
+        """[N m] at a speed, a number or an array."""
         sigmoids = zip(self.heights, self.sharpnesses, strict=True)
-        return self.constant + self.viscous * speed + sum(height * math.tanh(w * speed) for height, w in sigmoids)
+        return self.constant + self.viscous * speed + sum(height * m.tanh(w * speed) for height, w in sigmoids)
 
 
 @dataclass(frozen=True)
@@ -301,10 +287,10 @@ class Hooks:
     """
 
     load: Callable[[Motion, Array], Array] | None = None  # motion, states -> torque the drive must overcome [N m]
-    alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based) in plain numbers: `Fast.own_load`
-    remembering: tuple[int, OwnMemory] | None = None  # or where it is one state that begins at zero: `Fast.own_memory`
+    alone: tuple[int, OwnLoad] | None = None  # the same of one joint (0-based): `Fast.own_load`
+    remembering: tuple[int, OwnMemory] | None = None  # or with one state that begins at zero: `Fast.own_memory`
     actuator: Callable[[Array, Motion, Array], Array] | None = None  # command, motion, states -> applied torque [N m]
-    drive: PlainDrive | None = None  # the same of one robot in plain numbers, where speeds tell it
+    drive: tuple[int, OwnDrive] | None = None  # the same of one joint (0-based), where speeds tell it
     sensor: Callable[[Array, Array], Array] | None = None  # true q, states -> measured q [rad]
     inertia: Array | None = None  # (joints, joints) [kg m^2] added to D(q)
     arm: ArmModel | None = None  # the arm as it truly is

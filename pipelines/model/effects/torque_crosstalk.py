@@ -49,12 +49,5 @@ class TorqueCrosstalk(Effect):
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        def applied(command: Array, motion: Motion, _: Array) -> Array:
-            mixed = command.copy()
-            mixed[..., self._index] -= values["coefficient"] * command[..., int(values["from_joint"]) - 1]
-            return mixed
-
-        def plain(command: tuple[float, ...], _: tuple[float, ...]) -> tuple[float, ...]:
-            return self.with_own(command, command[self._index] - values["coefficient"] * command[int(values["from_joint"]) - 1])
-
-        return Hooks(actuator=applied, drive=plain)
+        own, other, share = self._index, int(values["from_joint"]) - 1, values["coefficient"]
+        return Hooks(drive=(own, lambda command, _, m: command[own] - share * command[other]))

@@ -59,12 +59,5 @@ class TorqueGain(Effect):
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        def applied(command: Array, motion: Motion, _: Array) -> Array:
-            scaled = command.copy()
-            scaled[..., self._index] *= 1.0 + values["gain_error"]
-            return scaled
-
-        def plain(command: tuple[float, ...], _: tuple[float, ...]) -> tuple[float, ...]:
-            return self.with_own(command, command[self._index] * (1.0 + values["gain_error"]))
-
-        return Hooks(actuator=applied, drive=plain)
+        own, gain = self._index, 1.0 + values["gain_error"]
+        return Hooks(drive=(own, lambda command, _, m: command[own] * gain))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -64,16 +65,13 @@ class TorqueSaturation(Effect):
         return tau
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
-        def applied(command: Array, motion: Motion, _: Array) -> Array:
-            left = command.copy()
-            left[..., self._index] -= values["coefficient"] * _above(self.own(command), values["limit"])
-            return left
+        index, limit, share = self._index, values["limit"], values["coefficient"]
 
-        def plain(command: tuple[float, ...], _: tuple[float, ...]) -> tuple[float, ...]:
-            own, limit = command[self._index], values["limit"]
-            return self.with_own(command, own - values["coefficient"] * (own - min(max(own, -limit), limit)))
+        def applied(command: Sequence[Any], _: Sequence[Any], m: Functions) -> Any:
+            asked = command[index]
+            return asked - share * (asked - m.smaller(m.larger(asked, -limit), limit))
 
-        return Hooks(actuator=applied, drive=plain)
+        return Hooks(drive=(index, applied))
 
     def _asked(self, motion: Motion, arm: ArmModel) -> Array:
         return predicted(arm, motion) if motion.tau is None else motion.tau

@@ -22,7 +22,7 @@ from pipelines.model.excitation.design import FINISH, Design, finished, landscap
 from pipelines.model.excitation.others import Plan
 from pipelines.model.excitation.task import Task
 from pipelines.model.rigid.body import Array
-from pipelines.model.simulation import Experiment, Noise, simulate
+from pipelines.simulation import Experiment, Noise, simulate
 
 __all__ = ["Beyond", "Rehearsal", "rehearse", "rehearsed", "rehearsed_design"]
 

@@ -11,13 +11,13 @@ Positions and speeds are in units of the travel d (Dahl 1968; Dupont, Hayward, A
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.functions import ARRAYS, Functions
 from pipelines.model.rigid.body import Array
 
 __all__ = ["ONE", "Breaking", "Bristles", "Slips", "sliding_level"]
@@ -64,24 +64,15 @@ class Bristles:
         return (max(power, 0.0) if isinstance(x, float) else np.maximum(power, 0.0)) ** (1.0 / (1.0 - n))
 
     def rate(self, states: Array, v: Array) -> Array:
-        y = np.sign(v) * states[:, 0]
-        slides = (np.maximum(1.0 - y, _SLIDES) / (1.0 - self.elastic)) ** self.exponent
-        return np.asarray(v * np.where(y < self.elastic, 1.0, np.where(y < 1.0, slides, 1.0 - y)))[:, None]
+        return np.asarray(self.rate_of(states[:, 0], v, ARRAYS))[:, None]
 
-    def number_rate(self) -> Callable[[float, float], float]:
-        """`rate` of numbers."""
-        e, n, straight = self.elastic, self.exponent, self.exponent == 1.0
-
-        def rate(u: float, v: float) -> float:
-            y = u if v > 0.0 else -u
-            if y < e:
-                return v
-            if y >= 1.0:
-                return v * (1.0 - y)
-            slides = max(1.0 - y, _SLIDES) / (1.0 - e)
-            return v * slides if straight else float(v * slides**n)
-
-        return rate
+    def rate_of(self, u: Any, v: Any, m: Functions) -> Any:
+        """du/dt of one state, a number or an array."""
+        e = self.elastic
+        y = m.where(v > 0.0, u, -u)
+        slides = m.larger(1.0 - y, _SLIDES) / (1.0 - e)
+        slides = slides if self.exponent == 1.0 else slides**self.exponent
+        return v * m.where(y < e, 1.0, m.where(y < 1.0, slides, 1.0 - y))
 
     def bent(self, states: Array) -> Array:
         return np.asarray(states[:, 0])
@@ -150,25 +141,21 @@ class Breaking:
         return _recursion(kept, np.sign(step) * level * (1.0 - kept))[:, None]
 
     def rate(self, states: Array, v: Array) -> Array:
-        return np.asarray(v * (1.0 - np.sign(v) * states[:, 0] / sliding_level(v, self.breakaway, self.speed)))[:, None]
+        return np.asarray(self.rate_of(states[:, 0], v, ARRAYS))[:, None]
 
-    def number_rate(self) -> Callable[[float, float], float]:
-        """`rate` of numbers."""
-        more, slow, fast, exp = self.breakaway, self.speed, _FAST * self.speed, math.exp
-
-        def rate(u: float, v: float) -> float:
-            y = u if v > 0.0 else -u
-            return v * (1.0 - y / (1.0 + more * exp(-(min(abs(v), fast) / slow) ** 2)))
-
-        return rate
+    def rate_of(self, u: Any, v: Any, m: Functions) -> Any:
+        """du/dt of one state, a number or an array."""
+        level = sliding_level(v, self.breakaway, self.speed, m)
+        return v * (1.0 - m.sign(v) * u / level)
 
     def bent(self, states: Array) -> Array:
         return np.asarray(states[:, 0])
 
 
-def sliding_level(v: Array, breakaway: float, speed: float) -> Array:
+def sliding_level(v: Any, breakaway: float, speed: float, m: Functions = ARRAYS) -> Any:
     """h(v)"""
-    return np.asarray(1.0 + breakaway * np.exp(-np.square(np.minimum(np.abs(v), _FAST * speed) / speed)))
+    over = m.smaller(abs(v), _FAST * speed) / speed
+    return 1.0 + breakaway * m.exp(-over * over)
 
 
 def _recursion(kept: Array, added: Array) -> Array:

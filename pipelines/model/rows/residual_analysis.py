@@ -23,8 +23,8 @@ import numpy as np
 from pipelines.io.log import Array
 from pipelines.model.rows.data import Data, LogData
 from pipelines.model.rows.fit import Refined
-from pipelines.model.simulation.comparison import Simulation
 from pipelines.signal.spectra import welch
+from pipelines.simulation.comparison import Simulation
 
 __all__ = ["Curve", "Evidence", "Proof", "Spectrum", "amplitudes", "binned", "evidence", "least_order", "proof",
            "with_simulation"]

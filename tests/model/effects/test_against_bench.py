@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from bench.plant import as_log
+from pipelines.dynamics.functions import NUMBERS
 from pipelines.io.log import Array
 from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
@@ -20,7 +21,7 @@ from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.link_length import LinkLength
 from pipelines.model.effects.spring import Spring
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Plant, run
+from pipelines.simulation import Experiment, Plant, run
 from tests.model.effects.on_bench import (
     arm,
     effect_of,
@@ -207,7 +208,7 @@ def test_a_spring_goes_straight_on_beyond_the_angles_it_was_fitted_to() -> None:
     for effect, values in ((spring, spring.values(amplitudes)), (read.effect, read.values)):
         load = effect.own_load(values)
         assert load is not None
-        np.testing.assert_allclose([load(x, 0.0) for x in q], expected, atol=1e-10)
+        np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], expected, atol=1e-10)
 
 
 def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
@@ -216,8 +217,8 @@ def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
     spring, q = Spring(1), np.linspace(-1.2, 1.2, 25)
     values = spring.values([fitted[1], fitted[0], *fitted[2:]])
     load = spring.own_load(values)
-    np.testing.assert_allclose([load(x, 0.0) for x in q], np.polynomial.Polynomial(fitted)(q), atol=1e-12)
-    assert load(values["rest_angle"], 0.0) == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], np.polynomial.Polynomial(fitted)(q), atol=1e-12)
+    assert load(values["rest_angle"], 0.0, NUMBERS) == pytest.approx(0.0, abs=1e-12)
     five = Spring(1, degree=5).values([fitted[1], fitted[0], *fitted[2:6]])
     whole = Arm.from_links(machine().robot).extended(Acting.of(Spring(1, degree=5), five)).to_model()
     before = {name: value for name, value in whole.effects[0].parameters.items() if name not in ("sixth", "seventh")}
@@ -225,7 +226,7 @@ def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
     old = arm_then.effects[0]
     load = old.effect.own_load(old.values)
     assert load is not None
-    np.testing.assert_allclose([load(x, 0.0) for x in q], np.polynomial.Polynomial(fitted[:6])(q), atol=1e-12)
+    np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], np.polynomial.Polynomial(fitted[:6])(q), atol=1e-12)
 
 
 def test_a_gap_of_nothing_is_no_backlash() -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from pipelines.dynamics.functions import NUMBERS
 from pipelines.model.effects.concave_friction import ConcaveFriction
 from pipelines.model.rigid.body import Array
 from sample_logs.make_model import synthetic_arm
@@ -62,4 +63,4 @@ def test_it_simulates_as_it_fits(knee: float) -> None:
     load = form.own_load(form.values([AMPLITUDE]))
     assert load is not None
     v = np.concatenate([-OTHERS, [0.0], OTHERS])
-    np.testing.assert_allclose([load(0.0, speed) for speed in v.tolist()], curve(form, AMPLITUDE, v), rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose([load(0.0, speed, NUMBERS) for speed in v.tolist()], curve(form, AMPLITUDE, v), rtol=1e-12, atol=1e-15)

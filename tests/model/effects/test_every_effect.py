@@ -284,7 +284,7 @@ def test_simulation_hooks(kind: type[Effect], arm: Arm, motion: Motion) -> None:
     """It enters the simulation in some way; a plain load is its torque."""
     values = drawn(placed(kind), 6)
     hooks = placed(kind).simulate(arm, values)
-    assert any(hook is not None for hook in (hooks.load, hooks.actuator, hooks.sensor, hooks.inertia, hooks.arm, hooks.record))
+    assert any(hook is not None for hook in (hooks.load, hooks.actuator, hooks.drive, hooks.sensor, hooks.inertia, hooks.arm, hooks.record))
     assert (hooks.states == 0) == (hooks.rate is None and hooks.update is None)
     if kind.simulate is Effect.simulate:
         assert hooks.load is not None

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pipelines.dynamics.functions import ARRAYS, NUMBERS
 from pipelines.model.effects.asymmetric_friction import AsymmetricFriction
 from pipelines.model.effects.load_friction import LoadFriction
 from pipelines.model.effects.position_friction import PositionFriction
@@ -104,9 +105,9 @@ def test_load_friction_of_the_simulation_is_that_of_the_log(behind: float, input
     values = {"mu": 0.2, "sharpness": 80.0, "behind": behind, "input_side": input_side}
     logged = LoadFriction(2).apply(motion, arm, values)
     hooks = LoadFriction(2).simulate(arm, values)
-    assert hooks.actuator is not None
-    carried = hooks.actuator(logged, motion, np.zeros((len(motion.t), 0)))
-    np.testing.assert_allclose(carried, arm.torque(motion), rtol=1e-12, atol=1e-12)
+    assert hooks.drive is not None
+    carried = hooks.drive[1](logged.T, motion.dq.T, ARRAYS)
+    np.testing.assert_allclose(carried, arm.torque(motion)[:, 1], rtol=1e-12, atol=1e-12)
 
 
 def test_what_rubs_behind_a_gear_loads_it_too() -> None:
@@ -215,4 +216,4 @@ def test_directions_that_go_over_gradually_are_fitted_as_such() -> None:
     assert left > 1e-3
     load = gradual.own_load(gradual.values([0.4, 0.1]))
     assert load is not None
-    assert [load(0.0, speed) for speed in v[:50]] == pytest.approx(list(0.5 * turned[:50] * (0.4 * turned[:50] + 0.1 * v[:50])))
+    assert [load(0.0, speed, NUMBERS) for speed in v[:50]] == pytest.approx(list(0.5 * turned[:50] * (0.4 * turned[:50] + 0.1 * v[:50])))

@@ -20,7 +20,7 @@ from pipelines.model.effects.kinds import Event
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.simulation import Plant
+from pipelines.simulation import Plant
 from tests.model.rigid.serial_arms import GANTRY, TX40, physical_links, table
 
 ROBOTS: dict[str, Callable[[Path], RobotDescription]] = {

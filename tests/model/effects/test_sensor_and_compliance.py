@@ -27,10 +27,10 @@ from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.joint_elasticity import JointElasticity
 from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Plant, run, simulate_windows
+from pipelines.simulation import Experiment, Plant, run, simulate_windows
 from tests.model.effects.on_bench import arm, fault, faulty, healthy, machine, planned, rms
-from tests.model.simulation.arms import KD, KP, experiment
 from tests.seeds import rarely, usually
+from tests.simulation.arms import KD, KP, experiment
 
 CUTOFF_HZ = 20.0
 SENSORS = (("time_delay", 1), ("time_delay", 2), ("time_delay", 3), ("encoder_eccentricity", 1), ("encoder_eccentricity", 2),

@@ -14,7 +14,7 @@ from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.rigid.body import Motion
-from pipelines.model.simulation import Experiment, Noise, simulate
+from pipelines.simulation import Experiment, Noise, simulate
 from sample_logs.make_closed_form import (
     NOISE,
     Fourier,

@@ -18,7 +18,7 @@ from pipelines.model.rigid.perturbation import (
     torque_slopes,
 )
 from tests.model.rigid.rrr_arms import random_states
-from tests.model.simulation.arms import Case, rrr
+from tests.simulation.arms import Case, rrr
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,239 @@
+"""Compare simulated arms with the measured one over the same stretches of logs.
+
+    simulation_errors(arms, motions)     position error of each arm, closed loop or short windows
+
+In a closed loop the controller of the log moves the arm. Where none is known, the logged torque
+drives the arm over windows of a tenth of a second.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import InputRejected
+from pipelines.io.log import Array, ExperimentLog
+from pipelines.model.arm import Arm
+from pipelines.model.estimation.logs import Motions
+from pipelines.model.motion import Reconstructed
+from pipelines.model.rigid.body import Motion
+from pipelines.simulation.config import SIMULATION
+from pipelines.simulation.experiment import Experiment
+from pipelines.simulation.plant import Plant
+from pipelines.simulation.replay import Windows, held_torque, simulate_windows
+from pipelines.simulation.run import run_together
+from pipelines.simulation.step import choose_step
+
+__all__ = ["Positions", "SimulatedSpan", "Simulation", "Strayed", "in_loop", "in_loops", "nearer",
+           "simulation_errors"]
+
+# simulated and measured (samples, joints) [rad], and the time between samples [s]
+Positions = tuple[Array, Array, float]
+
+
+@dataclass(frozen=True)
+class SimulatedSpan:
+    """How much of a log was simulated: in closed loop from where it begins on, or in windows."""
+
+    log: str  # its name
+    seconds: float  # [s] over which the simulated arm was compared with the measured one
+
+
+@dataclass(frozen=True, eq=False)
+class Strayed:
+    """How a simulated arm strays from the measured one in a log whose controller moves both."""
+
+    log: str  # its name
+    t: Array  # [s] (samples,) since it began
+    error: Array  # [rad] (samples, joints) simulated minus measured
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """How far the simulated arm is from the measured one, over the held-out logs."""
+
+    how: Literal["closed-loop", "windowed", "none"]
+    position_rms: Array  # [rad] (joints,)
+    tip_rms: float  # [m]
+    power: Array  # (blocks,) of time: squared error summed over the joints, in units of each
+    first: Strayed | None = None  # in the first of the logs; None where no controller is known
+    span: tuple[SimulatedSpan, ...] = ()  # of each log that was simulated
+
+    @classmethod
+    def none(cls, joints: int) -> Simulation:
+        return cls("none", np.full(joints, np.nan), np.nan, np.zeros(0))
+
+
+def nearer(before: Simulation, after: Simulation) -> bool:
+    """Return whether the second simulated arm is nearer to the measured one, chance or not."""
+    if "none" in (before.how, after.how):
+        return False
+    return float(after.power.sum()) < float(before.power.sum())
+
+
+def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
+    """Return the position error of each arm over the same stretches of logs.
+
+    In closed loop where the first arm allows it, over short windows else; nothing without logs. In
+    a loop the stretches are short, and longer ones where they leave it open whether the last arm
+    comes nearer than the first: what the amplifiers' noise moves, no simulated arm follows.
+    """
+    none = [Simulation.none(arm.n_joints) for arm in arms]
+    if not motions:
+        return none
+    logs = motions[:SIMULATION.logs]
+    hooks = [hook for arm in arms for hook in Plant.of(arm).hooks]
+    soft = any(hook.rate or hook.remembering for hook in hooks)
+    if all(in_loop(arms[0], log) for log, _ in logs):
+        slow = soft or any(hook.actuator and hook.states for hook in hooks)
+        longest = SIMULATION.longest_soft if slow else SIMULATION.longest
+        found = _told(arms, logs, in_loops(arms, logs, longest), closed=True)
+        more = any(log.n_samples * log.sample_time > longest for log, _ in logs)
+        if more and _open(found[0], found[-1]):
+            positions = in_loops(arms, logs, SIMULATION.longer * longest)
+            longer = _told(arms, logs, positions, closed=True)
+            found = found if longer[0].how == "none" else longer
+        if found[0].how != "none":
+            return found
+    exact = SIMULATION.exact_soft if soft else SIMULATION.exact
+    found = _told(arms, logs, [_in_windows(arm, logs, exact) for arm in arms], closed=False)
+    return none if found[0].how == "none" else found
+
+
+def _open(first: Simulation, last: Simulation) -> bool:
+    """Return whether both could be simulated, and the last is not nearer."""
+    return "none" not in (first.how, last.how) and first is not last and not nearer(first, last)
+
+
+def in_loop(arm: Arm, log: ExperimentLog) -> bool:
+    """Return whether the log's controller is known, and the arm has an inertia to be moved."""
+    try:
+        Plant.of(arm).refuse_unphysical(Experiment.of_log(log).q_ref[:1])
+    except InputRejected:
+        return False
+    return True
+
+
+def in_loops(arms: Sequence[Arm], motions: Motions,
+             seconds: float) -> list[list[Positions] | None]:
+    """Return the positions of each arm in each log, over its first `seconds`.
+
+    None of one that runs away, or is none that can be simulated. What step suffices for a log
+    suffices for the next: they have one controller and arm.
+
+    Raises:
+        InputRejected: a log does not describe its controller.
+    """
+    parts = []
+    for log, _ in motions:
+        experiment = Experiment.of_log(log)
+        samples = min(experiment.n_samples, round(seconds / log.sample_time))
+        parts.append(experiment.part(0, samples))
+    found: list[list[Positions] | None] = []
+    for plant in map(Plant.of, arms):
+        try:
+            step = choose_step(plant, parts[0])
+            moved = run_together(plant, parts, step.per_sample, exact=step.exact)
+        except InputRejected:  # D15, D17
+            found.append(None)
+            continue
+        pairs = [(one.q[0], log) for one, (log, _) in zip(moved, motions, strict=True)]
+        found.append([(q, log.q[:len(q)], log.sample_time) for q, log in pairs])
+    return found
+
+
+def _told(arms: Sequence[Arm], motions: Motions, every: Sequence[list[Positions] | None],
+          closed: bool) -> list[Simulation]:
+    """Return how far each arm is off, of its positions in each log."""
+    found = []
+    for arm, positions in zip(arms, every, strict=True):
+        none = Simulation.none(arm.n_joints)
+        found.append(none if positions is None else _errors(arm, motions, positions, closed))
+    return found
+
+
+def _errors(arm: Arm, motions: Motions, positions: Sequence[Positions],
+            closed: bool) -> Simulation:
+    square, away, span = [], [], []
+    for (q, seen, between), (log, _) in zip(positions, motions, strict=True):
+        known = np.isfinite(q + seen).all(axis=1)
+        square.append(np.square(q[known] - seen[known]))
+        away.append(np.sum(np.square(arm.body.tip(q[known]) - arm.body.tip(seen[known])), axis=1))
+        span.append(SimulatedSpan(log.name, between * int(known.sum())))
+    each = np.concatenate(square)
+    block = np.arange(len(each)) * SIMULATION.blocks // max(len(each), 1)
+    units = _units(arm, [seen[np.isfinite(seen).all(axis=1)] for _, seen, _ in positions])
+    power = np.bincount(block, each @ units**-2, minlength=SIMULATION.blocks).astype(np.float64)
+    position, tip = np.sqrt(each.mean(axis=0)), float(np.sqrt(np.mean(np.concatenate(away))))
+    if not closed:
+        return Simulation("windowed", position, tip, power, span=tuple(span))
+    (log, _), (q, seen, _) = motions[0], positions[0]
+    first = Strayed(log.name, log.t[:len(q)] - log.t[0], q - seen)
+    return Simulation("closed-loop", position, tip, power, first, tuple(span))
+
+
+def _units(arm: Arm, seen: Sequence[Array]) -> Array:
+    """Return the units (joints,) in which errors of several joints are added up.
+
+    Radians, or metres; where some joints turn and others slide, the standard deviation of what each
+    was measured to do. What is held there has no say, for a hair is all it moves.
+    """
+    turning = arm.robot.revolute
+    if all(turning) or not any(turning):
+        return np.ones(len(turning))
+    spread = np.std(np.concatenate(seen), axis=0)
+    return np.asarray(np.where(spread > SIMULATION.still, spread, np.inf))
+
+
+def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[Positions] | None:
+    """Return the positions of an arm that is driven by the logged torque; None if it runs away.
+
+    The steps that suffice for a log suffice for the next.
+    """
+    pairs: list[Positions] = []
+    steps: dict[float, int] = {}
+    try:
+        for log, found in motions:
+            windows, motion, between = _windowed(arm, log, found, exact, steps.get(log.sample_time))
+            steps[log.sample_time] = windows.steps
+            pairs.append((windows.q, motion.q, between))
+    except InputRejected:  # D15, D17, T08
+        return None
+    return pairs
+
+
+def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float,
+              steps: int | None) -> tuple[Windows, Motion, float]:
+    """Return the windows, the motion beside them, and the time between its samples [s]."""
+    usable = np.zeros(log.n_samples, dtype=bool)
+    usable[found.good.kept] = found.good.fit
+    motion, tau, usable, every = _coarser(found.motion, held_torque(log), usable, log.sample_time)
+    between = every * log.sample_time
+    length = max(SIMULATION.window_samples, round(SIMULATION.window / between))
+    for count in dict.fromkeys((steps, None)):  # livelier than the log they were chosen for?
+        windows = simulate_windows(Plant.of(arm), motion, tau, between, length, usable, exact,
+                                   count)
+        if np.isfinite(windows.q[windows.first[:, None] + np.arange(length)]).all():
+            return windows, motion, between
+    # left out, it would count as no error at all
+    raise InputRejected("D17", "the arm runs away in a window", where=log.name,
+                        remedy="look at its inertia")
+
+
+def _coarser(motion: Motion, tau: Array, usable: npt.NDArray[np.bool_],
+             sample_time: float) -> tuple[Motion, Array, npt.NDArray[np.bool_], int]:
+    """Return every Nth sample of a motion, the mean torque until the next, and what is usable."""
+    every = max(1, int(SIMULATION.fine / sample_time * (1.0 + 1e-9)))  # numerics: rounding
+    if every == 1:
+        return motion, tau, usable, 1
+    count = len(tau) // every
+    steps = np.diff(motion.t, append=motion.t[-1] + sample_time)
+    good = np.asarray(usable & ~(np.abs(steps - sample_time) > 0.5 * sample_time))
+    some = slice(0, count * every, every)
+    thin = Motion(motion.t[some], motion.q[some], motion.dq[some], motion.ddq[some])
+    mean = np.asarray(tau[:count * every].reshape(count, every, -1).mean(axis=1))
+    return thin, mean, np.asarray(good[:count * every].reshape(count, every).all(axis=1)), every

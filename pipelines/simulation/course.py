@@ -1,0 +1,89 @@
+"""What the figures of a simulated log show: envelopes, spectra, how windows drift."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.io.log import Array, ExperimentLog
+from pipelines.signal.spectra import welch
+from pipelines.simulation.config import SIMULATION
+from pipelines.simulation.replay import Windows
+
+__all__ = ["Course", "course"]
+
+Pair = tuple[Array, Array]
+
+
+@dataclass(frozen=True)
+class Course:
+    """Measured and simulated signals (points, joints).
+
+    t has two points a stretch, its lowest and its highest sample.
+    """
+
+    t: Array  # [s] (points,)
+    position: Array  # [rad] measured
+    position_simulated: Array
+    position_difference: Array  # simulated minus measured
+    speed: Array  # [rad/s] reconstructed
+    speed_simulated: Array
+    torque: Array | None  # [N m] commanded
+    torque_simulated: Array | None
+    torque_difference: Array | None
+    frequency: Array | None  # [Hz] (bins,) of the spectra; None for windows, which begin anew
+    position_density: Array | None  # [rad²/Hz] (bins, joints) of the difference
+    torque_density: Array | None  # [N² m²/Hz]
+    elapsed: Array | None  # [s] since a window began
+    drift: Array | None  # [rad] rms of the position's difference by then (points, joints)
+
+
+def course(log: ExperimentLog, q: Pair, dq: Pair, tau: Pair | None,
+           windows: Windows | None = None) -> Course:
+    """Return the series of one log; each pair is measured and simulated (samples, joints)."""
+    size = max(1, -(-log.n_samples // SIMULATION.stretches))
+    first = np.arange(0, log.n_samples, size)
+    middle = np.minimum(first + size // 2, log.n_samples - 1)
+    t = np.stack([log.t[first], log.t[middle]], axis=1).ravel()
+    off, time = q[1] - q[0], log.sample_time
+    measured, simulated, difference, speed, moved = (_envelope(x, size) for x in (*q, off, *dq))
+    torque = applied = missing = None
+    frequency = density = torque_density = elapsed = drift = None
+    if windows is None:
+        frequency, density = _spectrum(off, time)
+    else:
+        elapsed, drift = _drift(off, windows, time)
+    if tau is not None:
+        missed = tau[1] - tau[0]
+        torque, applied, missing = (_envelope(x, size) for x in (*tau, missed))
+        torque_density = None if frequency is None else _spectrum(missed, time)[1]
+    return Course(t, measured, simulated, difference, speed, moved, torque, applied, missing,
+                  frequency, density, torque_density, elapsed, drift)
+
+
+def _spectrum(x: Array, sample_time: float) -> tuple[Array, Array] | tuple[None, None]:
+    """Density of the longest stretch without a gap."""
+    known = np.isfinite(x).all(axis=1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known,
+                                                   [False]]).astype(np.int8))).reshape(-1, 2)
+    start, stop = max(edges.tolist(), key=lambda edge: edge[1] - edge[0], default=(0, 0))
+    if stop - start < SIMULATION.fewest:
+        return None, None
+    found = welch(x[start:stop], 1.0 / sample_time, SIMULATION.segment)
+    return found.frequency, found.density
+
+
+def _drift(off: Array, windows: Windows, sample_time: float) -> tuple[Array, Array]:
+    rows = windows.first[:, None] + np.arange(windows.length)
+    return sample_time * np.arange(windows.length, dtype=np.float64), np.sqrt(
+        np.mean(off[rows]**2, axis=0))
+
+
+def _envelope(x: Array, size: int) -> Array:
+    """(2 stretches, joints): lowest and highest of each `size` samples, NaN where there is none."""
+    first = np.arange(0, len(x), size)
+    low = np.minimum.reduceat(np.where(np.isnan(x), np.inf, x), first, axis=0)
+    high = np.maximum.reduceat(np.where(np.isnan(x), -np.inf, x), first, axis=0)
+    both = np.stack([low, high], axis=1).reshape(-1, x.shape[1])
+    return np.where(np.isfinite(both), both, np.nan)

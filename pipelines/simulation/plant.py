@@ -1,0 +1,268 @@
+"""The arm as a thing that moves: rigid body, friction and effects put together.
+
+    plant = Plant.of(arm)
+    moving = plant.prepared(replicas)            with working memory
+    moving.accelerations(t, q, dq, states, command, out)
+
+Effects enter through their hooks, in the order in which they act. What follows from angle and
+speed of one joint is a function of numbers or arrays; friction that is a curve of speed alone is
+gathered for all joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from pipelines.dynamics.functions import ARRAYS
+from pipelines.errors import InputRejected
+from pipelines.io.log import Array
+from pipelines.model.arm import Arm
+from pipelines.model.effects.base import ArmModel, Effect, Hooks, SpeedCurve, Values
+from pipelines.model.effects.fast import own_load, own_memory, speed_curve
+from pipelines.model.rigid.body import Motion, RigidBody
+from pipelines.simulation.bodies import ManyChains, many_bodies
+from pipelines.simulation.config import SIMULATION
+
+__all__ = ["MovingPlant", "Plant"]
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """What moves, in parts."""
+
+    body: RigidBody
+    p: Array  # (parameters,), or (replicas, parameters)
+    added: Array  # [kg m^2] (joints, joints) inertia of rotors
+    curves: tuple[SpeedCurve, ...]  # friction of each joint that follows from its speed alone
+    hooks: tuple[Hooks, ...]  # of all other effects
+    needed: Callable[[Motion], Array]  # torque of a motion at the start [N m], for memories
+    records: tuple[Callable[[Array, Array], Array], ...] = ()  # between a command and the log
+
+    @classmethod
+    def of(cls, arm: Arm, p: Array | None = None) -> Plant:
+        """Return `arm` in parts, with its own base parameters or with `p` (replicas, parameters).
+
+        Raises:
+            ValueError: p has another shape.
+        """
+        if p is not None and p.shape[1:] != arm.p.shape:
+            raise ValueError(f"p has the shape {p.shape}, wanted is (replicas, {len(arm.p)})")
+        rigid, acting_on = Arm(arm.name, arm.body, arm.base), cast("ArmModel", arm.nominal)
+        curves: list[list[SpeedCurve]] = [[] for _ in range(arm.n_joints)]
+        hooks, records, added = [], [], np.zeros((arm.n_joints, arm.n_joints))
+        for place, acting in enumerate((*arm.friction, *arm.effects)):
+            effect, values = acting.effect, {k: float(x) for k, x in acting.values.items()}
+            curve = speed_curve(effect, values)
+            if curve is not None and effect.joint is not None:
+                curves[effect.joint - 1].append(curve)
+                continue
+            inside = rigid if place < len(arm.friction) else acting_on
+            own = effect.simulate(inside, values)
+            acting_on = acting_on if own.arm is None else own.arm
+            added = added if own.inertia is None else added + own.inertia
+            records += [own.record] if own.record else []
+            if any((own.load, own.actuator, own.drive, own.sensor, own.settled, own.states)):
+                hooks.append(_alone(effect, values, own))
+        parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
+        gathered = tuple(_gathered(each) for each in curves)
+        needed = arm.nominal.torque
+        return cls(acting_on.body, parameters, added, gathered, tuple(hooks), needed,
+                   tuple(records))
+
+    @property
+    def n_joints(self) -> int:
+        return self.body.robot.n_joints
+
+    def logged(self, t: Array, tau: Array) -> Array:
+        """Return what the log holds of the commands tau (samples, joints)."""
+        for record in self.records:
+            tau = record(t, tau)
+        return tau
+
+    def refuse_unphysical(self, q: Array) -> None:
+        """Look at the inertia matrix in the postures q (postures, joints).
+
+        Raises:
+            InputRejected: D15, some torque would accelerate the arm against itself, or without
+                bound.
+        """
+        p = np.atleast_2d(self.p)[0]
+        values = np.linalg.eigvalsh(self.body.mass_matrix(q, p) + self.added)
+        worst = int(np.argmin(values[:, 0] / values[:, -1]))
+        if values[worst, 0] <= SIMULATION.singular * values[worst, -1]:
+            where = ", ".join(f"{x:.3g}" for x in q[worst])
+            raise InputRejected(
+                "D15", f"at q = ({where}) the model's inertia matrix is not positive definite, its "
+                f"smallest eigenvalue {values[worst, 0]:.2g}",
+                remedy="such an arm cannot be simulated: fit it to richer motion, or add the "
+                "rotors' inertia",
+            )
+
+    def prepared(self, replicas: int) -> MovingPlant:
+        return MovingPlant(self, replicas)
+
+
+def _alone(effect: Effect, values: Values, own: Hooks) -> Hooks:
+    """Return the hooks of an effect, its load as a function of its joint where it is one."""
+    if own.actuator or own.drive or effect.joint is None:
+        return own
+    joint, load, memory = effect.joint - 1, own_load(effect, values), own_memory(effect, values)
+    if memory is not None:
+        return replace(own, load=None, rate=None, remembering=(joint, memory))
+    return own if load is None else replace(own, load=None, alone=(joint, load))
+
+
+def _gathered(curves: list[SpeedCurve]) -> SpeedCurve:
+    """Return the sum of several curves."""
+    return SpeedCurve(sum(curve.constant for curve in curves),
+                      sum(curve.viscous for curve in curves),
+                      tuple(height for curve in curves for height in curve.heights),
+                      tuple(sharpness for curve in curves for sharpness in curve.sharpnesses),
+                      )
+
+
+def _changed(p: Array, nominal: Array, true: Array) -> Array:
+    """Return each replica's parameters with the change that effects made to the nominal ones."""
+    if true.shape != nominal.shape:
+        raise ValueError(
+            "an effect changes the set of base parameters: replicas cannot have parameters of "
+            "their own")
+    return np.asarray(p + (true - nominal))
+
+
+class _Curves:
+    """Friction curves of all joints in a few array operations.
+
+    τ = constant + viscous v + Σ height tanh(sharpness v), joint by joint; joints with fewer
+    sigmoids have zeros.
+    """
+
+    def __init__(self, curves: tuple[SpeedCurve, ...]) -> None:
+        most = max(len(curve.heights) for curve in curves)
+        terms = np.zeros((2, most, len(curves), 1))
+        for joint, curve in enumerate(curves):
+            terms[0, :len(curve.heights), joint, 0] = curve.heights
+            terms[1, :len(curve.heights), joint, 0] = curve.sharpnesses
+        self.heights, self.sharpnesses = terms
+        self.constant = np.array([curve.constant for curve in curves])[:, None]
+        self.viscous = np.array([curve.viscous for curve in curves])[:, None]
+
+    def taken_off(self, torque: Array, dq: Array) -> Array:
+        """Return `torque` less friction, all (joints, replicas)."""
+        left = torque - self.viscous * dq - self.constant
+        if self.heights.size:
+            bent = self.sharpnesses * dq
+            np.tanh(bent, out=bent)
+            bent *= self.heights
+            left -= np.add.reduce(bent, axis=0)
+        return np.asarray(left)
+
+
+class MovingPlant:
+    """A plant with working memory for a number of replicas. Joints come first, replicas last."""
+
+    def __init__(self, plant: Plant, replicas: int) -> None:
+        self.plant, self.replicas = plant, replicas
+        self.rigid = many_bodies(plant.body, plant.p, plant.added, replicas)
+        self.friction = _Curves(plant.curves)
+        ends = np.cumsum([0, *(hook.states for hook in plant.hooks)]).tolist()
+        self.n_states = ends[-1]
+        pairs = zip(plant.hooks, ends, ends[1:], strict=False)
+        self._hooked = [(hook, slice(a, b)) for hook, a, b in pairs]
+        self._zeros = np.zeros((replicas, plant.n_joints))
+
+    def motion(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Motion:
+        """Return the state as effects see it, (replicas, joints)."""
+        return Motion(t, q.T, dq.T, self._zeros if ddq is None else ddq.T)
+
+    def accelerations(self, t: Array, q: Array, dq: Array, states: Array, command: Array,
+                      out: Array, held: ManyChains | None = None,
+                      ) -> Array:
+        """Write ddq (joints, replicas) into `out`, and return d(states)/dt (replicas, states).
+
+        Args:
+            t: (replicas,); states (replicas, states); the rest (joints, replicas).
+            held: a rigid body that is taken as it was last held.
+        """
+        rates = states
+        if self._hooked:
+            command, rates = self.through(t, q, dq, states, command)
+        left = self.friction.taken_off(command, dq)
+        if held is None:
+            self.rigid.acceleration(q, dq, left, out)
+        else:
+            held.held_acceleration(left, out)
+        return rates
+
+    def through(self, t: Array, q: Array, dq: Array, states: Array,
+                command: Array) -> tuple[Array, Array]:
+        """Return what comes of `command` at the rigid body, and d(states)/dt.
+
+        Each effect acts around those before it: a command meets the last one first.
+        """
+        motion, rates, torque = self.motion(t, q, dq), np.zeros_like(states), command.copy()
+        for hook, own in reversed(self._hooked):
+            if hook.rate is not None:
+                rates[:, own] = hook.rate(motion, torque.T, states[:, own])
+            torque = _driven(hook, own, motion, dq, states, torque)
+        for hook, own in self._hooked:
+            if hook.alone is not None:
+                joint, load = hook.alone
+                torque[joint] -= load(q[joint], dq[joint], ARRAYS)
+            elif hook.remembering is not None:
+                joint, memory = hook.remembering
+                bent = states[:, own.start]
+                rates[:, own.start] = rate = memory.rate(bent, dq[joint], ARRAYS)
+                torque[joint] -= memory.load(bent, rate)
+            elif hook.load is not None:
+                torque -= hook.load(motion, states[:, own]).T
+        return torque, rates
+
+    def updated(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
+        """Return the states (replicas, states) after a control sample was taken."""
+        out, motion, torque = states.copy(), self.motion(t, q, dq), command.copy()
+        for hook, own in reversed(self._hooked):
+            if hook.update:
+                out[:, own] = hook.update(motion, torque.T, states[:, own])
+            torque = _driven(hook, own, motion, dq, states, torque)
+        return out
+
+    def settled(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Array:
+        """Return the true state (2 joints, replicas) when the encoders first tell q, dq, ddq."""
+        motion = self.motion(t, q, dq, ddq)
+        for hook, _ in reversed(self._hooked):
+            if hook.settled:
+                motion = hook.settled(motion, self.plant.needed(motion))
+        return np.concatenate([motion.q.T, motion.dq.T])
+
+    def at_start(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Array:
+        """Return the states (replicas, states) before the first sample."""
+        states = np.zeros((self.replicas, self.n_states))
+        motion = self.motion(t, q, dq, ddq)
+        for hook, own in self._hooked:
+            if hook.start:
+                states[:, own] = hook.start(motion, self.plant.needed(motion))
+        return states
+
+    def measured(self, q: Array, states: Array) -> Array:
+        """Return what the encoders see of q (joints, replicas), before they count it."""
+        seen = q.T
+        for hook, own in self._hooked:
+            if hook.sensor:
+                seen = hook.sensor(seen, states[:, own])
+        return seen.T
+
+
+def _driven(hook: Hooks, own: slice, motion: Motion, dq: Array, states: Array,
+            torque: Array) -> Array:
+    """Return what an effect makes of a torque (joints, replicas) on its way to the joints."""
+    if hook.drive is not None:
+        joint, drive = hook.drive
+        torque[joint] = drive(torque, dq, ARRAYS)
+    elif hook.actuator is not None:
+        torque = np.array(hook.actuator(torque.T, motion, states[:, own]).T)
+    return torque

@@ -1,0 +1,186 @@
+"""Simulate experiments in closed loop: arms in continuous time, controllers sample by sample.
+
+    simulated = run(plant, Experiment.of_log(log), steps, noise, seeds=range(10))
+    simulated.q[3], simulated.tau[3]             what replica 3 would have logged
+
+What a drive adds to the command is white torque noise, held over each sample; encoders count steps
+of their resolution.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pipelines.io.log import Array
+from pipelines.simulation.config import SIMULATION
+from pipelines.simulation.controller import Controlling
+from pipelines.simulation.experiment import Experiment
+from pipelines.simulation.integrate import HeldBody, RungeKutta
+from pipelines.simulation.one_arm import refuse_runaway, run_alone, runs_alone
+from pipelines.simulation.plant import Plant
+
+__all__ = ["Noise", "Simulated", "run", "run_together"]
+
+_CHUNK = 2048  # numerics: samples whose noise is drawn at once
+_LOOKS = 64  # numerics: samples between two looks at whether an arm runs away
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Standard deviations of what is random; zero without it."""
+
+    torque: Array  # [N m] (n,) of the drive, white from sample to sample
+    position: Array  # [rad] (n,) of the encoder, before it counts
+
+    @classmethod
+    def none(cls, n_joints: int) -> Noise:
+        return cls(np.zeros(n_joints), np.zeros(n_joints))
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """What the replicas did. Each array (replicas, samples, joints)."""
+
+    t: Array  # [s] (samples,)
+    q: Array  # [rad] as the encoders counted it
+    tau: Array  # [N m] as it was commanded, or as the recorder passed it on
+    true_q: Array  # [rad]
+    true_dq: Array  # [rad/s]
+    steps: int  # of the integrator, a sample
+
+
+def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = None,
+        seeds: Iterable[int] = (0, ), exact: bool = True,
+        ) -> Simulated:
+    """Run one replica for each seed, with `steps` steps of the integrator a sample.
+
+    Args:
+        exact: with a rigid body that is nowhere held.
+
+    Raises:
+        InputRejected: D15, the model's inertia matrix is singular or worse; D17, the simulated arm
+            runs away.
+    """
+    return run_together(plant, (experiment, ), steps, noise, seeds, exact)[0]
+
+
+def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int,
+                 noise: Noise | None = None, seeds: Iterable[int] = (0, ), exact: bool = True,
+                 ) -> list[Simulated]:
+    """`run` several experiments at once, which costs hardly more than the longest alone.
+
+    Raises:
+        InputRejected: D15, the model's inertia matrix is singular or worse; D17, the simulated arm
+            runs away.
+    """
+    drawn = tuple(seeds)
+    lanes = [
+        _Lane(plant, one, noise or Noise.none(one.n_joints), drawn, steps) for one in experiments
+    ]
+    few = len(lanes) * len(drawn) <= SIMULATION.few
+    for time in dict.fromkeys(one.sample_time for one in experiments):
+        same = [lane for lane in lanes if lane.experiment.sample_time == time]
+        if few and all(runs_alone(plant, lane.experiment) for lane in same):
+            for lane in same:
+                lane.run_alone()
+        else:
+            _advance(plant, same, exact)
+    return [lane.simulated() for lane in lanes]
+
+
+class _Lane:
+    """One experiment on the way: its controllers, and what its replicas would have logged."""
+
+    def __init__(self, plant: Plant, experiment: Experiment, noise: Noise, seeds: tuple[int, ...],
+                 steps: int) -> None:
+        postures = max(1, experiment.n_samples // SIMULATION.postures)
+        plant.refuse_unphysical(experiment.q_ref[::postures])
+        replicas, n = len(seeds), experiment.n_joints
+        moving = plant.prepared(replicas)
+        self.plant, self.experiment, self.steps = plant, experiment, steps
+        self.noise, self.seeds = noise, seeds
+        self.t = np.full(replicas, experiment.start_time)
+        begin = np.concatenate([experiment.q0, experiment.dq0])[:, None]
+        begin = np.repeat(begin, replicas, axis=1)
+        self.state = np.ascontiguousarray(moving.settled(self.t, begin[:n], begin[n:]))
+        self.states = moving.at_start(self.t, self.state[:n], self.state[n:])
+        samples = experiment.n_samples
+        self.counted, self.commanded = np.empty((2, samples, n, replicas))
+        self.motion = np.empty((samples, 2 * n, replicas))
+        self.draws = _draws(noise, seeds, samples)
+        self.control = Controlling(experiment, replicas)
+
+    def applied(self, k: int, state: Array, seen: Array) -> Array:
+        """Return the torque (joints, replicas) from sample k on, of an arm in `state`."""
+        extra_torque, extra_position = next(self.draws)
+        self.motion[k] = state
+        self.counted[k] = self.control.counted(seen + extra_position)
+        self.commanded[k] = command = self.control.command(k, self.counted[k])
+        return command + extra_torque
+
+    def run_alone(self) -> None:
+        """Run one replica after the other, each from the first to the last sample."""
+        for r, seed in enumerate(self.seeds):
+            draws = _draws(self.noise, (seed, ), self.experiment.n_samples)
+            start = np.concatenate([self.state[:, r], self.states[r]])
+            ran = run_alone(self.plant, self.experiment, self.steps, start, draws)
+            self.motion[..., r], self.counted[..., r], self.commanded[..., r] = ran
+
+    def simulated(self) -> Simulated:
+        experiment, n = self.experiment, self.experiment.n_joints
+        samples: Array = np.arange(experiment.n_samples, dtype=np.float64)
+        t = experiment.start_time + experiment.sample_time * samples
+        q, tau, moved = (np.ascontiguousarray(np.moveaxis(x, 2, 0))
+                         for x in (self.counted, self.commanded, self.motion))
+        if self.plant.records:
+            tau = np.stack([self.plant.logged(t, one) for one in tau])
+        return Simulated(t, q, tau, moved[..., :n], moved[..., n:], self.steps)
+
+
+@np.errstate(all="ignore")  # numbers of an arm that runs away are not finite before it is refused
+def _advance(plant: Plant, lanes: Sequence[_Lane], exact: bool) -> None:
+    """Move all lanes side by side to the end of the longest; an ended one keeps its torque."""
+    width, time, n = len(lanes[0].t), lanes[0].experiment.sample_time, plant.n_joints
+    own = plant if plant.p.ndim == 1 else replace(plant, p=np.tile(plant.p, (len(lanes), 1)))
+    moving = own.prepared(width * len(lanes))
+    held = not exact and HeldBody.fits(moving)
+    integrator = (HeldBody if held else RungeKutta)(moving, time, lanes[0].steps)
+    t = np.concatenate([lane.t for lane in lanes])
+    state = np.concatenate([lane.state for lane in lanes], axis=1)
+    states = np.concatenate([lane.states for lane in lanes])
+    parts = [slice(i * width, (i + 1) * width) for i in range(len(lanes))]
+    applied = np.zeros((n, len(t)))
+    for k in range(max(lane.experiment.n_samples for lane in lanes)):
+        seen = moving.measured(state[:n], states)
+        for lane, part in zip(lanes, parts, strict=True):
+            if k < lane.experiment.n_samples:
+                applied[:, part] = lane.applied(k, state[:, part], seen[:, part])
+        if moving.n_states:
+            states = moving.updated(t, state[:n], state[n:], states, applied)
+        states = integrator.advance(t, state, states, applied)
+        t += time
+        for lane, part in zip(lanes, parts, strict=True):
+            last = k + 1 == lane.experiment.n_samples
+            if last or (k % _LOOKS == 0 and k < lane.experiment.n_samples):
+                refuse_runaway(state[:, part], k, time)
+
+
+def _draws(noise: Noise, seeds: tuple[int, ...],
+           samples: int) -> Iterator[tuple[Array | float, Array | float]]:
+    """Yield torque and position noise (joints, replicas) of each sample.
+
+    Every replica has a generator of its own, so that it does the same alone and among others.
+    """
+    size, n = np.concatenate([noise.torque, noise.position]), len(noise.torque)
+    if not size.any():
+        yield from itertools.repeat((0.0, 0.0), samples)
+        return
+    generators = [np.random.default_rng(seed) for seed in seeds]
+    for first in range(0, samples, _CHUNK):
+        shape = (min(_CHUNK, samples - first), len(size))
+        drawn = [generator.standard_normal(shape) * size for generator in generators]
+        yield from ((row[:n], row[n:]) for row in np.stack(drawn, axis=-1))

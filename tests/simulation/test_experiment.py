@@ -1,0 +1,118 @@
+"""What a log must say to be simulated in closed loop, and what of it is used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pipelines.errors import InputRejected
+from pipelines.io import schema
+from pipelines.io.log import Controller, ExperimentLog, Signal
+from pipelines.io.model_file import model_text
+from pipelines.io.robot import format_robot
+from pipelines.io.robot_files import load_robot
+from pipelines.simulation import Experiment
+from tests.simulation.arms import GAIN, KD, KP, TS, rrr, waving
+
+SAMPLES = 50
+PD = Controller("pd", KP, KD, velocity="backward-difference")
+
+
+def log_of(controller: Controller | None = PD, without: tuple[str, ...] = (), **about: Any) -> ExperimentLog:
+    """A log of the RRR arm that follows `waving`, a little behind it."""
+    q, dq, ddq = waving(SAMPLES)
+    values = {"t": 3.0 + TS * np.arange(SAMPLES), "q": np.round((q - 1e-3) / 1e-5) * 1e-5, "tau": 0 * q + 0.5, "q_ref": q,
+              "dq_ref": dq, "ddq_ref": ddq}
+    known = {"name": "wave", "experiment": "excitation", "role": "identify", "origin": "measured", "robot_name": "rrr",
+             "sample_time": TS, "robot_text": format_robot(load_robot("rrr")), "controller": controller}
+    signals = {name: Signal(x, schema.unit_of(name), schema.SIGNALS[name][1]) for name, x in values.items() if name not in without}
+    return ExperimentLog(**(known | about), signals=signals)  # type: ignore[arg-type]
+
+
+def replaced(log: ExperimentLog, **values: np.ndarray) -> ExperimentLog:
+    return replace(log, signals=dict(log.signals) | {name: replace(log.signals[name], values=x) for name, x in values.items()})
+
+
+@pytest.mark.parametrize(("log", "code", "words"), [
+    (log_of(None), "S22", "does not say how its controller works"),
+    (log_of(Controller("unknown")), "S22", "does not say how its controller works"),
+    (log_of(replace(PD, kd=None)), "S22", "lacks kd"),
+    (log_of(replace(PD, velocity=None)), "S22", "lacks velocity"),
+    (log_of(replace(PD, velocity="observer")), "S22", "lacks observer_gain"),
+    (log_of(replace(PD, law="pd+feedforward")), "S22", "lacks feedforward"),
+    (log_of(replace(PD, law="pd+feedforward", feedforward=("gravity",))), "S22", "lacks model"),
+    (log_of(replace(PD, law="computed-torque")), "S22", "lacks model"),
+    (log_of(Controller("open-loop"), experiment="friction", joint=2), "S22", "how the others are held"),
+    (log_of(without=("q_ref",)), "S22", "q_ref"),
+    (replaced(log_of(), q_ref=np.full((SAMPLES, 3), np.nan)), "D02", "q_ref"),
+    (replaced(log_of(), t=np.cumsum(np.r_[0.0, np.full(SAMPLES - 1, TS)]) + 0.3 * (np.arange(SAMPLES) > 20)), "T05", "gaps"),
+])
+def test_what_is_missing_is_named(log: ExperimentLog, code: str, words: str) -> None:
+    """Nothing about a controller is guessed."""
+    with pytest.raises(InputRejected, match=words) as refused:
+        Experiment.of_log(log)
+    assert refused.value.code == f"RRID-{code}"
+
+
+def test_it_starts_where_the_arm_is() -> None:
+    """On the reference where the encoder agrees with it within a step, else where the encoder says; at the reference's speed."""
+    log = log_of()
+    off = Experiment.of_log(log)
+    np.testing.assert_array_equal(off.q0, log.q[0])
+    near = Experiment.of_log(replaced(log, q=np.round(log["q_ref"] / 1e-5) * 1e-5))
+    np.testing.assert_array_equal(near.q0, log["q_ref"][0])
+    np.testing.assert_array_equal(near.dq0, log["dq_ref"][0])
+    assert (off.start_time, off.n_samples) == (3.0, SAMPLES)
+
+
+def test_a_plan_can_be_simulated() -> None:
+    """References and a controller are enough."""
+    plan = Experiment.of_log(log_of(without=("q", "tau"), origin="planned"))
+    np.testing.assert_array_equal(plan.q0, waving(SAMPLES)[0][0])
+    np.testing.assert_array_equal(plan.tau0, np.zeros(3))
+
+
+def test_speed_is_derived_where_only_positions_were_planned() -> None:
+    """dq_ref from q_ref; ddq_ref only where a feed-forward asks for it."""
+    found = Experiment.of_log(log_of(without=("dq_ref", "ddq_ref")))
+    np.testing.assert_allclose(found.dq_ref[1:-1], waving(SAMPLES)[1][1:-1], atol=2e-3)
+    model = model_text(rrr().arm.to_model())
+    asked = replace(PD, law="pd+feedforward", feedforward=("gravity",), model=model)
+    with pytest.raises(InputRejected, match="ddq_ref"):
+        Experiment.of_log(log_of(asked, without=("ddq_ref",)))
+
+
+def test_the_controllers_own_model_is_read() -> None:
+    """Feed-forward runs on the model that the log carries, and on no other."""
+    arm = rrr().arm
+    text = model_text(arm.with_body(arm.body, 1.1 * arm.p).to_model())
+    found = Experiment.of_log(log_of(replace(PD, law="pd+feedforward", feedforward=("inertia",), model=text)))
+    assert found.feedforward_arm is not None
+    np.testing.assert_allclose(found.feedforward_arm.p, 1.1 * arm.p)
+
+
+def test_held_joints_stay_where_no_reference_is_logged() -> None:
+    """Open loop: the moving joint follows the logged torque, the others their first position."""
+    law = Controller("open-loop", KP, KD, velocity="observer", observer_gain=GAIN)
+    log = log_of(law, without=("q_ref", "dq_ref", "ddq_ref"), experiment="friction", joint=2)
+    found = Experiment.of_log(log)
+    assert found.driven is not None
+    np.testing.assert_array_equal(found.driven, [False, True, False])
+    np.testing.assert_array_equal(found.tau, log.tau)
+    np.testing.assert_array_equal(found.q_ref, np.tile(log.q[0], (SAMPLES, 1)))
+    whole = Experiment.of_log(log_of(Controller("open-loop"), without=("q_ref", "dq_ref", "ddq_ref")))
+    assert whole.driven is not None
+    assert whole.driven.all()
+
+
+def test_a_part_starts_on_the_reference() -> None:
+    """What the choice of the step tries."""
+    whole = Experiment.of_log(log_of())
+    part = whole.part(20, 10)
+    np.testing.assert_array_equal(part.q_ref, whole.q_ref[20:30])
+    np.testing.assert_array_equal([part.q0, part.dq0], [whole.q_ref[20], whole.dq_ref[20]])
+    assert part.start_time == pytest.approx(3.02)
+    np.testing.assert_array_equal(whole.part(0, 10).q0, whole.q0)

@@ -1,0 +1,177 @@
+"""One arm without arrays, whose friction remembers one number, or whose drives change a command: it moves as among many replicas,
+which take arrays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.dynamics.functions import ARRAYS, NUMBERS
+from pipelines.errors import InputRejected
+from pipelines.io.log import Controller
+from pipelines.model.arm import Acting
+from pipelines.model.effects.cogging import Cogging
+from pipelines.model.effects.gravity_tilt import GravityTilt
+from pipelines.model.effects.load_friction import LoadFriction
+from pipelines.model.effects.presliding import Presliding
+from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.stribeck import Stribeck
+from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
+from pipelines.model.effects.torque_gain import TorqueGain
+from pipelines.model.effects.torque_saturation import TorqueSaturation
+from pipelines.model.rigid.body import Array
+from pipelines.simulation import Noise, Plant, run
+from pipelines.simulation.integrate import RungeKutta
+from pipelines.simulation.one_arm import OneArm, runs_alone
+from tests.simulation.arms import KD, KP, TS, experiment, rrr
+
+SAMPLES, MANY = 100, 9  # more replicas than are run one after the other
+LAWS = {
+    "Dahl": Presliding(joint=2, distance=0.01),
+    "LuGre": Presliding(joint=2, distance=0.01, damping_time=0.004),
+    "bends first": Presliding(joint=3, distance=0.02, elastic=0.5),
+    "Dahl's exponent": Presliding(joint=1, distance=0.01, elastic=-0.4, exponent=0.7),
+    "breakaway": Presliding(joint=2, distance=0.005, breakaway=0.6, breakaway_speed=0.2, damping_time=0.001),
+}
+SLIPS = Presliding(joint=2, distance=0.01, elastic=0.2, exponent=0.8, inner_loops=1.0)
+
+
+def acting(law: Presliding, amplitude: float = 2.0) -> Acting:
+    return Acting.of(law, law.values([amplitude]))
+
+
+def plant(*more: Acting) -> Plant:
+    return Plant.of(rrr().arm.extended(*more))
+
+
+ASKED = experiment(Controller("pd", KP, KD, velocity="backward-difference"), SAMPLES)
+NOISE = Noise(np.array([0.3, 0.2, 0.1]), np.array([1e-6, 2e-6, 3e-6]))
+
+
+def by_itself(arm: Plant) -> Array:
+    """(samples, joints) [rad] of one replica."""
+    return run(arm, ASKED, 4, NOISE, (7,)).true_q[0]
+
+
+def both(arm: Plant) -> tuple[Array, Array]:
+    """(samples, joints) [rad] of one replica by itself, and of the same among many."""
+    return by_itself(arm), run(arm, ASKED, 4, NOISE, (7, *range(MANY))).true_q[0]
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_alone_and_among_many(name: str) -> None:
+    """In a loop in plain numbers, to rounding; and it does move otherwise than an arm without it."""
+    arm = plant(acting(LAWS[name]))
+    assert [hook.remembering[0] for hook in arm.hooks if hook.remembering] == [(LAWS[name].joint or 0) - 1]
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+    assert np.abs(alone - by_itself(plant())).max() > 1e-4
+
+
+def test_several_memories_beside_a_load_without() -> None:
+    """Each at its own joint, two at one, in the order of their states."""
+    spring = Spring(joint=3)
+    values = {q.name: 3.0 if q.name == "stiffness" else 0.0 for q in spring.parameters if q.unsaid is None}
+    arm = plant(acting(LAWS["breakaway"]), Acting.of(spring, values), acting(LAWS["bends first"], 0.7), acting(LAWS["LuGre"], 1.1))
+    assert sum(hook.remembering is not None for hook in arm.hooks) == 3
+    assert OneArm.fits(arm)
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+
+
+def test_the_integrator_moves_memories_as_runge_kutta_does() -> None:
+    """One sample after the other, outside a loop: angles, speeds and memories."""
+    arm = plant(acting(LAWS["LuGre"]), acting(LAWS["breakaway"]))
+    ours, theirs = OneArm(arm, TS, 3), RungeKutta(arm.prepared(2), TS, 3)
+    state, states = np.array([[0.1], [-1.0], [0.4], [0.0], [0.2], [-0.1]]), np.zeros((1, 2))
+    other, others, seen = np.repeat(state, 2, axis=1), np.zeros((2, 2)), []
+    for k in range(300):
+        torque = np.array([[3.0], [8.0], [2.0]]) * np.sin(0.03 * k + np.arange(3.0)[:, None])
+        states = ours.advance(np.array([TS * k]), state, states, torque)
+        others = theirs.advance(np.full(2, TS * k), other, others, np.repeat(torque, 2, axis=1))
+        seen.append(states[0])
+    np.testing.assert_allclose(state[:, 0], other[:, 1], rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(states[0], others[1], rtol=0.0, atol=1e-10)
+    assert np.ptp(seen, axis=0).min() > 1.0  # they bent to one side, and to the other
+
+
+def leaning(*more: Acting) -> Plant:
+    """Its rigid body is in no closed form: it takes arrays, but for the loads of single joints."""
+    return plant(Acting.of(GravityTilt(), {"angle": 0.05, "direction": 0.7, "waist_sine": 0.0, "waist_cosine": 0.0}), *more)
+
+
+def waves(amplitude: float) -> Acting:
+    cogging = Cogging(joint=3, order=11.0)
+    return Acting.of(cogging, cogging.values([amplitude, 0.2 * amplitude, 0.0, 0.0, 0.0, 0.0]))
+
+
+def test_loads_of_single_joints_beside_a_body_that_takes_arrays() -> None:
+    """Two of them, at one joint, and a drive before them: alone as among many."""
+    values = {"amplitude": 0.4, "speed": 0.1, "sharpness": 60.0, "tail": 0.0, "exponent": 2.0}
+    arm = leaning(waves(0.3), Acting.of(Stribeck(joint=3, speed=0.1), values), Acting.of(TorqueGain(joint=2), {"gain_error": 0.1}))
+    assert not OneArm.fits(arm)
+    assert sum(hook.alone is not None for hook in arm.hooks) == 2
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+    assert np.abs(alone - by_itself(leaning())).max() > 1e-5
+
+
+def test_an_arm_that_runs_away_says_so_whatever_its_loads_make_of_it() -> None:
+    """D17: there is no sine of an infinite angle."""
+    with pytest.raises(InputRejected) as raised:
+        run(leaning(waves(0.3)), experiment(Controller("pd", -300.0 * KP, -300.0 * KD, velocity="backward-difference"), SAMPLES), 1)
+    assert raised.value.code == "RRID-D17"
+
+
+def test_what_remembers_more_numbers_takes_arrays() -> None:
+    """Elements that slip one after the other are no single number; the arm moves all the same, and beside what is one."""
+    arm = plant(acting(SLIPS), acting(LAWS["Dahl"]))
+    assert sum(hook.remembering is not None for hook in arm.hooks) == 1
+    assert not OneArm.fits(arm)
+    assert not runs_alone(arm, ASKED)
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+
+
+DRIVES = {
+    "gain": Acting.of(TorqueGain(joint=2), {"gain_error": -0.1}),
+    "crosstalk": Acting.of(TorqueCrosstalk(joint=1, from_joint=2.0), {"coefficient": 0.1, "from_joint": 2.0}),
+    "limit": Acting.of(TorqueSaturation(joint=2), {"limit": 6.0, "coefficient": 1.0}),
+    "load": Acting.of(LoadFriction(joint=3), {"mu": 0.2, "sharpness": 80.0, "behind": 0.4, "input_side": 0.7}),
+}
+
+
+@pytest.mark.parametrize("names", [*((name,) for name in DRIVES), tuple(DRIVES),
+                                   pytest.param(tuple(reversed(DRIVES)), marks=pytest.mark.slow)])
+def test_a_command_on_its_way_to_the_joints(names: tuple[str, ...]) -> None:
+    """Through one drive, or through all of them in their order, beside friction that remembers; by Runge-Kutta's arrays as well."""
+    acting_on = [DRIVES[name] for name in names]
+    arm = plant(*acting_on, acting(LAWS["LuGre"]))
+    assert OneArm.fits(arm)
+    assert sum(hook.drive is not None for hook in arm.hooks) == len(names)
+    alone, among = both(arm)
+    np.testing.assert_allclose(alone, among, rtol=0.0, atol=1e-10)
+    assert np.abs(alone - by_itself(plant(acting(LAWS["LuGre"])))).max() > 1e-5
+
+
+def test_the_order_of_drives_is_that_in_which_they_act() -> None:
+    """A limit before the gain is another than one behind it."""
+    gain, limit = Acting.of(TorqueGain(joint=2), {"gain_error": -0.6}), DRIVES["limit"]
+    arms = [Plant.of(replace(rrr().arm, effects=order)) for order in ((gain, limit), (limit, gain))]
+    (one, among), (other, _) = map(both, arms)
+    np.testing.assert_allclose(one, among, rtol=0.0, atol=1e-10)
+    assert np.abs(one - other).max() > 1e-4
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_rate_of_a_number_is_that_of_an_array(name: str) -> None:
+    """Also beyond where it slides, where a step went too far, and at rest."""
+    memory = LAWS[name].own_memory(LAWS[name].values([2.0]))
+    assert memory is not None
+    rng = np.random.default_rng(3)
+    v, u = (x.ravel() for x in np.meshgrid([0.0, 1e-3, -1e-3, *rng.uniform(-2.0, 2.0, 20)],
+                                           [0.0, 1.0, -1.0, 1.0 + 1e-9, -1.2, *rng.uniform(-1.1, 1.1, 10)]))
+    plain = [memory.rate(bent, speed, NUMBERS) for bent, speed in zip(u.tolist(), v.tolist(), strict=True)]
+    np.testing.assert_allclose(memory.rate(u, v, ARRAYS), plain, rtol=1e-12, atol=1e-15)
