@@ -44,6 +44,10 @@ from bench.machine import Machine
 from bench.motions import Reference
 from bench.plant import record
 from pipelines import fit_friction
+from pipelines.excitation.optimise import landscape
+from pipelines.excitation.problem import DesignProblem
+from pipelines.excitation.regressor import grams_of
+from pipelines.excitation.task import Wishes, plan_task
 from pipelines.io.files import open_log, write_log
 from pipelines.io.robot import format_robot
 from pipelines.io.robot_files import load_robot
@@ -51,15 +55,12 @@ from pipelines.io.urdf import import_urdf
 from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe, fit_logs
 from pipelines.model.estimation.nominal import nominal_columns
-from pipelines.model.excitation.design import landscape
-from pipelines.model.excitation.problem import DesignProblem, grams_of
-from pipelines.model.excitation.task import Wishes, plan_task
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.rigid.base import BaseArm
 from pipelines.model.rigid.body import Motion
 from pipelines.signal.fourier import FourierSeries
 from pipelines.stage import Request, run_stage
-from tests.model.excitation.test_gradient import SHARP, TASKS, WEIGHT, _complex_value, _problem
+from tests.excitation.test_gradient import SHARP, TASKS, WEIGHT, _complex_value, _problem
 
 TX40 = Path(__file__).resolve().parents[2] / "shared" / "real" / "tx40" / "tx40.urdf"
 PAPER = (
@@ -252,8 +253,7 @@ def forward_differences(problem: DesignProblem, x: np.ndarray) -> np.ndarray:
     goal, columns = problem.arm.goal, problem.arm.columns
 
     def value(at: np.ndarray) -> float:
-        rows = columns.rows(problem.space.motion(at, problem.samples))
-        return goal.value(grams_of(columns.columns, rows, len(columns.names)), 8.0)[0]
+        return goal.value(grams_of(columns, problem.space.motion(at, problem.samples)), 8.0)[0]
 
     base, out = value(x), np.empty(len(x))
     for k in range(len(x)):
@@ -299,10 +299,8 @@ def _random_six_axes() -> float:
     rng, goal, columns = np.random.default_rng(0), problem.arm.goal, problem.arm.columns
     found = []
     for _ in range(50):
-        rows = columns.rows(problem.space.motion(problem.start(rng, 0.999), problem.samples))
-        found.append(
-            goal.figures(grams_of(columns.columns, rows, len(columns.names))).condition_number
-        )
+        motion = problem.space.motion(problem.start(rng, 0.999), problem.samples)
+        found.append(goal.figures(grams_of(columns, motion)).condition_number)
     return statistics.median(found)
 
 

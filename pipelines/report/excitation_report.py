@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.excitation.apart import Apart
-from pipelines.model.excitation.doubts import beyond_words
-from pipelines.model.excitation.result import DrawnPlan, Result
+from pipelines.excitation.discrimination import Apart
+from pipelines.excitation.result import DrawnPlan, Result, beyond_words
 from pipelines.report import style
 from pipelines.report.figures import (
     Array,

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 
 from pipelines.errors import UsageError
+from pipelines.excitation.optimise import Effort, design
+from pipelines.excitation.task import Wishes, plan_task
 from pipelines.io.robot_files import load_robot
 from pipelines.model.arm import Arm
-from pipelines.model.excitation.design import Effort, design
-from pipelines.model.excitation.task import Wishes, plan_task
 from tests.cli.commands import rrrid
 
 

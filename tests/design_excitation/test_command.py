@@ -122,7 +122,7 @@ def test_who_stops_the_rehearsal_keeps_the_motion_with_all_its_files(plain: Outc
     def stopped(*given: object) -> None:
         raise Interrupted(signal.SIGINT)
 
-    monkeypatch.setattr("pipelines.model.excitation.rehearse.rehearse", stopped)
+    monkeypatch.setattr("pipelines.excitation.rehearsal.rehearse", stopped)
     outcome = designed(tmp_path / "out", replace(QUICK, rehearse=True))
     for name in ("trajectory.h5", "controller.csv", "coefficients.json", "result.json"):
         assert (outcome.folder / name).is_file()
@@ -146,7 +146,6 @@ def test_the_report_warns_in_bold(tmp_path: Path) -> None:
     ({"criterion": "C"}, "RRID-C02"), ({"periods": 0}, "RRID-C02"), ({"evaluations": 0}, "RRID-C02"),
     ({"time_limit": float("nan")}, "RRID-C02"), ({"seed": -1}, "RRID-C02"), ({"tip_speed": 0.0}, "RRID-C02"),
     ({"noise": (1.0, -1.0, 1.0)}, "RRID-C02"), ({"torque_share": 1.5}, "RRID-C02"), ({"speed_share": 1.5}, "RRID-C02"),
-    ({"bounds": "nothing"}, "RRID-C02"),
     ({"home": (0.0, 0.0)}, "RRID-C02"), ({"model": "nothing"}, "RRID-C04"),
 ])
 def test_wrong_usage_is_said(changes: dict[str, Any], code: str, tmp_path: Path) -> None:

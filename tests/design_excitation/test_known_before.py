@@ -6,14 +6,12 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.results import headed
 from pipelines.io.robot_files import load_robot
-from pipelines.model.arm import Arm
-from tests.design_excitation.short import QUICK, designed, without_links
+from tests.design_excitation.short import QUICK, designed
 
 
 def test_the_top_harmonic_stays_below_a_mode(tmp_path: Path) -> None:
@@ -65,47 +63,3 @@ def testwithout_links_torque_is_not_claimed_to_be_checked(tmp_path: Path) -> Non
     assert not outcome.result.torque_checked
     assert "torque limits could not be checked" in outcome.report.verdict
     assert all(one.quantity != "torque" for one in outcome.result.limits)
-
-
-@pytest.mark.slow
-def test_bounds_on_the_parameters_limit_the_torque(tmp_path: Path) -> None:
-    """No parameters between the bounds ask for more than the limit, on 0.1 ms; the corner that asks most comes near to it."""
-    body = Arm.from_links(load_robot("rrr")).body
-    p = body.known_parameters()
-    assert p is not None
-    middle, half = p, 0.2 * np.abs(p) + 0.01
-    lines = (f"{known.name} = [{m - h}, {m + h}]" for known, m, h in zip(body.parameters, middle, half, strict=True))
-    (tmp_path / "bounds.toml").write_text("\n".join(lines))
-    bare = without_links(tmp_path)
-    done = designed(tmp_path / "out", replace(QUICK, robot=bare, bounds=str(tmp_path / "bounds.toml")))
-    series = done.result
-    told = json.loads((done.folder / "coefficients.json").read_text())
-    t = np.arange(0.0, told["period"], 1e-4)
-    q, dq, ddq = np.zeros((3, 3, len(t)))
-    for j, joint in enumerate(told["joints"]):
-        w = 2 * np.pi * np.array(joint["harmonics"])[:, None] / told["period"]
-        a, b = np.array(joint["a"]), np.array(joint["b"])
-        sine, cosine = np.sin(w * t), np.cos(w * t)
-        q[j], dq[j] = joint["q0"] + a / w[:, 0] @ sine - b / w[:, 0] @ cosine, a @ cosine + b @ sine
-        ddq[j] = (b * w[:, 0]) @ cosine - (a * w[:, 0]) @ sine
-    limit, rng, most = 0.9 * np.array([60.0, 30.0, 15.0]), np.random.default_rng(3), np.zeros(3)
-    regressor = body.regressor(q.T, dq.T, ddq.T)
-    for draw in range(20):
-        beta = middle + half * rng.choice([-1.0, 1.0], 15)
-        most = np.maximum(most, np.abs(regressor[draw % 5::5] @ beta).max(axis=0))
-    worst = (np.abs(regressor @ middle) + np.abs(regressor) @ half).max(axis=0)
-    assert (most <= limit).all()
-    assert (worst <= limit).all()
-    peaks = {one.joint: abs(one.peak) for one in series.limits if one.quantity == "torque"}
-    np.testing.assert_allclose([peaks[1], peaks[2], peaks[3]], worst, rtol=5e-3)
-    assert series.torque_checked
-    assert series.rehearsal is None
-    assert (worst / limit).max() > 0.5
-
-
-@pytest.mark.parametrize("text", ["p1 = [", "p1 = [0.0, 1.0]", "p1 = [1.0, 0.0]", "p99 = [0.0, 1.0]"])
-def test_bounds_that_make_no_sense_are_refused(text: str, tmp_path: Path) -> None:
-    (tmp_path / "bounds.toml").write_text(text)
-    with pytest.raises(UsageError) as told:
-        designed(tmp_path / "out", replace(QUICK, robot=without_links(tmp_path), bounds=str(tmp_path / "bounds.toml")))
-    assert told.value.code == "RRID-C02"

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from pipelines.diagnosis.result import BeforeAfter, Diagnosis, Extension, Gain, ResidualRms
-from pipelines.model.excitation.limits import Limit
+from pipelines.excitation.constraints import Limit
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.residual_analysis import Curve, Evidence
 from pipelines.report.diagnosis_finding import gain_table

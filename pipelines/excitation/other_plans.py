@@ -1,0 +1,302 @@
+"""Plan the other experiments of the workflow.
+
+    friction    one joint at speeds over two decades, both ways, each held as its range allows
+    frf         one joint turning slowly there and back, with an odd random-phase multisine, twice
+    hold        static postures that together determine gravity best
+
+The multisine has odd lines of which one in four is missing. An even power of the motion shows at
+even lines, an odd power at the missing ones; differences between realisations of other phases are
+distortion, differences between periods noise (Pintelon, Schoukens 2012, System Identification,
+§4.3.1; Schoukens et al. 2005, Automatica 41, on random grids of odd lines).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.errors import UsageError
+from pipelines.excitation.config import CONFIG
+from pipelines.excitation.constraints import tip_motion
+from pipelines.excitation.fourier import quintics
+from pipelines.excitation.task import Task
+from pipelines.excitation.verify import Peak, torque_of, worst
+from pipelines.model.rigid.body import Array
+
+__all__ = ["Plan", "frf_plans", "friction_plans", "hold_plans", "odd_lines", "realisation"]
+
+QUINTIC_SPEED, QUINTIC_ACCELERATION = 1.875, 5.774  # numerics: peaks of 10 s³ - 15 s⁴ + 6 s⁵
+RAMP = 1.5  # numerics: largest slope of 3 s² - 2 s³
+Knots = list[tuple[float, Array]]  # times [s], and position, speed and acceleration (3, 1) there
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """One experiment to record."""
+
+    name: str
+    experiment: str
+    joint: int | None  # counted from 1
+    posture: Array | None  # (joints,) [rad]
+    t: Array  # [s]
+    motion: Array  # (3, joints, samples)
+    v: Array | None = None  # (samples, joints) [rad/s^2] injected excitation
+    period: float | None = None  # [s]
+    words: str = ""
+    nearest: Peak | None = None  # the limit that it comes nearest to
+
+
+def friction_plans(task: Task) -> tuple[Plan, ...]:
+    """Plan one experiment a joint; the others stay at home.
+
+    Raises:
+        UsageError: C08, a limit that even a slow one breaks: says which.
+    """
+    home, found = _home(task), list[Plan]()
+    for j in range(task.robot.n_joints):
+        found += _within(task, partial(_friction, task, j, home))
+    return tuple(found)
+
+
+def frf_plans(task: Task, seed: int, random: bool = False) -> tuple[Plan, ...]:
+    """Plan two experiments a joint: there and back at low speed, with multisines of equal lines.
+
+    The slow turn keeps friction from sticking. `random`: noise instead, as in Kostić et al. 2004,
+    Section IV.D.
+
+    Raises:
+        UsageError: C08, a limit that even a slow and weak one breaks: says which.
+    """
+    home, found = _home(task), list[Plan]()
+    for j in range(task.robot.n_joints):
+        found += _within(task, partial(_frf, task, j, home, seed, random))
+    return tuple(found)
+
+
+def _within(task: Task, make: Callable[[float], tuple[Plan, ...]]) -> tuple[Plan, ...]:
+    """Return the fastest of the sets of plans make(share) that keep every limit."""
+    share = 1.0
+    while True:
+        plans = tuple(replace(plan, nearest=_nearest(task, plan)) for plan in make(share))
+        broken = next((plan for plan in plans if plan.nearest and plan.nearest.share > 1.0), None)
+        if broken is None or broken.nearest is None:
+            return plans
+        if share * CONFIG.slower < CONFIG.slowest:
+            found = broken.nearest
+            of = "" if found.joint is None else f" of joint {found.joint}"
+            raise UsageError(
+                "C08", f"{broken.name} cannot keep the {found.quantity} limit{of}, "
+                f"{found.limit:.4g} {found.unit}", where="limits",
+                remedy="start elsewhere (--home), or correct that limit")
+        share *= CONFIG.slower
+
+
+def _nearest(task: Task, plan: Plan) -> Peak | None:
+    """Return the worst peak; the torque is that of the excitation as well."""
+    found = list(task.peaks(plan.motion, periodic=False))
+    if plan.v is not None and task.arm is not None:
+        excited = plan.motion.copy()
+        excited[2] += plan.v.T
+        tau = np.abs(torque_of(task.arm, excited)).max(axis=1)
+        found += [Peak(one.joint, "torque", float(tau[one.joint - 1]), one.high, one.unit,
+                       float(tau[one.joint - 1]) / one.high)
+                  for one in task.problem.limits if one.quantity == "torque" and one.joint]
+    return worst(found)
+
+
+def _home(task: Task) -> Array:
+    if task.home is None:
+        raise UsageError("C02", "these experiments need a posture where the other joints stay",
+                         where="--no-rest", remedy="leave --no-rest out, or give --home")
+    return task.home
+
+
+def _room(task: Task, j: int, home: Array, free: float) -> tuple[float, float]:
+    """Return centre and width [rad] of the range that joint j uses; `free` without limits."""
+    low, high = task.robot.joints[j].position
+    if not np.isfinite(high - low):
+        return float(home[j]), free
+    return 0.5 * (low + high), CONFIG.used_range * (high - low)
+
+
+def _friction(task: Task, j: int, home: Array, share: float) -> tuple[Plan, ...]:
+    centre, room = _room(task, j, home, 4.0 * np.pi)
+    rate = share * _acceleration(task, j, home)
+    top, (shortest, longest) = share * CONFIG.speed_share * float(task.speed[j]), CONFIG.held
+    knots: Knots = [(0.0, _state(float(home[j])))]
+    held: list[float] = []
+    for speed in (np.geomspace(0.01, 1.0, CONFIG.levels) * top).tolist():
+        ramp = max(RAMP * speed / rate, 0.05)
+        hold = min(room / speed - ramp, longest)
+        if hold >= shortest:
+            start = centre - 0.5 * speed * (hold + ramp)
+            _move(knots, start, rate, top)
+            _stroke(knots, speed, ramp, hold)
+            held.append(speed)
+    if not held:
+        raise UsageError("C08", f"joint {j + 1} has too small a range to hold any speed",
+                         where="position limits", remedy="widen them, or record friction by hand")
+    _move(knots, float(home[j]), rate, top)
+    t, motion = _sampled(task, j, home, knots)
+    words = f"{len(held)} speeds from {held[0]:.3g} to {held[-1]:.3g} rad/s, each both ways"
+    return (Plan(f"friction-{j + 1}", "friction", j + 1, None, t, motion, words=words),)
+
+
+def _acceleration(task: Task, j: int, home: Array) -> float:
+    """Return what joint j may use [rad/s^2]: of its limit, and of its torque beyond gravity."""
+    joint = task.robot.joints[j]
+    bound = joint.acceleration
+    if not np.isfinite(bound):
+        bound = float(task.speed[j]) / 0.3
+    if task.arm is not None and np.isfinite(joint.torque):
+        bound = min(bound, 0.5 * joint.torque / _inertia(task, j, home))
+    return CONFIG.acceleration * bound
+
+
+def _inertia(task: Task, j: int, home: Array) -> float:
+    assert task.arm is not None
+    return max(float(task.arm.body.mass_matrix(home[None], task.arm.p)[0, j, j]), 1e-9)
+
+
+def _state(position: float, speed: float = 0.0) -> Array:
+    return np.array([[position], [speed], [0.0]])
+
+
+def _move(knots: Knots, end: float, rate: float, speed: float) -> None:
+    """Add a move from rest to rest, within `speed` and acceleration `rate`."""
+    at, state = knots[-1]
+    far = abs(end - float(state[0, 0]))
+    fastest = max(math.sqrt(QUINTIC_ACCELERATION * far / rate), QUINTIC_SPEED * far / speed)
+    knots.append((at + max(fastest, 0.2), _state(end)))
+
+
+def _stroke(knots: Knots, speed: float, ramp: float, hold: float) -> None:
+    """Add the way there and back at constant speed."""
+    for v in (speed, -speed):
+        at, place = knots[-1][0], float(knots[-1][1][0, 0])
+        for seconds, way, now in ((ramp, 0.5 * ramp, v), (hold, hold, v), (ramp, 0.5 * ramp, 0.0)):
+            at, place = at + seconds, place + v * way
+            knots.append((at, _state(place, now)))
+
+
+def _sampled(task: Task, j: int, home: Array, knots: Knots) -> tuple[Array, Array]:
+    """Return times and the motion (3, joints, samples) of joint j along `knots`."""
+    samples = math.ceil(knots[-1][0] / task.sample_time - 1e-9) + 1
+    t = np.arange(samples, dtype=np.float64) * task.sample_time
+    motion = np.zeros((3, task.robot.n_joints, len(t)))
+    motion[0] = home[:, None]
+    motion[:, j] = quintics(knots, t)[:, 0]
+    return t, motion
+
+
+def _frf(task: Task, j: int, home: Array, seed: int, random: bool,
+         share: float) -> tuple[Plan, ...]:
+    """Plan joint j's experiments, `share` as fast and strong as they might be."""
+    centre, room = _room(task, j, home, 2.0 * np.pi)
+    least = CONFIG.frf_periods * CONFIG.frf_period + CONFIG.frf_settle
+    fastest = min(CONFIG.slow * float(task.speed[j]), room / least)
+    ramp = max(RAMP * fastest / _acceleration(task, j, home), 0.1)
+    full = min(fastest, room / (least + ramp))  # the periods fit into the room each way
+    speed, hold = share * full, room / full - ramp
+    knots: Knots = [(0.0, _state(centre - 0.5 * speed * (hold + ramp)))]
+    _stroke(knots, speed, ramp, hold)
+    t, motion = _sampled(task, j, home, knots)
+    joint = task.robot.joints[j]
+    if task.arm is not None and np.isfinite(joint.torque):
+        strength = CONFIG.frf_torque * joint.torque / _inertia(task, j, home)
+    else:
+        strength = CONFIG.frf_torque * _acceleration(task, j, home) / CONFIG.acceleration
+    found = []
+    for k in range(CONFIG.realisations):
+        own, period, words = _excitation(task, np.random.default_rng([seed, j]),
+                                         np.random.default_rng([seed, j, k]), len(t), random)
+        v = np.zeros((len(t), task.robot.n_joints))
+        v[:, j] = share * strength * own
+        found.append(Plan(
+            f"frf-{j + 1}-{k + 1}", "frf", j + 1, home, t, motion, v, period,
+            f"{speed:.3g} rad/s there and back, {hold:.3g} s each way, {words}; {k + 1} of "
+            f"{CONFIG.realisations}"))
+    return tuple(found)
+
+
+def _excitation(task: Task, grid: np.random.Generator, rng: np.random.Generator, samples: int,
+                random: bool) -> tuple[Array, float | None, str]:
+    """Return a signal of rms 1 (samples,), its period [s], and what it is."""
+    if random:
+        return rng.standard_normal(samples), None, "a random number each sample"
+    seconds, (low, high) = CONFIG.frf_period, CONFIG.frf_band
+    period = round(seconds / task.sample_time)
+    lines = odd_lines(grid, int(low * seconds), int(high * period))
+    words = (f"{len(lines)} odd lines from {lines[0] / seconds:.3g} to "
+             f"{lines[-1] / seconds:.4g} Hz, one of four left out to detect distortion, repeated "
+             f"every {seconds:g} s")
+    return realisation(rng, lines, period, samples), period * task.sample_time, words
+
+
+def odd_lines(rng: np.random.Generator, lowest: int, highest: int) -> npt.NDArray[np.int64]:
+    """Return odd harmonics from `lowest` to `highest`, without one of every four neighbours."""
+    odd = np.arange(lowest | 1, highest + 1, 2)
+    groups = len(odd) // CONFIG.group
+    out = CONFIG.group * np.arange(groups) + rng.integers(CONFIG.group, size=groups)
+    return np.asarray(np.delete(odd, out), dtype=np.int64)
+
+
+def realisation(rng: np.random.Generator, lines: Sequence[int] | npt.NDArray[np.int64],
+                period: int, samples: int) -> Array:
+    """Return lines of equal amplitude and random phase, rms 1, repeated after `period` samples."""
+    spectrum = np.zeros(period // 2 + 1, dtype=np.complex128)
+    spectrum[lines] = np.exp(2j * np.pi * rng.uniform(size=len(lines)))
+    one = np.fft.irfft(spectrum, period)
+    return np.asarray(np.resize(one / np.sqrt(np.mean(one**2)), samples))
+
+
+def hold_plans(task: Task, seed: int) -> tuple[Plan, ...]:
+    """Plan postures, each the one that adds most to log det of the information on gravity."""
+    rng, n = np.random.default_rng(seed), task.robot.n_joints
+    low, high = task.around
+    wide = 0.5 * (high - low)
+    candidates = rng.uniform(low - wide, high + wide, (CONFIG.candidates, n))
+    bounds = np.array([joint.position for joint in task.robot.joints])
+    candidates = np.clip(candidates, bounds[:, 0] + 0.02, bounds[:, 1] - 0.02)
+    rows, kept = _static_rows(task, candidates)
+    if not kept.any():
+        raise UsageError("C08", "no posture can be held within the limits of torque and tip",
+                         where=task.robot.name, remedy="correct these limits or the model")
+    rows, candidates = rows[kept], candidates[kept]
+    matrix, plans = 1e-6 * np.eye(rows.shape[2]), []
+    t = np.arange(round(CONFIG.dwell / task.sample_time) + 1, dtype=np.float64) * task.sample_time
+    for k in range(min(CONFIG.postures, len(candidates))):
+        gain = np.linalg.slogdet(np.eye(n) + rows @ np.linalg.solve(matrix, rows.swapaxes(1, 2)))[1]
+        best = int(np.argmax(gain))
+        matrix += rows[best].T @ rows[best]
+        motion = np.zeros((3, n, len(t)))
+        motion[0] = candidates[best][:, None]
+        words = ", ".join(f"{value:.3f}" for value in candidates[best]) + " rad"
+        plan = Plan(f"hold-{k + 1}", "hold", None, candidates[best], t, motion, words=words)
+        plans.append(replace(plan, nearest=_nearest(task, plan)))
+    return tuple(plans)
+
+
+def _static_rows(task: Task, q: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Return rows (postures, joints, columns) over the noise, and which postures can be held."""
+    problem, still = task.problem, np.zeros((3, q.shape[1], len(q)))
+    still[0] = q.T
+    rows = np.zeros((len(q), q.shape[1], len(problem.columns.names)))
+    own_rows = [row.copy() for row in problem.columns.rows(still)]
+    for j, (own, row) in enumerate(zip(problem.columns.columns, own_rows, strict=True)):
+        rows[:, j, own] = row.T / problem.goal.noise[j]
+    kept = np.ones(len(q), dtype=bool)
+    tip = tip_motion(problem.chain, still[0], still[1]).position
+    tau = None if problem.beta is None else problem.torque(own_rows, still[1])
+    for one in problem.limits:
+        if one.quantity == "torque" and one.joint and tau is not None:
+            kept &= np.abs(tau[one.joint - 1]) < one.high
+        elif one.quantity[:-1] == "tip ":
+            place = tip["xyz".index(one.quantity[-1])]
+            kept &= (place > one.low) & (place < one.high)
+    return rows, kept

@@ -1,0 +1,312 @@
+"""Judge a design: the figures of its report, the warnings, and the files for the robot."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from pipelines.errors import Check, UsageError
+from pipelines.excitation.config import CONFIG
+from pipelines.excitation.discrimination import Apart, Found
+from pipelines.excitation.fourier import Trajectory
+from pipelines.excitation.optimise import landscape
+from pipelines.excitation.other_plans import Plan
+from pipelines.excitation.regressor import ArmColumns, grams_of
+from pipelines.excitation.rehearsal import Beyond, Rehearsal
+from pipelines.excitation.task import LOWER_BOUND, Task
+from pipelines.excitation.verify import Peak
+from pipelines.importers.units import ControllerTable
+from pipelines.io.log import ExperimentLog, Signal
+from pipelines.io.results import NOT_STORED
+from pipelines.model.motion import Reconstruction, reconstruct
+from pipelines.model.rigid import rrr
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.writing.task import planned_log
+
+__all__ = ["Compared", "Course", "DrawnPlan", "ParameterStd", "Result", "beyond_words",
+           "coefficients", "doubts", "first_mode", "information_of", "judged", "log_of",
+           "planned"]
+
+BLOCK = 4096  # numerics: samples whose rows are computed at once
+
+
+@dataclass(frozen=True)
+class ParameterStd:
+    """How well one parameter will be known."""
+
+    name: str
+    unit: str
+    value: float | None  # of the model
+    std: float  # predicted, of one experiment
+    rigid: bool
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Random motions within the same limits."""
+
+    count: int
+    condition_median: float
+    condition_best: float
+    relative_std_median: float
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """One period for figures, each (points, joints); and its spectrum."""
+
+    t: Array  # [s]
+    q: Array  # [rad]
+    dq: Array  # [rad/s]
+    ddq: Array  # [rad/s^2]
+    tau: Array | None  # [N m] of the model
+    hertz: Array  # (harmonics,)
+    amplitude: Array  # (harmonics, joints) [rad/s] of the speed
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnPlan:
+    """One of the other experiments, for a figure and a row of a table."""
+
+    name: str
+    joint: int | None
+    words: str
+    seconds: float
+    t: Array  # [s] (points,)
+    q: Array  # [rad] (points, joints)
+    speed_peak: float  # [rad/s]
+    acceleration_peak: float  # [rad/s^2]
+    nearest: Peak | None = None  # the limit that it comes nearest to
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """Of an excitation everything; of other purposes the plans alone."""
+
+    robot: str
+    joints: tuple[str, ...]
+    purpose: str
+    seed: int
+    sample_time: float  # [s]
+    duration: float = 0.0  # [s]
+    plans: tuple[DrawnPlan, ...] = ()
+    criterion: str = ""
+    ceiling: float | None = None  # on the condition number
+    condition_number: float | None = None
+    lower_bound: float | None = None  # no motion of this arm can have a smaller one
+    predicted_relative_std: float | None = None
+    frobenius: float | None = None
+    smallest_singular_value: float | None = None
+    log_determinant: float | None = None
+    limits: tuple[Peak, ...] = ()
+    evaluations: int = 0
+    found_at: int = 0
+    interrupted: bool = False
+    stopped: int = field(default=0, metadata=NOT_STORED)  # exit code of the signal
+    reached: bool = True
+    shrunk: float = 1.0
+    shrunk_for: tuple[str, ...] = ()  # the limits, in words, that asked for it
+    singular_values: tuple[float, ...] = ()  # of Φ/√n
+    parameters: tuple[ParameterStd, ...] = ()
+    random: Compared | None = None
+    course: Course | None = None
+    period: float = 0.0  # [s]
+    periods: int = 0
+    run_in: float = 0.0  # [s]
+    home: tuple[float, ...] | None = None  # [rad]
+    noise: tuple[float, ...] = ()  # [N m]
+    friction_columns: bool = False
+    torque_checked: bool = False
+    torque_share: float = 1.0
+    speed_share: float = 1.0  # of the speed limit that the plan may use
+    after: tuple[str, ...] = ()
+    first_mode: float | None = None  # [Hz]
+    mode_factor: float = 1.0  # times that the top harmonic lies below it, at least
+    top_hz: float = 0.0  # [Hz] of the highest harmonic
+    rehearsal: Rehearsal | None = None
+    rehearsal_failed: str = ""
+    rehearsals: tuple[tuple[str, Rehearsal], ...] = ()  # of plans, by name
+    robot_from: str = ""  # why this robot, where none was named
+    apart: Apart | None = None  # of a design that tells two causes apart
+    logs: tuple[tuple[str, ExperimentLog], ...] = field(default=(), metadata=NOT_STORED)
+    table: ControllerTable | None = field(default=None, metadata=NOT_STORED)
+    coefficients: dict[str, object] | None = field(default=None, metadata=NOT_STORED)
+
+    @property
+    def dearest(self) -> str:
+        """The limit that costs most, in words; empty where none costs anything worth naming."""
+        top = max(self.limits, key=lambda one: one.cost, default=None)
+        if top is None or top.cost < CONFIG.costly:
+            return ""
+        if top.joint is None:
+            return f"limit of {top.quantity}"
+        return f"{top.quantity} limit of joint {top.joint}"
+
+
+def _of_task(task: Task, purpose: str, seed: int) -> Result:
+    return Result(task.robot.name, tuple(joint.name for joint in task.robot.joints), purpose, seed,
+                  task.sample_time, torque_checked=task.arm is not None,
+                  home=None if task.home is None else tuple(map(float, task.home)))
+
+
+def planned(task: Task, purpose: str, seed: int, plans: Sequence[Plan]) -> Result:
+    """Return the result of the other experiments, with their logs."""
+    drawn = []
+    for plan in plans:
+        rows = slice(None, None, max(1, len(plan.t) // CONFIG.points))
+        speed, acceleration = (float(np.abs(part).max()) for part in plan.motion[1:])
+        drawn.append(DrawnPlan(plan.name, plan.joint, plan.words, float(plan.t[-1]), plan.t[rows],
+                               plan.motion[0].T[rows], speed, acceleration, plan.nearest))
+    logs = []
+    for plan in plans:
+        log = log_of(task, plan.name, plan.t, plan.motion, plan.experiment)
+        signals = dict(log.signals)
+        if plan.v is not None:
+            signals["v"] = Signal(plan.v, "rad/s^2", "injected excitation")
+        logs.append((plan.name, replace(log, signals=signals, joint=plan.joint,
+                                        posture=plan.posture, period=plan.period)))
+    return replace(_of_task(task, purpose, seed), plans=tuple(drawn), logs=tuple(logs),
+                   duration=sum(plan.seconds for plan in drawn))
+
+
+def judged(task: Task, found: Found, seed: int) -> Result:
+    """Judge a design on all samples of its period, and random motions in comparison."""
+    design, problem, goal = found.design, task.problem, task.problem.goal
+    trajectory, columns = design.trajectory, problem.columns
+    series = trajectory.series
+    samples = max(round(series.period / task.sample_time), 2 * series.harmonics + 2)
+    motion = series.samples(samples)
+    grams = grams_of(columns, motion)
+    figures, std = goal.figures(grams), goal.std(grams)
+    parameters = tuple(
+        ParameterStd(columns.names[k], columns.units[k],
+                     None if problem.beta is None else float(problem.beta[k]), float(std[k]),
+                     bool(k < columns.rigid_count)) for k in goal.kept.tolist())
+    rows = slice(None, None, max(1, samples // CONFIG.points))
+    q, dq, ddq = (part.T[rows] for part in motion)
+    t = np.arange(samples, dtype=np.float64)[rows] * (series.period / samples)
+    tau = None if task.arm is None else task.arm.torque(Motion(t, q, dq, ddq))
+    amplitude = np.hypot(series.cosine, series.sine).T
+    bounded = rrr.fits(task.robot) and goal.earlier is None
+    used = np.flatnonzero(task.harmonics.used.any(axis=0))
+    return replace(
+        _of_task(task, "excitation", seed), **vars(figures), limits=design.peaks,
+        ceiling=goal.ceiling, lower_bound=LOWER_BOUND if bounded else None,
+        evaluations=design.evaluations, found_at=design.found_at, interrupted=design.stopped > 0,
+        stopped=design.stopped, reached=goal.meets(figures.condition_number),
+        shrunk=design.shrunk, shrunk_for=design.shrunk_for, parameters=parameters,
+        singular_values=tuple(goal.singular_values(grams).tolist()), random=_random(task, seed),
+        course=Course(t, q, dq, ddq, tau, series.omega / (2.0 * np.pi), amplitude),
+        period=series.period, periods=trajectory.periods, run_in=trajectory.run_in,
+        duration=trajectory.duration, noise=tuple(map(float, goal.noise)),
+        friction_columns=columns.friction, top_hz=float(used[-1] + 1) / series.period,
+        rehearsal=found.rehearsal, rehearsal_failed=found.failed, apart=found.apart,
+        coefficients=coefficients(task, trajectory))
+
+
+def _random(task: Task, seed: int) -> Compared:
+    problem, rng = landscape(task), np.random.default_rng([seed, 1])
+    figures = []
+    for _ in range(CONFIG.random):
+        motion = problem.space.motion(problem.start(rng, 0.999), problem.samples)
+        figures.append(task.problem.goal.figures(grams_of(task.problem.columns, motion)))
+    condition = [one.condition_number for one in figures]
+    std = [one.predicted_relative_std for one in figures]
+    return Compared(CONFIG.random, float(np.median(condition)), min(condition),
+                    float(np.median(std)))
+
+
+def doubts(result: Result) -> tuple[Check, ...]:
+    """Return C08, a ceiling not reached; D17, no rehearsal; D12, a limit that it did not keep."""
+    found = []
+    if not result.reached:
+        dear = f"; the {result.dearest} is most in the way" if result.dearest else ""
+        found.append(Check.of(
+            "C08", "warn", f"a condition number of {result.ceiling:g} was not reached{dear}",
+            where=result.robot, gate=True,
+            remedy="search longer, give more harmonics, or widen that limit"))
+    if result.rehearsal_failed:
+        found.append(Check.of("D17", "warn", f"the rehearsal failed: {result.rehearsal_failed}",
+                              where=result.robot, remedy="check the model before the robot moves"))
+    motion = () if result.rehearsal is None else (("the motion", result.rehearsal),)
+    for name, rehearsal in (*motion, *result.rehearsals):
+        if rehearsal.safe:
+            continue
+        ways = {"torque": "a smaller torque_share", "speed": "a smaller speed_share",
+                "position": "another --home, or a position range in the robot description that "
+                "leaves room"}
+        named = ", and ".join(dict.fromkeys(ways[one.quantity] for one in rehearsal.beyond))
+        words = ", ".join(beyond_words(result.joints, rehearsal))
+        found.append(Check.of(
+            "D12", "warn", f"rehearsed in simulation, {name} goes beyond limits: {words}",
+            where=result.robot, gate=True, remedy=f"plan it again with {named}; or make sure that "
+            "your controller follows more closely"))
+    return tuple(found)
+
+
+def beyond_words(joints: Sequence[str], found: Rehearsal) -> list[str]:
+    """Return each limit that a rehearsal broke, in words."""
+    def words(joint: str, one: Beyond) -> str:
+        if one.quantity == "torque":
+            return f"the drive of {joint} saturates in {100.0 * one.by:.2g} % of the samples"
+        if one.quantity == "speed":
+            return f"{joint} reaches {100.0 * (1.0 + one.by):.4g} % of its speed limit"
+        return f"{joint} goes {one.by:.2g} {one.unit} beyond its range"
+
+    return [words(joints[one.joint], one) for one in found.beyond]
+
+
+def log_of(task: Task, name: str, t: Array, motion: Array, experiment: str) -> ExperimentLog:
+    """Return the planned log of a motion (3, joints, samples) at times t (samples,) [s]."""
+    q, dq, ddq = (np.ascontiguousarray(part.T) for part in motion)
+    return planned_log(f"{task.robot.name} {name}", task.robot, Motion(t, q, dq, ddq), experiment,
+                       "identify")
+
+
+def coefficients(task: Task, trajectory: Trajectory) -> dict[str, object]:
+    """Return eq. (22) of Kostić et al. 2004, joint by joint, at the harmonics each one has."""
+    series, joints = trajectory.series, []
+    for j, joint in enumerate(task.robot.joints):
+        own = np.flatnonzero(task.harmonics.used[j])
+        joints.append({"joint": j + 1, "name": joint.name, "q0": float(series.offset[j]),
+                       "harmonics": (own + 1).tolist(), "a": series.cosine[j, own].tolist(),
+                       "b": series.sine[j, own].tolist()})
+    formula = "q = q0 + sum_j (a_j sin(w_j t) - b_j cos(w_j t))/w_j, w_j = 2 pi j / period"
+    return {"formula": formula, "period": series.period, "run_in": trajectory.run_in,
+            "units": {"period": "s", "q0": "rad", "a": "rad/s", "b": "rad/s"},
+            "periods": trajectory.periods, "joints": joints}
+
+
+def information_of(logs: Iterable[ExperimentLog], columns: ArmColumns) -> Array:
+    """Return rowsᵀ rows (joints, columns, columns) summed over every sample of the logs."""
+    count = len(columns.names)
+    total = np.zeros((len(columns.columns), count, count))
+    for log in logs:
+        motion = reconstruct(log, Reconstruction()).motion
+        whole = np.stack([motion.q.T, motion.dq.T, motion.ddq.T])
+        for first in range(0, whole.shape[2], BLOCK):
+            block = np.ascontiguousarray(whole[:, :, first:first + BLOCK])
+            total += grams_of(columns, block) * block.shape[2]
+    return total
+
+
+def first_mode(results: Iterable[Mapping[str, Any]]) -> float | None:
+    """Return the lowest frequency [Hz] of a mode in results of `frf`; None where none was found.
+
+    Raises:
+        UsageError: C02, a result that does not hold what `frf` writes.
+    """
+    try:
+        values = [mode["frequency"]["value"] for result in results
+                  for response in result["responses"] for mode in response["modes"]]
+        found = [float(value) for value in values if value is not None]
+    except (KeyError, TypeError, ValueError):
+        found = [math.nan]
+    if not all(0.0 < value < math.inf for value in found):
+        raise UsageError("C02", "a result of frf does not say the frequencies of its modes",
+                         where="--prior-logs", remedy="run frf again, or leave its result out")
+    return min(found, default=None)

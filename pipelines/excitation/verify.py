@@ -1,0 +1,97 @@
+"""Verify a finished motion on a fine grid: its peaks between samples too.
+
+Position, speed and acceleration of a periodic motion are trigonometric polynomials, whose bound
+holds rigorously (`fourier.periodic_peak`). Torque and tip are smooth but no polynomials: to each
+of their samples half the step to its neighbour is added, which on a grid of 0.1 ms exceeds what
+can lie between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipelines.excitation.config import CONFIG
+from pipelines.excitation.constraints import Limit, tip_motion
+from pipelines.model.arm import Arm
+from pipelines.model.rigid.body import Array, Motion
+from pipelines.model.rigid.geometry import SerialChain
+from pipelines.signal import fourier
+
+__all__ = ["Peak", "peaks", "torque_of", "worst"]
+
+MOTION = ("position", "speed", "acceleration")
+
+
+@dataclass(frozen=True)
+class Peak:
+    """The peak of one signal of a motion."""
+
+    joint: int | None  # counted from 1; None of the tip
+    quantity: str
+    peak: float  # the value that is nearer to its limit, the lowest or the highest
+    limit: float  # that end
+    unit: str
+    share: float  # 1 is the limit: of the way from the middle of the range, or from zero
+    cost: float = 0.0  # share of what all limits together cost the design
+
+
+def peaks(limits: Iterable[Limit], chain: SerialChain, motion: Array, arm: Arm | None, *,
+          periodic: bool) -> tuple[Peak, ...]:
+    """Return the peaks of motion (3, joints, samples) on the grid of `CONFIG.grid`.
+
+    Args:
+        arm: predicts the torque, where that is limited.
+        periodic: the samples are one period, the first of them once.
+    """
+    limits = tuple(limits)
+    quantities = {one.quantity for one in limits}
+    tau = torque_of(arm, motion) if arm is not None and "torque" in quantities else motion[0]
+    tip = tip_motion(chain, *motion[:2]) if any(x.joint is None for x in limits) else None
+    found = []
+    for one in limits:
+        if one.quantity in MOTION and one.joint is not None:
+            signal = motion[MOTION.index(one.quantity), one.joint - 1]
+            bound = fourier.periodic_peak if periodic else _between
+        else:
+            bound = _between
+            if one.joint is not None:
+                signal = tau[one.joint - 1]
+            else:
+                assert tip is not None
+                place = "xyz".find(one.quantity[-1])
+                speed = np.linalg.norm(tip.velocity, axis=0)
+                signal = speed if one.quantity == "tip speed" else tip.position[place]
+        low, high = map(float, bound(signal))
+        found.append(_peak(one, low, high))
+    return tuple(found)
+
+
+def torque_of(arm: Arm, motion: Array) -> Array:
+    """Return the torque (joints, samples) of a model on the grid of `CONFIG.grid`."""
+    t = CONFIG.grid * np.arange(motion.shape[2], dtype=np.float64)
+    return arm.torque(Motion(t, *(part.T for part in motion))).T
+
+
+def _between(signal: Array) -> tuple[float, float]:
+    half = 0.5 * np.abs(np.diff(signal))
+    slack = np.maximum(np.append(half, 0.0), np.append(0.0, half))
+    return float((signal - slack).min()), float((signal + slack).max())
+
+
+def _peak(one: Limit, low: float, high: float) -> Peak:
+    middle = 0.5 * (one.low + one.high)
+    if not np.isfinite(middle):  # open at one end
+        middle = one.high - 1.0 if np.isfinite(one.high) else one.low + 1.0
+    shares = [(value - middle) / (end - middle) if np.isfinite(end) else -np.inf
+              for value, end in ((low, one.low), (high, one.high))]
+    upper = shares[1] >= shares[0]
+    return Peak(one.joint, one.quantity, high if upper else low, one.high if upper else one.low,
+                one.unit, float(max(shares)))
+
+
+def worst(found: Iterable[Peak]) -> Peak | None:
+    """Return the peak that comes nearest to its limit."""
+    return max(found, key=lambda peak: peak.share, default=None)

@@ -1,0 +1,72 @@
+"""A design is changed until it separates two causes; where that gains nothing, it stays the plain design."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipelines.excitation import discrimination as telling
+from pipelines.excitation.discrimination import Pair, best
+from pipelines.excitation.optimise import Design, Effort, design, final_problem, finished
+from pipelines.excitation.task import Task, Wishes, plan_task
+from pipelines.model.effects.spring import Spring
+from pipelines.model.effects.torque_offset import TorqueOffset
+from tests.excitation.arms import described, rrr
+
+PAIR = Pair(Spring(joint=2), TorqueOffset(joint=2))
+EFFORT = Effort(evaluations=200)
+
+
+@pytest.fixture(scope="module")
+def task() -> Task:
+    return plan_task(rrr(), described(rrr()), replace(Wishes(), harmonics=(8,)))
+
+
+@pytest.fixture(scope="module")
+def plain(task: Task) -> Design:
+    return design(task, EFFORT, 1)
+
+
+def halved(task: Task, found: Design) -> Design:
+    space = final_problem(task).space
+    return finished(task, space.shrunk(space.point(found.trajectory.series), 0.5), 1, 1, found.stopped)
+
+
+def test_causes_are_less_alike_within_the_ceiling(task: Task, plain: Design) -> None:
+    """Less alike than in the plain design, within the ceiling, and safe in simulation."""
+    found = best(task, PAIR, EFFORT, 1, rehearse=True)
+    assert found.apart is not None
+    assert found.apart.changed
+    assert found.rehearsal is not None
+    assert found.rehearsal.safe
+    assert found.design.reached
+    assert found.apart.after.score < found.apart.before.score
+    assert found.apart.after.condition_number <= 3.0 * (1.0 + 1e-6)
+    assert found.design.trajectory.series.cosine.tobytes() != plain.trajectory.series.cosine.tobytes()
+
+
+def test_a_motion_that_its_limits_spoil_gives_way_to_one_on_the_way(task: Task, plain: Design,
+                                                                    monkeypatch: pytest.MonkeyPatch) -> None:
+    """The end of the search cannot be used: a motion that it passed is, which still tells more than the plain design."""
+    calls: list[int] = []
+
+    def first_halved(task: Task, *given: object) -> Design:
+        calls.append(1)
+        made = finished(task, *given)  # type: ignore[arg-type]
+        return halved(task, made) if len(calls) == 1 else made
+
+    monkeypatch.setattr(telling, "finished", first_halved)
+    after, apart = telling.told_apart(task, plain, PAIR, EFFORT, 1)
+    assert len(calls) == 2
+    assert apart.changed
+    assert apart.after.score < apart.before.score
+    assert after.reached
+
+
+def test_where_nothing_is_better_it_is_the_plain_design(task: Task, plain: Design, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(telling, "finished", lambda task, *given: halved(task, plain))
+    after, apart = telling.told_apart(task, plain, PAIR, EFFORT, 1)
+    assert after.trajectory is plain.trajectory
+    assert (apart.changed, after.reached) == (False, plain.reached)
+    assert after.evaluations == plain.evaluations + 200
