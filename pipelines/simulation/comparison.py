@@ -25,7 +25,7 @@ from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import Windows, held_torque, simulate_windows
-from pipelines.simulation.run import run_together
+from pipelines.simulation.closed_loop import run_together
 from pipelines.simulation.step import choose_step
 
 __all__ = ["Positions", "SimulatedSpan", "Simulation", "Strayed", "in_loop", "in_loops", "nearer",

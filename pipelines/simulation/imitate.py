@@ -24,7 +24,7 @@ from pipelines.simulation.course import Course, course
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import held_torque, simulate_windows
-from pipelines.simulation.run import Noise, Simulated, run
+from pipelines.simulation.closed_loop import Noise, Simulated, run
 from pipelines.simulation.step import choose_step
 
 __all__ = ["How", "Imitation", "imitate"]

@@ -24,7 +24,7 @@ from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.integrate import HeldBody
 from pipelines.simulation.plant import Plant
-from pipelines.simulation.run import Noise, Simulated, run, run_together
+from pipelines.simulation.closed_loop import Noise, Simulated, run, run_together
 
 __all__ = ["Step", "choose_step", "simulate"]
 

@@ -27,7 +27,7 @@ from pipelines.model.rigid.geometry import serial_chain
 from pipelines.model.rigid.kinematics import tip_position
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
-from pipelines.simulation.run import run
+from pipelines.simulation.closed_loop import run
 from pipelines.simulation.step import choose_step
 from pipelines.writing.config import CONFIG
 

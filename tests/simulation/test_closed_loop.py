@@ -12,7 +12,7 @@ from pipelines.io.log import Array, Controller
 from pipelines.model.arm import Arm
 from pipelines.model.rigid.body import Motion
 from pipelines.simulation import Noise, Plant, run
-from pipelines.simulation.run import _draws, run_together
+from pipelines.simulation.closed_loop import _draws, run_together
 from tests.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving
 from tests.simulation.pinocchio_loop import Loop, TransferObserver
 

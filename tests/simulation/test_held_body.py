@@ -14,7 +14,7 @@ from pipelines.simulation import Experiment, Noise, choose_step
 from pipelines.simulation.imitate import How, imitate
 from pipelines.simulation.integrate import HeldBody
 from pipelines.simulation.plant import Plant
-from pipelines.simulation.run import run_together
+from pipelines.simulation.closed_loop import run_together
 from pipelines.writing.task import planned_log
 from tests.seeds import rarely
 from tests.simulation.arms import TS, Case, rrr, serial
