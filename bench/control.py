@@ -92,6 +92,9 @@ class ControllerModel(Protocol):
     def parts(self, q: Floats, dq: Floats, ddq: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """Return friction, inertia D ddq, Coriolis and gravity of one sample [N m], lists of n."""
 
+    def along(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Return the same of a whole motion (4, samples, n)."""
+
 
 Step = Callable[[int, Floats, Observer], Floats]
 """Torque (n,) [N m] at sample k, before quantisation, from positions as read [rad] and the
@@ -226,8 +229,7 @@ class FeedForward:
 
     def start(self, machine: Machine, reference: Reference) -> tuple[Step, dict[str, Array]]:
         back = _feedback(*_softer(machine, self.stiffness), self.velocity, reference)
-        path = zip(*(x.tolist() for x in (reference.q, reference.dq, reference.ddq)), strict=True)
-        every = np.array([self.model.parts(*row) for row in path]).transpose(1, 0, 2)
+        every = self.model.along(reference.q, reference.dq, reference.ddq)
         by_part = dict(zip(FEEDFORWARD, every, strict=True))
         total = np.sum([by_part[part] for part in self.parts], axis=0)
         extras = {"tau_feedforward": total}
@@ -257,9 +259,7 @@ class ComputedTorque:
     def start(self, machine: Machine, reference: Reference) -> tuple[Step, dict[str, Array]]:
         back = _feedback(self.kp, self.kd, self.velocity, reference)
         q_ref, dq_ref, v = reference.q.tolist(), reference.dq.tolist(), self.v.tolist()
-        still = [0.0] * machine.n
-        path = zip(q_ref, dq_ref, strict=True)
-        friction = np.array([self.model.parts(q, dq, still)[0] for q, dq in path])
+        friction = self.model.along(reference.q, reference.dq, np.zeros_like(reference.q))[0]
         compensated, r_kept = friction.tolist(), np.zeros_like(reference.q)
 
         def step(k: int, q: Floats, observer: Observer) -> Floats:

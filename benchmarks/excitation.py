@@ -44,6 +44,9 @@ from bench.machine import Machine
 from bench.motions import Reference
 from bench.plant import record
 from pipelines import fit_friction
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import Motion
 from pipelines.excitation.optimise import landscape
 from pipelines.excitation.problem import DesignProblem
 from pipelines.excitation.regressor import grams_of
@@ -52,12 +55,9 @@ from pipelines.io.files import open_log, write_log
 from pipelines.io.robot import format_robot
 from pipelines.io.robot_files import load_robot
 from pipelines.io.urdf import import_urdf
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe, fit_logs
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.body import Motion
 from pipelines.signal.fourier import FourierSeries
 from pipelines.stage import Request, run_stage
 from tests.excitation.test_gradient import SHARP, TASKS, WEIGHT, _complex_value, _problem

@@ -30,20 +30,49 @@ import sys
 import time
 import tracemalloc
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.body import RigidBody
+from pipelines.dynamics.rrr import ACTING, RRR
+from pipelines.fit.equations import Block
 from pipelines.fit.least_squares import fit, solve
 from pipelines.fit.statistics import triangulate
 from pipelines.io.robot_files import load_robot
-from pipelines.model.rigid.equations import RigidEquations
-from pipelines.model.rigid.rrr import RRR
 
 _FIGAROH_UP_TO = 100_000  # beyond, its matrices do not fit beside the others'
 _TILE = 8192
+COLUMNS = tuple(np.array(columns, dtype=np.intp) for columns in ACTING)
+
+
+@dataclass(frozen=True, eq=False)
+class RigidEquations:
+    """The equations τ = Y p of a motion in blocks, each overwritten by the next."""
+
+    body: RigidBody
+    q: np.ndarray  # [rad] (samples, joints)
+    dq: np.ndarray
+    ddq: np.ndarray
+    tau: np.ndarray  # [N m] (samples, joints)
+    block: int = 6144  # samples at most: what is worked on then stays in the cache
+
+    def __iter__(self) -> Iterator[Block]:
+        count = max(1, -(-len(self.q) // self.block))
+        size = -(-len(self.q) // count)
+        memory = np.empty((28, size))
+        for first in range(0, len(self.q), size):
+            part = slice(first, min(first + size, len(self.q)))
+            motion = (self.q, self.dq, self.ddq, self.tau)
+            q, dq, ddq, tau = (np.asarray(x[part], dtype=np.float64) for x in motion)
+            if isinstance(self.body, RRR):
+                rows = self.body.acting_rows(q, dq, ddq, memory[:, : len(q)])
+                yield Block(15, COLUMNS, rows, tuple(np.ascontiguousarray(tau.T)))
+            else:
+                yield Block.of(self.body.regressor(q, dq, ddq), tau)
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,14 +19,14 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.hidden_effects.table import wilson
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.estimate_bps import Result, Settings, compute
 from pipelines.io.files import Opened
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import format_robot
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Inputs
-from tests.model.rigid.serial_arms import Arm, by_hand, physical_links, pin, table
+from tests.dynamics.serial_arms import Arm, by_hand, physical_links, pin, table
 
 Array = npt.NDArray[np.float64]
 

@@ -146,8 +146,8 @@ def _errors(folder: Path, methods: list[str]) -> list[float]:
     import numpy as np
     import pinocchio as pin
 
+    from pipelines.dynamics.arm import Arm
     from pipelines.io.model_file import read_model
-    from pipelines.model.arm import Arm
     from sample_logs.make_closed_form import from_rest, within_limits
     from sample_logs.make_model import synthetic_arm
 

@@ -26,9 +26,9 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.regressor import rrr
+from pipelines.dynamics.kinematics import serial_chain
+from pipelines.dynamics.rrr_kinematics import BRANCHES, Geometry, inverse, rrr_geometry, tip
 from pipelines.io.log import Array
-from pipelines.model.rigid.geometry import serial_chain
-from pipelines.model.rigid.rrr_kinematics import BRANCHES, Geometry, inverse, rrr_geometry, tip
 from pipelines.writing.inverse_kinematics import ClosedForm, Numerical
 from pipelines.writing.task import writing_task
 

@@ -25,8 +25,8 @@ from bench.draw import draw_machine
 from bench.machine import Machine
 from bench.motions import Reference
 from bench.plant import record
+from pipelines.dynamics.arm import Arm
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.in_folder import fitted_in_folder
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct

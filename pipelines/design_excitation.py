@@ -16,6 +16,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.named_cause import wanted_cause
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.excitation.discrimination import Pair, best, refuse_hidden, refuse_one
 from pipelines.excitation.optimise import Effort
@@ -34,8 +36,6 @@ from pipelines.io.results import json_text, stored_result
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.io.sandbox import read_small_text
-from pipelines.model.arm import Arm
-from pipelines.model.named_cause import wanted_cause
 from pipelines.report.excitation_report import excitation_report
 from pipelines.report.report import Report
 from pipelines.stage import Inputs, Request, Stage, read_logs, slug

@@ -20,13 +20,13 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.result import Diagnosis, Extended, Result
 from pipelines.diagnosis.words import summary_of
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.named_cause import refuse_unknown
 from pipelines.errors import Check, UsageError
 from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
-from pipelines.model.named_cause import refuse_unknown
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, Logs, prepare
 from pipelines.report.diagnosis_report import diagnosis_report

@@ -11,6 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from pipelines.dynamics.arm import Arm, ArmTorque
+from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.estimation.checks.boundary import Boundary, torque_boundary
 from pipelines.estimation.checks.findings import boundary_findings, without_followers
@@ -27,7 +29,6 @@ from pipelines.io.model_file import (
 from pipelines.io.option import option
 from pipelines.io.results import encode
 from pipelines.io.schema import joint_unit
-from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.estimation.balance import power_balance
 from pipelines.model.estimation.checks import consistency
@@ -52,7 +53,6 @@ from pipelines.model.estimation.words import columns_in_words
 from pipelines.model.excited import REMEDY
 from pipelines.model.mean_period import doubts
 from pipelines.model.motion import Reconstructed, for_equations, reconstruct
-from pipelines.model.parameter import Uncertainty
 from pipelines.model.plausibility import mismatches
 from pipelines.model.tuned import Reconstruction
 from pipelines.quality.checks import Subject, accepted

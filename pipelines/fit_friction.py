@@ -14,13 +14,16 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Array
+from pipelines.dynamics.parameter import Parameter
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import ModelFile, Source, read_model, write_model
 from pipelines.io.option import option
 from pipelines.io.results import encode
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.estimation.nominal import fitted_arm
 from pipelines.model.estimation.outcome import validity
@@ -39,9 +42,6 @@ from pipelines.model.friction.output_error import refuse_unpolished
 from pipelines.model.friction.result import Result, joint_result, several_results
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import reconstruct
-from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.body import Array
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.friction_report import friction_report

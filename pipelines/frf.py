@@ -17,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.io.log import ExperimentLog, recording
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
-from pipelines.model.arm import Arm
 from pipelines.model.frf.findings import Findings, frf_findings
 from pipelines.model.frf.grouping import GroupingConfig, advance
 from pipelines.model.frf.modes import BAND

@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, Gathering, InputRejected, UsageError
 from pipelines.importers.assemble import Map, Material, Source, assemble, collect, parse_map
 from pipelines.importers.config import REPAIR
@@ -35,7 +36,6 @@ from pipelines.io.parquet import write_table
 from pipelines.io.results import NOT_STORED
 from pipelines.io.robot import RobotDescription
 from pipelines.io.sandbox import regular_file
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.quality.subject import many
 from pipelines.report.report import Figure, Report, Section, Table
 from pipelines.signal.resample import grid, resample

@@ -16,14 +16,14 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.named_cause import acting_cause
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.io.files import write_log
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.io.model_file import read_model
 from pipelines.io.option import option
 from pipelines.io.results import encode
-from pipelines.model.arm import Arm
-from pipelines.model.named_cause import acting_cause
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.config import REPORT
 from pipelines.report.report import Report

@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm, ArmTorque
+from pipelines.dynamics.body import Motion
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.importers.recipe import Recipe
 from pipelines.importers.units import controller_table, write_controller_table
@@ -27,11 +29,9 @@ from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot, robot_at_hand, robot_sources
 from pipelines.io.sandbox import read_small_text
-from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.in_folder import fitted_in_folder
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
-from pipelines.model.rigid.body import Motion
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.report import Report
 from pipelines.report.writing_report import writing_report

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,12 +22,12 @@ from bench.machine import Fault, Friction, Machine
 from bench.motions import Reference
 from bench.plan import Solid
 from bench.plant import record
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import RobotDescription
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
-from pipelines.model.online import OnlineModel, OnlineTorque
 
 SEED = 28  # numerics: of the machine and of its controllers' model
 # Bits behind the point that a number keeps, by its signal. What a computer computed is given to far
@@ -45,25 +46,43 @@ BITS = {
 }
 
 
+class Parts(NamedTuple):
+    """The torque of a model for one sample, split. Each (joints,) [N m]."""
+
+    friction: list[float]
+    inertia: list[float]
+    coriolis: list[float]
+    gravity: list[float]
+
+
 @dataclass(frozen=True)
 class ControllerModel:
     """A model as a controller of the bench uses it, one sample at a time."""
 
     text: str  # model.json, for the log
-    online: OnlineModel
+    arm: Arm
 
-    def parts(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> OnlineTorque:
+    def parts(self, q: Sequence[float], dq: Sequence[float], ddq: Sequence[float]) -> Parts:
         """Return friction, inertia, Coriolis and gravity [N m], each a list of n."""
-        return self.online.parts(q, dq, ddq)
+        each = self.along(*(np.array([x], dtype=float) for x in (q, dq, ddq)))
+        return Parts(*(part[0].tolist() for part in each))
+
+    def along(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Return the same of a whole motion (4, samples, n)."""
+        rigid = self.arm.body.torque_parts(q, dq, ddq, self.arm.p)
+        friction = self.arm.friction_torque(Motion(np.zeros(len(q)), q, dq, ddq))
+        return np.array([friction, rigid.inertia, rigid.coriolis, rigid.gravity])
 
     def inertia_times(self, q: Sequence[float], r: Sequence[float]) -> list[float]:
         """Return D(q) r [N m], a list of n."""
-        return self.online.inertia_times(q, r)
+        mass = self.arm.body.mass_matrix(np.array([q], dtype=float), self.arm.p)[0]
+        product: list[float] = (mass @ r).tolist()
+        return product
 
 
 def controller_model(arm: Arm) -> ControllerModel:
     """Return the model of `arm` for a controller of the bench."""
-    return ControllerModel(model_text(arm.to_model()), OnlineModel(arm))
+    return ControllerModel(model_text(arm.to_model()), arm)
 
 
 def machine() -> Machine:

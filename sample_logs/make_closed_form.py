@@ -14,11 +14,11 @@ from typing import Any
 import numpy as np
 
 from bench.config import CONFIG, SAMPLE_TIME
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io import schema
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
-from pipelines.model.arm import Arm
-from pipelines.model.rigid.body import Motion
 from sample_logs.make_model import synthetic_arm
 
 NOISE = np.array([0.020, 0.010, 0.005])  # [N m] rms, white, of the amplifier

@@ -12,11 +12,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.io import schema
 from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
 from pipelines.io.robot_files import load_robot
-from pipelines.model.rigid.choose import rigid_body
 
 TS = 1e-3  # [s]
 ENCODER = 1e-5  # [rad]

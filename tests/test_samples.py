@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from bench.experiments import WRITING_CASES
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Array, Motion
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog, digest_of
-from pipelines.model.arm import Arm
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_changed import changed_logs
 from sample_logs.make_closed_form import (
     NOISE,

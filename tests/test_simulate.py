@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.named_cause import acting_cause
 from pipelines.errors import InputRejected, RrridError, UsageError
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog, digest_of
 from pipelines.io.model_file import model_text, read_model
-from pipelines.model.named_cause import acting_cause
 from pipelines.simulate import STAGE, Settings
 from pipelines.stage import Outcome, Request, run_stage
 from tests.cli.commands import rrrid

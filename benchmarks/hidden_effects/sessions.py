@@ -31,9 +31,9 @@ from bench.plan import Solid
 from bench.plant import peak_torque
 from benchmarks.hidden_effects.cases import Hidden, SealedCase
 from benchmarks.hidden_effects.robots import ROBOTS
+from pipelines.dynamics.arm import Acting, Arm
 from pipelines.errors import UsageError
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
 from sample_logs.bench_session import ControllerModel, controller_model, recorded

@@ -18,12 +18,12 @@ import numpy as np
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.unnamed import Key, Make, Unnamed
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
 from pipelines.fit.joint_table import Array, Indices, Table
-from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, everywhere
 from pipelines.model.effects.torque_lag import TorqueLag
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.families import Family, Laid, families, lay_family, whole_motion
 
 __all__ = ["Dictionary", "Group", "Kind", "laid"]

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
 from pipelines.fit.joint_table import Array, Indices, Table, by_joint, in_rows
 from pipelines.io.log import ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data, Kept, Whitening
 from pipelines.model.rows.exact import Exact, further_slopes, nominal_slopes

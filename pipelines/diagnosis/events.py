@@ -13,9 +13,9 @@ import numpy as np
 from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
+from pipelines.dynamics.arm import Arm
 from pipelines.fit.bootstrap import chi2_bound, upper_point
 from pipelines.fit.joint_table import Array, Indices, by_joint
-from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import Event
 

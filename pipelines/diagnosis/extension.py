@@ -24,7 +24,7 @@ from pipelines.diagnosis.selection import Candidate, refit
 from pipelines.diagnosis.standing import standing_of
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import covariance, train
-from pipelines.model.arm import Acting
+from pipelines.dynamics.arm import Acting
 from pipelines.model.rows.families import Wanted, usable
 from pipelines.model.rows.fit import worse_log
 from pipelines.model.rows.prepare import Prepared

@@ -23,11 +23,11 @@ from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
 from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
+from pipelines.dynamics.config import ORDERS
 from pipelines.fit.bootstrap import chi2_bound
 from pipelines.fit.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.rigid.orders import NEARLY
 from pipelines.model.rows.data import END
 from pipelines.model.rows.exact import Exact, Named
 
@@ -398,7 +398,7 @@ class Later:
     def again(self, key: Key) -> bool:
         """Return whether a cause may act more than once at its place."""
         motion, families = self.rows.data.logs[0].motion, self.dictionary.families
-        return self.waves(key) and families[key].shapes[0].goes_round(motion, NEARLY)
+        return self.waves(key) and families[key].shapes[0].goes_round(motion, ORDERS.nearly)
 
     @cached_property
     def shares(self) -> Array:

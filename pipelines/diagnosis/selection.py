@@ -20,8 +20,8 @@ from pipelines.diagnosis.score import confidence_set, log_scores, probabilities
 from pipelines.diagnosis.screening import Screened, best_of
 from pipelines.diagnosis.state import Fit, State
 from pipelines.diagnosis.unnamed import Key, in_words
+from pipelines.dynamics.arm import Acting
 from pipelines.fit.joint_table import Array
-from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.rows.exact import Exact, Named

@@ -27,9 +27,9 @@ from pipelines.diagnosis.result import Standing as Told
 from pipelines.diagnosis.result import Value
 from pipelines.diagnosis.score import confidence_set, log_scores
 from pipelines.diagnosis.state import State
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
 from pipelines.fit.joint_table import Array, Arrow, Table
-from pipelines.model.arm import Acting, Arm
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact, Named, Which, slopes_of
 from pipelines.model.rows.fit import Refined, acting, with_uncertainty

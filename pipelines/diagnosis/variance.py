@@ -21,8 +21,8 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.events import windows_of
 from pipelines.diagnosis.screening import best_of, screen
+from pipelines.dynamics.arm import Arm
 from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
-from pipelines.model.arm import Arm
 
 __all__ = ["Components", "components", "settle"]
 

@@ -42,8 +42,7 @@ NUMBERS = Functions(
     round,
     min,
     max,
-    lambda condition, one, other: one if condition else other,
-)
+    lambda condition, one, other: one if condition else other)
 ARRAYS = Functions(
     np.sin, np.cos, np.tanh, np.exp, np.sign, np.rint, np.minimum, np.maximum, np.where
 )

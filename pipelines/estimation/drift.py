@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.parameter_names import quantity_of
 from pipelines.estimation.config import DriftConfig
 from pipelines.io.log import Array
-from pipelines.model.parameter_names import quantity_of
 
 __all__ = ["DriftFigure", "RobotDrift", "Session", "drift_of", "from_others", "is_drift"]
 

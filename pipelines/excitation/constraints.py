@@ -16,11 +16,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
+from pipelines.dynamics.kinematics import SerialChain, forward_kinematics
 from pipelines.excitation.config import CONFIG
 from pipelines.io.robot import RobotDescription
-from pipelines.model.rigid.body import Array
-from pipelines.model.rigid.geometry import SerialChain
-from pipelines.model.rigid.kinematics import forward_kinematics
 
 __all__ = ["Limit", "TipMotion", "barrier", "cost_of_limits", "limits_of", "middle_and_half",
            "tip_motion"]

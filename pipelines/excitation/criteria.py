@@ -25,8 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array
 from pipelines.excitation.config import CONFIG
-from pipelines.model.rigid.body import Array
 
 __all__ = ["CRITERIA", "FAR", "Figures", "Goal", "Spectrum", "a_optimal", "condition", "d_optimal",
            "e_optimal", "frobenius", "spectrum"]

@@ -19,9 +19,9 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.excitation.config import CONFIG
-from pipelines.model.rigid.body import Array
 from pipelines.signal import fourier
 
 __all__ = ["Harmonics", "MotionSpace", "Trajectory", "plan_harmonics", "quintics"]

@@ -19,6 +19,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import Interrupted, UsageError
 from pipelines.excitation.config import CONFIG, Round
 from pipelines.excitation.criteria import FAR
@@ -27,7 +28,6 @@ from pipelines.excitation.problem import DesignProblem
 from pipelines.excitation.regressor import grams_of
 from pipelines.excitation.task import Task
 from pipelines.excitation.verify import Peak, worst
-from pipelines.model.rigid.body import Array
 from pipelines.signal.fourier import good_size
 
 __all__ = ["Design", "Effort", "design", "final_problem", "finished", "landscape"]

@@ -20,13 +20,13 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.constraints import tip_motion
 from pipelines.excitation.fourier import quintics
 from pipelines.excitation.task import Task
 from pipelines.excitation.verify import Peak, torque_of, worst
-from pipelines.model.rigid.body import Array
 
 __all__ = ["Plan", "frf_plans", "friction_plans", "hold_plans", "odd_lines", "realisation"]
 

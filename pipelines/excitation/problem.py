@@ -15,6 +15,8 @@ from functools import cached_property
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
+from pipelines.dynamics.kinematics import SerialChain
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.constraints import (
     Limit,
@@ -27,8 +29,6 @@ from pipelines.excitation.constraints import (
 from pipelines.excitation.criteria import Goal
 from pipelines.excitation.fourier import MotionSpace
 from pipelines.excitation.regressor import ArmColumns, grams_of_rows
-from pipelines.model.rigid.body import Array
-from pipelines.model.rigid.geometry import SerialChain
 
 __all__ = ["ArmProblem", "DesignProblem"]
 

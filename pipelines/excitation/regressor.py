@@ -22,12 +22,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import Array, RigidBody
+from pipelines.dynamics.kinematics import Placement, Turn, cross, turns
+from pipelines.dynamics.rrr import ACTING, RRR
 from pipelines.excitation.config import CONFIG
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.body import Array, RigidBody
-from pipelines.model.rigid.geometry import Placement
-from pipelines.model.rigid.kinematics import Turn, cross, turns
-from pipelines.model.rigid.rrr import ACTING, RRR
 
 __all__ = ["ArmColumns", "ChainRows", "RRRRows", "arm_columns", "grams_of"]
 

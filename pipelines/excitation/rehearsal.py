@@ -16,14 +16,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Array
 from pipelines.errors import Interrupted, RrridError
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.optimise import Design
 from pipelines.excitation.other_plans import Plan
 from pipelines.excitation.task import Task
 from pipelines.io.log import Controller
-from pipelines.model.arm import Arm
-from pipelines.model.rigid.body import Array
 from pipelines.simulation import Experiment, Noise, simulate
 
 __all__ = ["Beyond", "Rehearsal", "rehearse", "rehearsed_design", "rehearsed_plans"]

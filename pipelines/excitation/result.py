@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics import rrr
+from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import Check, UsageError
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.discrimination import Apart, Found
@@ -23,8 +25,6 @@ from pipelines.importers.units import ControllerTable
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.results import NOT_STORED
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.rigid import rrr
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.writing.task import planned_log
 
 __all__ = ["Compared", "Course", "DrawnPlan", "ParameterStd", "Result", "beyond_words",

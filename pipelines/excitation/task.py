@@ -10,6 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics import rrr
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Array
+from pipelines.dynamics.kinematics import serial_chain
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import UsageError
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.constraints import limits_of
@@ -19,11 +24,6 @@ from pipelines.excitation.problem import ArmProblem
 from pipelines.excitation.regressor import ArmColumns, arm_columns
 from pipelines.excitation.verify import Peak, peaks
 from pipelines.io.robot import RobotDescription
-from pipelines.model.arm import Arm
-from pipelines.model.rigid import rrr
-from pipelines.model.rigid.body import Array
-from pipelines.model.rigid.choose import rigid_body
-from pipelines.model.rigid.geometry import serial_chain
 
 __all__ = ["LOWER_BOUND", "Task", "Wishes", "plan_task"]
 

@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.kinematics import SerialChain
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.constraints import Limit, tip_motion
-from pipelines.model.arm import Arm
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.geometry import SerialChain
 from pipelines.signal import fourier
 
 __all__ = ["Peak", "peaks", "torque_of", "worst"]

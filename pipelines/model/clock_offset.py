@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.dynamics.body import Array, RigidBody
 from pipelines.model.row_fit import Row, Sampled, factorised, row_columns
 
 __all__ = ["Offset", "away_from_reversals", "clock_offset"]

@@ -15,9 +15,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import Check, InputRejected
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rigid.body import Array
 from pipelines.quality.subject import Subject
 from pipelines.simulation import Experiment
 from pipelines.simulation.controller import Controlling

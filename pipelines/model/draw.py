@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipelines.model.arm import Acting, Arm
-from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.body import Array
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Array
+from pipelines.dynamics.parameter import Parameter
 
 __all__ = ["drawn"]
 

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.dynamics.body import Array, RigidBody
 from pipelines.model.row_fit import Row, Sampled, relative_residual, row_fits
 from pipelines.quality.subject import Subject
 

@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Motion
 from pipelines.errors import Check, InputRejected, Level
 from pipelines.io.limits import shorter_than_period
 from pipelines.io.log import Array, ExperimentLog, Signal, recording
@@ -35,7 +36,6 @@ from pipelines.model.motion import (
     encoder_resolution,
     reconstruct,
 )
-from pipelines.model.rigid.body import Motion
 from pipelines.quality.segments import Mask, Usable, quantum, usable
 from pipelines.signal.filters import passed_both_ways
 from pipelines.signal.grid import Grid, grids, lay_on

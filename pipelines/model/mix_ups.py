@@ -7,9 +7,9 @@ from itertools import combinations, permutations
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import Check
 from pipelines.model.evidence import Evidence
-from pipelines.model.rigid.body import Array
 from pipelines.model.row_fit import Sampled, quick_residual, shared_residual
 from pipelines.model.torque_scale import torque_scale
 

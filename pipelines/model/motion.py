@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, ExperimentLog, derived_by
 from pipelines.model.even import Evened, evened
 from pipelines.model.measured import Measured, measured
-from pipelines.model.rigid.body import Motion
 from pipelines.model.trackers import difference_tracker, filter_tracker
 from pipelines.model.tuned import (
     METHODS,

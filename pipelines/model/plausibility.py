@@ -16,6 +16,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check
 from pipelines.model.clock_offset import away_from_reversals, clock_offset
 from pipelines.model.commanded import against_command
@@ -28,8 +30,6 @@ from pipelines.model.mix_ups import (
     position_columns,
     torque_columns,
 )
-from pipelines.model.rigid.body import Array
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
 from pipelines.quality.subject import NotTested, Subject, spread

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.rigid.body import Array, RigidBody
+from pipelines.dynamics.body import Array, RigidBody
 from pipelines.quality.segments import Usable
 from pipelines.signal.derivatives import apply_kernel, half_width, kernel, local_polynomial
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, RigidBody
 from pipelines.model.evidence import Evidence
-from pipelines.model.rigid.body import Array, RigidBody
 from pipelines.model.row_fit import Sampled
 
 __all__ = ["TorqueScale", "torque_scale"]

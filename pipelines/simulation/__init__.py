@@ -9,10 +9,10 @@ windows = simulate_windows(Plant.of(arm), motion, tau, …)   where no controlle
 
 from __future__ import annotations
 
+from pipelines.simulation.closed_loop import Noise, Simulated, run, run_together
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import Windows, simulate_windows
-from pipelines.simulation.closed_loop import Noise, Simulated, run, run_together
 from pipelines.simulation.step import Step, choose_step, simulate
 
 __all__ = [

@@ -20,10 +20,10 @@ from math import cos, sin
 
 import numpy as np
 
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import RigidBody
+from pipelines.dynamics.rrr import RRR
 from pipelines.io.log import Array
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.body import RigidBody
-from pipelines.model.rigid.rrr import RRR
 
 __all__ = ["ManyChains", "ManyRRR", "OneRRR", "acceleration_of", "many_bodies"]
 

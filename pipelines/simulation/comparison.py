@@ -15,17 +15,17 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.motion import Reconstructed
-from pipelines.model.rigid.body import Motion
+from pipelines.simulation.closed_loop import run_together
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import Windows, held_torque, simulate_windows
-from pipelines.simulation.closed_loop import run_together
 from pipelines.simulation.step import choose_step
 
 __all__ = ["Positions", "SimulatedSpan", "Simulation", "Strayed", "in_loop", "in_loops", "nearer",

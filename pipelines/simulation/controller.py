@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.body import Motion
 from pipelines.dynamics.functions import ARRAYS, NUMBERS, Functions
 from pipelines.io.log import Array, Controller
-from pipelines.model.rigid.body import Motion
 from pipelines.simulation.experiment import Experiment
 
 __all__ = ["Controlling", "Feedback", "ahead_of"]

@@ -15,12 +15,12 @@ from typing import Final
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.named_cause import acting_cause
 from pipelines.io import schema
 from pipelines.io.log import Array, Controller, ExperimentLog, Signal
 from pipelines.io.model_file import read_model
 from pipelines.io.robot import format_robot
-from pipelines.model.arm import Arm
-from pipelines.model.named_cause import acting_cause
 from pipelines.signal.fourier import FourierSeries
 from pipelines.simulation.config import EXAMPLE
 from pipelines.simulation.imitate import How, imitate

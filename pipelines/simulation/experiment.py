@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller, ExperimentLog
 from pipelines.io.model_file import parse_model
-from pipelines.model.arm import Arm
 from pipelines.simulation.config import SIMULATION
 
 __all__ = ["Experiment"]

@@ -13,18 +13,18 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io import schema
 from pipelines.io.log import Array, Derived, ExperimentLog, Signal, created, digest_of, recording
 from pipelines.io.results import NOT_STORED
-from pipelines.model.arm import Arm
 from pipelines.model.motion import Reconstruction, reconstruct
+from pipelines.simulation.closed_loop import Noise, Simulated, run
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.course import Course, course
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
 from pipelines.simulation.replay import held_torque, simulate_windows
-from pipelines.simulation.closed_loop import Noise, Simulated, run
 from pipelines.simulation.step import choose_step
 
 __all__ = ["How", "Imitation", "imitate"]

@@ -15,10 +15,10 @@ from math import nan, tanh
 import numpy as np
 
 from pipelines.dynamics.functions import NUMBERS
+from pipelines.dynamics.rrr import RRR
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
 from pipelines.model.effects.base import Hooks, SpeedCurve
-from pipelines.model.rigid.rrr import RRR
 from pipelines.simulation.bodies import acceleration_of
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.controller import Feedback, ahead_of

@@ -17,13 +17,13 @@ from typing import cast
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion, RigidBody
 from pipelines.dynamics.functions import ARRAYS
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
-from pipelines.model.arm import Arm
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, SpeedCurve, Values
 from pipelines.model.effects.fast import own_load, own_memory, speed_curve
-from pipelines.model.rigid.body import Motion, RigidBody
 from pipelines.simulation.bodies import ManyChains, many_bodies
 from pipelines.simulation.config import SIMULATION
 

@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import InputRejected
 from pipelines.io.log import ExperimentLog
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.integrate import RungeKutta
 from pipelines.simulation.plant import Plant

@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
-from pipelines.model.arm import Arm
+from pipelines.simulation.closed_loop import Noise, Simulated, run, run_together
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.integrate import HeldBody
 from pipelines.simulation.plant import Plant
-from pipelines.simulation.closed_loop import Noise, Simulated, run, run_together
 
 __all__ = ["Step", "choose_step", "simulate"]
 

@@ -16,18 +16,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
+from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.draw import drawn
 from pipelines.model.effects.base import Hooks
 from pipelines.model.motion import Reconstructed
-from pipelines.model.rigid.body import Motion
-from pipelines.model.rigid.geometry import serial_chain
-from pipelines.model.rigid.kinematics import tip_position
+from pipelines.simulation.closed_loop import run
 from pipelines.simulation.experiment import Experiment
 from pipelines.simulation.plant import Plant
-from pipelines.simulation.closed_loop import run
 from pipelines.simulation.step import choose_step
 from pipelines.writing.config import CONFIG
 

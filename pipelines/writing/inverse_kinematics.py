@@ -12,12 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from pipelines.model.rigid import kinematics
-from pipelines.model.rigid.body import Array
-from pipelines.model.rigid.geometry import SerialChain
-from pipelines.model.rigid.kinematics import jacobian, tip_position
-from pipelines.model.rigid.rrr_kinematics import BRANCHES, Geometry, Reach, inverse
-from pipelines.model.rigid.rrr_rates import joint_rates
+from pipelines.dynamics import kinematics
+from pipelines.dynamics.body import Array
+from pipelines.dynamics.kinematics import SerialChain, jacobian, tip_position
+from pipelines.dynamics.rrr_kinematics import BRANCHES, Geometry, Reach, inverse, joint_rates
 from pipelines.writing.config import CONFIG
 
 __all__ = ["ClosedForm", "Elbow", "Numerical", "Obstacle"]

@@ -17,8 +17,8 @@ from typing import Literal
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
-from pipelines.model.rigid.body import Array
 from pipelines.writing.letters import CHARACTERS, glyph
 
 __all__ = ["Arc", "Joint", "Line", "Page", "Piece", "TipPath", "lay_out"]

@@ -16,16 +16,15 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics import rrr
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.kinematics import serial_chain, tip_position
+from pipelines.dynamics.rrr_kinematics import rrr_geometry
 from pipelines.errors import UsageError
 from pipelines.io import schema
 from pipelines.io.log import ExperimentLog, Signal
 from pipelines.io.robot import RobotDescription, format_robot
-from pipelines.model.arm import Arm
-from pipelines.model.rigid import rrr
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.geometry import serial_chain
-from pipelines.model.rigid.kinematics import tip_position
-from pipelines.model.rigid.rrr_kinematics import rrr_geometry
 from pipelines.writing.config import CONFIG
 from pipelines.writing.inverse_kinematics import ClosedForm, Elbow, Numerical, Obstacle
 from pipelines.writing.path import Page, TipPath, lay_out

@@ -21,8 +21,8 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
-from pipelines.model.rigid.body import Array
 from pipelines.writing.path import TipPath
 
 __all__ = ["Pace", "TimeLaw", "largest", "time_law"]

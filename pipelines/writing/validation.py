@@ -17,17 +17,16 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Arm, ArmTorque
+from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.errors import Check, RrridError
 from pipelines.importers.units import ControllerTable
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.io.output import slug
 from pipelines.io.results import NOT_STORED
 from pipelines.io.schema import joint_unit
-from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import condition
 from pipelines.model.motion import Reconstructed
-from pipelines.model.rigid.geometry import serial_chain
-from pipelines.model.rigid.kinematics import tip_position
 from pipelines.signal.filters import zero_phase
 from pipelines.simulation.imitate import How, Imitation, imitate
 from pipelines.writing.config import CONFIG

@@ -20,10 +20,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
-from pipelines.model.arm import Arm
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.writing.config import CONFIG
 from pipelines.writing.task import refuse_sample_time
 from pipelines.writing.timing import MOST_BENT, STEEPEST, largest

@@ -11,6 +11,7 @@ import numpy as np
 from bench.dynamics import RigidDynamics
 from bench.machine import Machine
 from bench.plan import Solid
+from pipelines.io.log import Array
 
 __all__ = ["LinkModel"]
 
@@ -38,3 +39,8 @@ class LinkModel:
         """Friction, inertia, Coriolis and gravity of one sample [N m]."""
         friction = [law(v) for law, v in zip(self._friction, dq, strict=True)]
         return friction, *self._rigid.parts(q, dq, ddq)
+
+    def along(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """The same of a whole motion (4, samples, n)."""
+        rows = zip(q.tolist(), dq.tolist(), ddq.tolist(), strict=True)
+        return np.array([self.parts(*row) for row in rows]).transpose(1, 0, 2)

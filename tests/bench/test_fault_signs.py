@@ -29,7 +29,7 @@ from bench.plan import Solid
 from bench.plant import Recording, run
 from tests.bench.machines import sway
 from tests.bench.test_rigid import standard_parameters
-from tests.model.rigid.serial_arms import Arm, by_hand
+from tests.dynamics.serial_arms import Arm, by_hand
 from tests.seeds import usually
 
 SHARPNESS = 100.0  # [s/rad]

@@ -19,7 +19,7 @@ from bench.motions import at_rest
 from bench.plant import run
 from tests.bench.machines import CENTRE, Spy, frictionless, sway, turntable, unrounded
 from tests.bench.test_rigid import standard_parameters
-from tests.model.rigid.serial_arms import Arm, by_hand
+from tests.dynamics.serial_arms import Arm, by_hand
 
 
 def pinocchio_arm(machine: Machine) -> Arm:

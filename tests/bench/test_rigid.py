@@ -17,7 +17,7 @@ from bench.machine import Machine
 from bench.motions import at_rest
 from bench.plant import run
 from tests.bench.machines import frictionless
-from tests.model.rigid.serial_arms import ARMS, Arm, by_hand
+from tests.dynamics.serial_arms import ARMS, Arm, by_hand
 from tests.seeds import seeds
 
 INNER = 2.5e-4  # [s]

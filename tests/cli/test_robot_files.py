@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import UsageError
 from pipelines.excitation.optimise import Effort, design
 from pipelines.excitation.task import Wishes, plan_task
 from pipelines.io.robot_files import load_robot
-from pipelines.model.arm import Arm
 from tests.cli.commands import rrrid
 
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.base_parameters import BaseArm
 from pipelines.errors import UsageError
 from pipelines.inspect import STAGE as DOCTOR
 from pipelines.io.files import open_log
 from pipelines.io.robot_files import load_robot
-from pipelines.model.arm import Arm
-from pipelines.model.rigid.base import BaseArm
 from pipelines.stage import Request, run_stage
 from tests.design_excitation.short import QUICK, designed
 from tests.seeds import rarely

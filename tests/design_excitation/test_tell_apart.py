@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from pipelines import design_excitation
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import UsageError
 from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.report.excitation_report import excitation_report
 from pipelines.stage import Outcome, Request, run_stage
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.result import Diagnosis
+from pipelines.dynamics.arm import Arm
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but, session

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.rigid.body import Motion
 from sample_logs.make_closed_form import NOISE, quantised, torque_step
 from tests.model.estimation.experiments import arm, experiment, motion_of
 

@@ -11,8 +11,8 @@ from pipelines.diagnosis.engine import Diagnosis, diagnose, diagnose_prepared
 from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.result import Diagnosis as Answer
 from pipelines.diagnosis.result import Extended
+from pipelines.dynamics.arm import Acting, Arm
 from pipelines.io.log import ExperimentLog
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, Logs, Prepared, prepare

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.dataset import load
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.estimation.logs import Recipe
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import but
 from tests.diagnosis.arms import hidden

@@ -14,8 +14,8 @@ from bench.machine import Fault, Machine
 from bench.plant import record
 from pipelines.diagnosis.limits import without_limit
 from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
+from pipelines.dynamics.arm import Acting
 from pipelines.io.log import ExperimentLog
-from pipelines.model.arm import Acting
 from pipelines.model.effects import effect_names
 from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from pipelines.model.rows.prepare import Logs

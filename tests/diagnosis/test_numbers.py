@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.diagnosis.trained import parameters, told
+from pipelines.dynamics.arm import Acting
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array
-from pipelines.model.arm import Acting
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.gravity_tilt import GravityTilt
@@ -17,7 +18,6 @@ from pipelines.model.effects.payload import Payload
 from pipelines.model.effects.torque_offset import TorqueOffset
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
 from pipelines.model.estimation.logs import Recipe
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact, Named
 from pipelines.model.rows.fit import Refined, _by_slopes, acting, refine
 from pipelines.model.rows.nominal import fit_nominal

@@ -8,15 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import UsageError
 from pipelines.estimate_bps import Result, Settings, compute, report
 from pipelines.io.files import Opened
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import format_robot
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Inputs
-from tests.model.rigid.serial_arms import GANTRY, SEVEN, Arm, by_hand, physical_links, pin, table
+from tests.dynamics.serial_arms import GANTRY, SEVEN, Arm, by_hand, physical_links, pin, table
 from tests.seeds import rarely
 
 ENCODER, NOISE = 1e-5, 0.01  # [rad], [N m]

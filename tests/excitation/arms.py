@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 from pipelines.io.robot_files import load_robot
-from pipelines.model.arm import Arm
 
 __all__ = ["described", "rrr", "six_axes", "sliding"]
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.body import RigidBody
-from pipelines.model.rigid.geometry import SerialChain, serial_chain
-from pipelines.model.rigid.rrr import RRR
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import RigidBody
+from pipelines.dynamics.kinematics import SerialChain, serial_chain
+from pipelines.dynamics.rrr import RRR
 
 __all__ = ["complex_regressor", "complex_tip"]
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Arm
 from pipelines.excitation.discrimination import Found
 from pipelines.excitation.optimise import Effort, design, landscape
 from pipelines.excitation.regressor import grams_of
 from pipelines.excitation.result import judged
 from pipelines.excitation.task import Wishes, plan_task
 from pipelines.io.urdf import import_urdf
-from pipelines.model.arm import Arm
 from tests.excitation.arms import described, rrr
 
 pytestmark = pytest.mark.slow

@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.rrr_kinematics import rrr_geometry, tip
 from pipelines.errors import Interrupted, UsageError
 from pipelines.excitation.discrimination import Found
 from pipelines.excitation.optimise import Design, Effort, design, landscape
@@ -14,8 +16,6 @@ from pipelines.excitation.regressor import grams_of
 from pipelines.excitation.result import judged as judged_found
 from pipelines.excitation.task import Task, Wishes, plan_task
 from pipelines.io.robot import RobotDescription
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.rrr_kinematics import rrr_geometry, tip
 from tests.excitation.arms import described, rrr, six_axes
 
 GRID = 1e-4  # [s]

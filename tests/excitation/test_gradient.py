@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.fourier import MotionSpace
 from pipelines.excitation.problem import DesignProblem
 from pipelines.excitation.regressor import arm_columns
 from pipelines.excitation.task import Task, Wishes, plan_task
 from pipelines.io.robot import RobotDescription
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.choose import rigid_body
 from tests.excitation.arms import described, rrr, six_axes, sliding
 from tests.excitation.complex_arm import complex_regressor, complex_tip
 

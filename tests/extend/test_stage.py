@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from pipelines import extend
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.named_cause import wanted_cause
 from pipelines.errors import UsageError
 from pipelines.io.files import open_log
 from pipelines.io.model_file import read_model
-from pipelines.model.arm import Arm
-from pipelines.model.named_cause import wanted_cause
 from pipelines.simulation import Experiment, simulate
 from pipelines.stage import Outcome, Request, run_stage
 from tests.diagnose.sessions import healthy_again, session, written

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from pipelines import fit_friction
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.fit_friction import Settings
 from pipelines.io.files import Opened, open_log, write_log
 from pipelines.io.log import Controller, ExperimentLog, Signal
 from pipelines.io.model_file import read_model
 from pipelines.io.robot import format_robot
-from pipelines.model.arm import Arm
 from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from tests.cli.commands import rrrid

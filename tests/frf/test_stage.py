@@ -12,14 +12,14 @@ import pytest
 from matplotlib.figure import Figure as Drawing
 
 from pipelines import frf
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.parameter import Parameter
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import InputRejected, NothingMatched, UsageError
 from pipelines.frf import Settings
 from pipelines.io.files import Opened, open_log, write_log
 from pipelines.io.log import ExperimentLog, Signal
-from pipelines.model.arm import Arm
 from pipelines.model.frf.result import Posture
-from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.report.frf_figures import draw_bode
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from sample_logs.bench_session import controllers_model, machine

@@ -115,5 +115,5 @@ def test_defaults_may_be_left_out() -> None:
 
 def test_pydantic_is_not_imported_until_a_model_is_read() -> None:
     """Help and logs do not pay for it."""
-    script = "import sys, pipelines.io.model_file, pipelines.model.arm; sys.exit('pydantic' in sys.modules)"
+    script = "import sys, pipelines.io.model_file, pipelines.dynamics.arm; sys.exit('pydantic' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", script], check=False).returncode == 0

@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipelines.dynamics import chain as serial
+from pipelines.dynamics.kinematics import serial_chain
 from pipelines.errors import UsageError
 from pipelines.io.robot import LinkParameters, RobotDescription, format_robot, parse_robot
 from pipelines.io.robot_files import load_robot
-from pipelines.model.rigid import chain as serial
-from pipelines.model.rigid.geometry import serial_chain
 from tests.io.robot_structures import STRUCTURES, urdf_of
 
 BAR = 1e-11  # of the largest torque

@@ -75,7 +75,7 @@ def _assert_links_equal(robot: RobotDescription, model: object) -> None:
 
 def test_links_fixed_to_a_moving_one_are_merged_into_it(tmp_path: Path) -> None:
     """A motor bolted on askew, with its own inertial axes, moves as part of its link: Pinocchio's merged inertia."""
-    from tests.model.rigid.serial_arms import SKEW_URDF, skew
+    from tests.dynamics.serial_arms import SKEW_URDF, skew
 
     arm = skew(tmp_path)
     _assert_links_equal(arm.robot, arm.model)

@@ -9,6 +9,9 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.parameter import Parameter
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.model_file import (
     ModelFile,
@@ -20,7 +23,6 @@ from pipelines.io.model_file import (
 )
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 from pipelines.io.robot_files import load_robot
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
@@ -32,10 +34,8 @@ from pipelines.model.effects.base import (
 )
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.viscous import Viscous
-from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
-from tests.model.rigid.rrr_arms import column, random_states
+from tests.dynamics.rrr_arms import column, random_states
 
 
 @pytest.fixture(scope="module")

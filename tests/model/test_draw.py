@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.dynamics.parameter import Uncertainty
 from pipelines.model.draw import drawn
-from pipelines.model.parameter import Uncertainty
 from sample_logs.make_model import synthetic_arm
 
 
@@ -27,7 +27,7 @@ def test_draws_have_the_covariance_of_the_fit() -> None:
 
 def test_a_drawn_law_acts_with_its_numbers() -> None:
     """Torque follows the drawn viscous friction: Δb times the speed."""
-    from pipelines.model.rigid.body import Motion
+    from pipelines.dynamics.body import Motion
 
     arm = synthetic_arm()
     uncertain = replace(arm, uncertainty=Uncertainty((f"{arm.friction[1].place}:b",), np.array([[0.01]])))

@@ -6,8 +6,8 @@ import re
 
 import pytest
 
+from pipelines.dynamics.named_cause import acting_cause, wanted_cause
 from pipelines.errors import UsageError
-from pipelines.model.named_cause import acting_cause, wanted_cause
 
 REVOLUTE = (True, True, False)
 

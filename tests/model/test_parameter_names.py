@@ -6,8 +6,8 @@ import math
 
 import pytest
 
+from pipelines.dynamics.parameter_names import quantity_of
 from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.parameter_names import quantity_of
 
 
 @pytest.mark.parametrize("effect", effect_names())

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from pipelines import estimate_bps
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.io.files import Opened, open_log
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.robot import LinkParameters, format_robot
@@ -18,7 +19,6 @@ from pipelines.model.clock_offset import Offset, clock_offset
 from pipelines.model.evidence import Evidence
 from pipelines.model.excited import excitation
 from pipelines.model.plausibility import plausibility, plausibility_findings
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import quick_residual, relative_residual, row_fits, sample_motion
 from pipelines.quality.checks import NotTested, Subject
 from pipelines.stage import Inputs

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
 from pipelines.model.evidence import Evidence
 from pipelines.model.plausibility import _against_the_others as against_the_others
 from pipelines.model.plausibility import plausibility
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
 from pipelines.quality.checks import Subject

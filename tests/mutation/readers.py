@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 
 from pipelines import import_log, inspect, reconstruct, simulate
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.named_cause import acting_cause
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.io.files import open_log, write_log
 from pipelines.io.model_file import model_text, read_model
 from pipelines.io.robot_files import load_robot
-from pipelines.model.arm import Arm
 from pipelines.model.effects.base import Motion
-from pipelines.model.named_cause import acting_cause
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.stage import Request, Stage
 from rrrid_cli.options import make_settings
 from tests.healthy import fourier, make_log

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.parameter import Parameter
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.io.log import Array, Controller
-from pipelines.model.arm import Arm
-from pipelines.model.parameter import Parameter
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.simulation import Experiment
 from sample_logs.make_model import FRICTION, synthetic_arm
-from tests.model.rigid import serial_arms
+from tests.dynamics import serial_arms
 from tests.simulation.pinocchio_loop import Friction, three_sigmoids
 
 TS = 1e-3  # [s]
@@ -63,7 +63,7 @@ def serial(name: str, shared: Path, folder: Path, seed: int = 3) -> Case:
 
 
 def _known(arm: Arm) -> Array:
-    from pipelines.model.rigid.chain import standard_parameters
+    from pipelines.dynamics.chain import standard_parameters
 
     return standard_parameters([joint.link for joint in arm.robot.joints if joint.link is not None])
 

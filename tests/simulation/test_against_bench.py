@@ -17,8 +17,8 @@ from bench.experiments import Experiment as Planned
 from bench.machine import Machine
 from bench.motions import Reference
 from bench.plant import record
+from pipelines.dynamics.arm import Arm
 from pipelines.io.log import Array
-from pipelines.model.arm import Arm
 from pipelines.simulation import Experiment, Noise, simulate
 from sample_logs.bench_session import arm_of, controllers_model
 from sample_logs.make_healthy import text

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, Controller
-from pipelines.model.arm import Arm
-from pipelines.model.rigid.body import Motion
 from pipelines.simulation import Noise, Plant, run
 from pipelines.simulation.closed_loop import _draws, run_together
 from tests.simulation.arms import GAIN, KD, KP, TS, experiment, rrr, rrr_friction, waving

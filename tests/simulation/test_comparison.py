@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Acting, Arm
 from pipelines.errors import InputRejected
 from pipelines.io.log import ExperimentLog
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact

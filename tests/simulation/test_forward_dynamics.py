@@ -8,13 +8,13 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from pipelines.model.arm import Acting, Arm
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Array
 from pipelines.model.effects.rotor_inertia import RotorInertia
-from pipelines.model.rigid.body import Array
 from pipelines.simulation.integrate import RungeKutta
 from pipelines.simulation.one_arm import OneArm
 from pipelines.simulation.plant import Plant
-from tests.model.rigid.serial_arms import ARMS
+from tests.dynamics.serial_arms import ARMS
 from tests.seeds import rarely
 from tests.simulation.arms import TS, Case, rrr, rrr_friction, serial
 from tests.simulation.pinocchio_loop import Loop

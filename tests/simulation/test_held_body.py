@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.io.log import Controller
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.simulation import Experiment, Noise, choose_step
+from pipelines.simulation.closed_loop import run_together
 from pipelines.simulation.imitate import How, imitate
 from pipelines.simulation.integrate import HeldBody
 from pipelines.simulation.plant import Plant
-from pipelines.simulation.closed_loop import run_together
 from pipelines.writing.task import planned_log
 from tests.seeds import rarely
 from tests.simulation.arms import TS, Case, rrr, serial

@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from pipelines.dynamics.arm import Acting
+from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
-from pipelines.model.arm import Acting
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
 from pipelines.model.effects.quadratic_drag import QuadraticDrag
-from pipelines.model.rigid.body import Motion
 from pipelines.simulation import Plant, run
 from tests.seeds import rarely
 from tests.simulation.arms import KD, KP, TS, Case, experiment, rrr, rrr_friction, waving

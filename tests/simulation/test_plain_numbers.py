@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Acting
+from pipelines.dynamics.body import Array
 from pipelines.dynamics.functions import ARRAYS, NUMBERS
 from pipelines.errors import InputRejected
 from pipelines.io.log import Controller
-from pipelines.model.arm import Acting
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.load_friction import LoadFriction
@@ -21,7 +22,6 @@ from pipelines.model.effects.stribeck import Stribeck
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_gain import TorqueGain
 from pipelines.model.effects.torque_saturation import TorqueSaturation
-from pipelines.model.rigid.body import Array
 from pipelines.simulation import Noise, Plant, run
 from pipelines.simulation.integrate import RungeKutta
 from pipelines.simulation.one_arm import OneArm, runs_alone

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Acting, Arm
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.simulation import Noise, Plant, choose_step, run, simulate
 from tests.seeds import rarely

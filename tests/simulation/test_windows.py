@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
-from pipelines.model.rigid.body import Motion
 from pipelines.simulation import Plant, Windows, simulate_windows
 from tests.simulation.arms import KD, KP, TS, rrr, rrr_friction, waving
 from tests.simulation.pinocchio_loop import Loop

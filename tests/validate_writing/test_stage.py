@@ -13,25 +13,24 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure as Drawing
 
 from pipelines import validate_writing
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.kinematics import serial_chain, tip_position
+from pipelines.dynamics.parameter import Uncertainty
 from pipelines.errors import InputRejected, NothingMatched, RrridError, UsageError
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog, digest_of, recording
 from pipelines.io.model_file import Source, model_text, read_model, write_model
 from pipelines.io.robot import format_robot
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.parameter import Uncertainty
-from pipelines.model.rigid.geometry import serial_chain
-from pipelines.model.rigid.kinematics import tip_position
 from pipelines.report.writing_figures import error_map_figure
 from pipelines.stage import Outcome, Request, run_stage
 from pipelines.validate_writing import STAGE, Result, Settings
 from pipelines.writing.validation import torque_validation
 from sample_logs.make_model import synthetic_arm
 from tests.cli.commands import rrrid
+from tests.dynamics.serial_arms import ARMS
 from tests.healthy import rows, with_signal
-from tests.model.rigid.serial_arms import ARMS
 
 SAMPLES = 1600  # of a writing log: most of its first letter
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from pipelines.model.rigid.body import Array
-from tests.model.rigid.serial_arms import Arm
+from pipelines.dynamics.body import Array
+from tests.dynamics.serial_arms import Arm
 
 # eighth-order central difference: weights of the points h apart, themselves left out
 OFFSETS = np.array([-4, -3, -2, -1, 1, 2, 3, 4])

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Arm
 from pipelines.io.files import open_log
 from pipelines.io.log import ExperimentLog
 from pipelines.io.model_file import read_model
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstruction, reconstruct
 from pipelines.writing.control_cases import (
@@ -25,8 +25,8 @@ from pipelines.writing.control_cases import (
     why_not,
 )
 from pipelines.writing.validation import residual
+from tests.dynamics.serial_arms import ARMS
 from tests.healthy import rows, with_signal
-from tests.model.rigid.serial_arms import ARMS
 from tests.writing.judge import TipJudge
 
 SAMPLES = 2200  # of the writing logs: the first letter

@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.kinematics import serial_chain
+from pipelines.dynamics.rrr_kinematics import rrr_geometry
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
-from pipelines.model.rigid.geometry import serial_chain
-from pipelines.model.rigid.rrr_kinematics import rrr_geometry
 from pipelines.writing.inverse_kinematics import ClosedForm, Numerical
 from pipelines.writing.path import Page
 from pipelines.writing.task import WritingTask, writing_task
 from pipelines.writing.timing import Pace
-from tests.model.rigid.serial_arms import ARMS, PUMA, Arm, table
+from tests.dynamics.serial_arms import ARMS, PUMA, Arm, table
 from tests.writing.judge import OFFSETS, WEIGHTS, TipJudge
 
 POSTURES = {"tx40": (0.2, 0.4, 0.4, 0.1, 0.5, 0.0), "seven-joints": (0.3, 0.6, 0.2, -1.2, 0.3, 0.8, 0.0),

@@ -8,8 +8,8 @@ import string
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
-from pipelines.model.rigid.body import Array
 from pipelines.writing.letters import CHARACTERS, glyph
 from pipelines.writing.path import Arc, Page, lay_out
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Motion
 from pipelines.io.files import open_log, write_log
 from pipelines.io.robot_files import load_robot
-from pipelines.model.rigid.body import Motion
 from pipelines.quality.checks import check_log
 from pipelines.writing.task import planned_log, writing_task
 from pipelines.writing.via_points import via_points

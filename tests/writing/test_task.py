@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
-from pipelines.model.rigid.body import Array
 from pipelines.writing.inverse_kinematics import Elbow
 from pipelines.writing.path import Page
 from pipelines.writing.task import WritingReference, WritingTask, demands, writing_task
 from pipelines.writing.timing import Pace
 from sample_logs.make_model import synthetic_arm
-from tests.model.rigid.serial_arms import ARMS
+from tests.dynamics.serial_arms import ARMS
 from tests.writing.judge import OFFSETS, WEIGHTS, TipJudge
 
 TEXT = "RRRID 2004 SG"

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.outcome import torques
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
-from pipelines.model.rigid.body import Motion
 from pipelines.writing.task import writing_task
 from pipelines.writing.validation import TorqueValidation, stretches_of, torque_validation
 from sample_logs.make_model import synthetic_arm

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
-from pipelines.model.arm import Arm
 from pipelines.writing.task import demands
 from pipelines.writing.via_points import ViaPoints, via_points
 from sample_logs.make_model import synthetic_arm

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.chain import standard_parameters
 from pipelines.estimation.checks.channel_order import SIGNALS, ColumnOrder, search_orders
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import LOOSE, GravityFit, GravityModel
@@ -37,7 +38,6 @@ from pipelines.estimation.checks.torque_sign import touches_of_zero
 from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
 from pipelines.io.schema import joint_unit
-from pipelines.model.rigid.chain import standard_parameters
 from pipelines.model.row_fit import Sampled, sample_motion
 from pipelines.quality.segments import Usable
 from pipelines.quality.subject import Subject

@@ -13,6 +13,7 @@ from itertools import combinations, permutations
 
 import numpy as np
 
+from pipelines.dynamics.chain import regressor
 from pipelines.estimation.checks.torque_rows import (
     Array,
     GenericArm,
@@ -21,7 +22,6 @@ from pipelines.estimation.checks.torque_rows import (
     own_columns,
     thinned,
 )
-from pipelines.model.rigid.chain import regressor
 from pipelines.model.row_fit import Sampled
 
 __all__ = ["SIGNALS", "ColumnOrder", "search_orders"]

@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.chain import standard_parameters
 from pipelines.estimation.checks.config import BoundaryConfig
 from pipelines.estimation.checks.gravity_fit import GravityFit, GravityModel
 from pipelines.estimation.checks.spread import jackknife
 from pipelines.estimation.checks.torque_rows import CLUSTERS, Array, GenericArm
 from pipelines.io.robot import LinkParameters
-from pipelines.model.rigid.chain import standard_parameters
 
 __all__ = ["NOT_TOLD", "CompensatedPayload", "payload_by_links", "payload_by_reference"]
 

@@ -21,10 +21,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.base_parameters import base_set
+from pipelines.dynamics.chain import regressor
+from pipelines.dynamics.kinematics import SerialChain, serial_chain
 from pipelines.io.robot import RobotDescription
-from pipelines.model.rigid.base import base_set
-from pipelines.model.rigid.chain import regressor
-from pipelines.model.rigid.geometry import SerialChain, serial_chain
 from pipelines.model.row_fit import Sampled
 
 __all__ = [

@@ -7,6 +7,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import (
     LARGE,
@@ -19,7 +20,6 @@ from pipelines.model.effects.base import (
     Words,
 )
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["AsymmetricFriction"]
 

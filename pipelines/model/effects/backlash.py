@@ -9,6 +9,10 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.drive_apart import DriveApart
+from pipelines.dynamics.gap import Gaps, followed
+from pipelines.dynamics.perturbation import perturbed_by, rate_of, rigid_slopes, shifted
 from pipelines.model.effects.base import (
     ArmModel,
     Hooks,
@@ -19,10 +23,6 @@ from pipelines.model.effects.base import (
     friction_at,
 )
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.drive_apart import DriveApart
-from pipelines.model.rigid.gap import Gaps, followed
-from pipelines.model.rigid.perturbation import perturbed_by, rate_of, rigid_slopes, shifted
 
 __all__ = ["Backlash"]
 

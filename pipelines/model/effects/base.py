@@ -35,6 +35,7 @@ from typing import Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.placed import Placed
 from pipelines.model.effects.terms import (
     LARGE,
@@ -56,7 +57,6 @@ from pipelines.model.effects.terms import (
     summed,
     waves,
 )
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Hooks", "OwnDrive", "OwnLoad", "OwnMemory",
            "Parameters", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "adds", "everywhere",

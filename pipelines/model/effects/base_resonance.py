@@ -9,6 +9,15 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.perturbation import (
+    deflection,
+    oscillation,
+    perturbed_by,
+    rigid_slopes,
+    rigid_torque,
+    shifted,
+)
 from pipelines.model.effects.base import (
     ArmModel,
     Hooks,
@@ -20,15 +29,6 @@ from pipelines.model.effects.base import (
     friction_at,
 )
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import (
-    deflection,
-    oscillation,
-    perturbed_by,
-    rigid_slopes,
-    rigid_torque,
-    shifted,
-)
 
 __all__ = ["BaseResonance"]
 

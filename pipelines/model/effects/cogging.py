@@ -9,6 +9,9 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.config import ORDERS
+from pipelines.dynamics.orders import orders_along
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
@@ -20,8 +23,6 @@ from pipelines.model.effects.base import (
     waves,
 )
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.orders import NEARLY, orders_along
 
 __all__ = ["Cogging"]
 
@@ -93,7 +94,7 @@ class Cogging(Fast):
         model, they would pull a free one off its place.
         """
         travel, turning = float(np.ptp(self.own(motion.q))), arm.robot.revolute[self._index]
-        around = turning and self.goes_round(motion, NEARLY)
+        around = turning and self.goes_round(motion, ORDERS.nearly)
         for order in orders_along(travel, turning):
             whole = around and order.is_integer()
             yield replace(self, order=order, harmonics=1, whole=whole, apart=_APART * 2.0 * math.pi / travel if whole else 0.0,

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
@@ -20,7 +21,6 @@ from pipelines.model.effects.base import (
 )
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ConcaveFriction"]
 

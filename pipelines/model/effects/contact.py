@@ -10,12 +10,11 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.altered import chain_of
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.kinematics import SerialChain, jacobian
 from pipelines.model.effects.base import ArmModel, Hooks, Parameters, Quantity, Values, Words
 from pipelines.model.effects.kinds import Event
-from pipelines.model.rigid.altered import chain_of
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.geometry import SerialChain
-from pipelines.model.rigid.kinematics import jacobian
 
 __all__ = ["Contact"]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Self
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     LARGE,
     SHARPNESSES,
@@ -17,7 +18,6 @@ from pipelines.model.effects.base import (
 )
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw, sign_curve
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Coulomb"]
 

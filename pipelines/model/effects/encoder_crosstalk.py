@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.perturbation import arm_slopes, perturbed_by, shifted
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -14,8 +16,6 @@ from pipelines.model.effects.base import (
     Values,
     Words,
 )
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import arm_slopes, perturbed_by, shifted
 
 __all__ = ["EncoderCrosstalk"]
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.perturbation import arm_slopes, perturbed_by, shifted
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -17,8 +19,6 @@ from pipelines.model.effects.base import (
     Values,
     Words,
 )
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.perturbation import arm_slopes, perturbed_by, shifted
 
 __all__ = ["EncoderEccentricity"]
 

@@ -20,8 +20,8 @@ from typing import ClassVar, Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import ArmModel, Effect, OwnLoad, OwnMemory, SpeedCurve, Values
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Fast", "from_motion", "own_columns", "own_load", "own_memory",
            "several_columns", "shape_slopes", "speed_curve"]

@@ -8,6 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.altered import (
+    carry_over,
+    chain_of,
+    gravity_torque,
+    standard_of,
+    with_gravity,
+)
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -18,14 +26,6 @@ from pipelines.model.effects.base import (
     Values,
     Words,
 )
-from pipelines.model.rigid.altered import (
-    carry_over,
-    chain_of,
-    gravity_torque,
-    standard_of,
-    with_gravity,
-)
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["GravityTilt"]
 

@@ -9,6 +9,16 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.drive_apart import DriveApart
+from pipelines.dynamics.perturbation import (
+    deflection,
+    perturbed_by,
+    rate_of,
+    rigid_slopes,
+    rigid_torque,
+    shifted,
+)
 from pipelines.model.effects.base import (
     ArmModel,
     Hooks,
@@ -20,16 +30,6 @@ from pipelines.model.effects.base import (
     friction_at,
 )
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.drive_apart import DriveApart
-from pipelines.model.rigid.perturbation import (
-    deflection,
-    perturbed_by,
-    rate_of,
-    rigid_slopes,
-    rigid_torque,
-    shifted,
-)
 
 __all__ = ["JointElasticity"]
 

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Self
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Event", "FrictionLaw", "plainer", "sign_curve"]
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.altered import carry_over, masses_beyond, with_longer_link
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -16,8 +18,6 @@ from pipelines.model.effects.base import (
     Values,
     Words,
 )
-from pipelines.model.rigid.altered import carry_over, masses_beyond, with_longer_link
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LinkLength"]
 

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import ARRAYS, Functions
 from pipelines.model.effects.base import (
     SHARPNESSES,
@@ -21,7 +22,6 @@ from pipelines.model.effects.base import (
     predicted,
 )
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["LoadFriction"]
 

@@ -8,6 +8,8 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.altered import tip_parameters
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -18,8 +20,6 @@ from pipelines.model.effects.base import (
     Values,
     Words,
 )
-from pipelines.model.rigid.altered import tip_parameters
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Payload"]
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.terms import ArmModel, Numbered, Values
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Placed"]
 

@@ -9,6 +9,8 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.bristles import ONE, Breaking, Bristles, Slips, sliding_level
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
@@ -20,8 +22,6 @@ from pipelines.model.effects.base import (
     Words,
 )
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.bristles import ONE, Breaking, Bristles, Slips, sliding_level
 
 __all__ = ["Presliding"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import LARGE, ArmModel, Hooks, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["RotorInertia"]
 

@@ -9,10 +9,10 @@ from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import ArmModel, OwnLoad, Parameters, Quantity, Values, Words
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Spring"]
 

@@ -9,6 +9,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import (
     LARGE,
@@ -21,7 +22,6 @@ from pipelines.model.effects.base import (
 )
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Stribeck"]
 

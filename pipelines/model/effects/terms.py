@@ -21,9 +21,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.functions import ARRAYS, Functions
 from pipelines.io.robot import RobotDescription
-from pipelines.model.rigid.body import Array, Motion, RigidBody
 
 __all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Hooks", "Numbered", "OwnDrive", "OwnLoad", "OwnMemory",
            "Parameters", "Predict", "Quantity", "SpeedCurve", "Values", "Words", "friction_at", "predicted", "summed",

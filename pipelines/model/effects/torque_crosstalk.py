@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -15,7 +16,6 @@ from pipelines.model.effects.base import (
     Words,
     predicted,
 )
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueCrosstalk"]
 

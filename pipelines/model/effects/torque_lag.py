@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     SAMPLED,
     ArmModel,
@@ -20,7 +21,6 @@ from pipelines.model.effects.base import (
     Words,
     predicted,
 )
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.first_order import continuous, held_mean, lagging, later, rate_of_change
 
 __all__ = ["TorqueLag"]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
@@ -16,7 +17,6 @@ from pipelines.model.effects.base import (
     Words,
 )
 from pipelines.model.effects.fast import Fast
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueOffset"]
 

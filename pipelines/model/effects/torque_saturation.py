@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import Functions
 from pipelines.model.effects.base import (
     ArmModel,
@@ -20,7 +21,6 @@ from pipelines.model.effects.base import (
     Words,
     predicted,
 )
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["TorqueSaturation"]
 

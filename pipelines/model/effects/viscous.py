@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     LARGE,
     ArmModel,
@@ -15,7 +16,6 @@ from pipelines.model.effects.base import (
 )
 from pipelines.model.effects.fast import Fast
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Viscous"]
 

@@ -8,6 +8,7 @@ from typing import Self
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -18,7 +19,6 @@ from pipelines.model.effects.base import (
     Words,
     predicted,
 )
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["ViscousDrift"]
 

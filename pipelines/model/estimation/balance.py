@@ -22,13 +22,13 @@ from operator import add
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Motion, RigidBody
+from pipelines.dynamics.energy import energy, work
 from pipelines.fit.equations import Array, Block, Indices, split
 from pipelines.fit.least_squares import solve
 from pipelines.fit.statistics import Gram, gather_growing
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.regression import LogEquations
-from pipelines.model.rigid.body import Motion, RigidBody
-from pipelines.model.rigid.energy import energy, work
 
 __all__ = ["ALONE", "CLOSED", "TOGETHER", "Balance", "power_balance"]
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import RigidBody
+from pipelines.dynamics.consistency import rrr_inequalities
+from pipelines.dynamics.rrr import RRR, combined
 from pipelines.fit.consistency import physical_consistency
 from pipelines.model.estimation.estimate import Estimate
-from pipelines.model.rigid.base import BaseArm
-from pipelines.model.rigid.body import RigidBody
-from pipelines.model.rigid.rrr import RRR
-from pipelines.model.rigid.rrr_consistency import rrr_combine, rrr_inequalities
 
 __all__ = ["Consistent", "Inequal", "consistency"]
 
@@ -47,7 +47,7 @@ def consistency(found: Estimate, body: RigidBody) -> Consistent | None:
     beta, covariance = np.zeros(count), np.zeros((count, count))
     beta[kept] = found.beta[:len(kept)]
     covariance[np.ix_(kept, kept)] = found.robust.covariance[:len(kept), :len(kept)]
-    combine = rrr_combine(body) if isinstance(body, RRR) else body.base.combine if isinstance(body, BaseArm) else None
+    combine = combined(body.robot) if isinstance(body, RRR) else body.base.combine if isinstance(body, BaseArm) else None
     if combine is None:
         raise TypeError(f"no links are known behind a {type(body).__name__}")
     rest = np.array(kept)

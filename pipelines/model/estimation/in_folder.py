@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.parameter import Parameter
 from pipelines.io.log import ExperimentLog
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.estimation.floor import averaged
 from pipelines.model.estimation.logs import (
     Fitted,
@@ -27,7 +28,6 @@ from pipelines.model.friction.joint import JointLogs, fit_joint, friction_of
 from pipelines.model.friction.laws import law_named
 from pipelines.model.friction.several import fit_several
 from pipelines.model.motion import Reconstruction, reconstruct
-from pipelines.model.parameter import Parameter
 
 __all__ = ["fitted_in_folder"]
 

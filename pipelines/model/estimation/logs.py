@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected, UsageError
 from pipelines.fit.least_squares import Errors
 from pipelines.fit.statistics import Triangles, gather
@@ -16,7 +17,6 @@ from pipelines.model.estimation.conditioning import condition, cutoff_at, wanted
 from pipelines.model.estimation.estimate import Estimate, Stacked, estimate
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.motion import Reconstructed, Reconstruction, reconstruct
-from pipelines.model.rigid.body import Motion
 from pipelines.signal.filters import KEEP
 
 __all__ = ["FEWEST_OF_JOINT", "Fitted", "Judged", "Motions", "Recipe", "equations_of", "fit_logs", "judge", "motions_of",

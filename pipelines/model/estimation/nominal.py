@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion, RigidBody
+from pipelines.dynamics.parameter import Parameter, Uncertainty
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect, everywhere
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.regression import Columns
-from pipelines.model.parameter import Parameter, Uncertainty
-from pipelines.model.rigid.body import Motion, RigidBody
-from pipelines.model.rigid.choose import rigid_body
 
 __all__ = ["fitted_arm", "geared", "nominal_columns", "with_offsets"]
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm, ArmTorque
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import Validity
-from pipelines.model.arm import Arm, ArmTorque
 from pipelines.model.estimation.conditioning import cutoff_at
 from pipelines.model.estimation.logs import Fitted, Motions
 from pipelines.model.estimation.peaks import bridged

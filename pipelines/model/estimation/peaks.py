@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.model.rigid.body import Array
+from pipelines.dynamics.body import Array
 from pipelines.quality.segments import Usable
 from pipelines.signal.filters import LowPass, zero_phase
 

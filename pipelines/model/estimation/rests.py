@@ -19,10 +19,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of, fit_logs
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
 from pipelines.model.motion import Reconstructed
-from pipelines.model.rigid.body import Array
 from pipelines.quality.segments import Mask
 
 __all__ = ["RestConfig", "rests", "without_stiction"]

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check
 from pipelines.estimation.checks.boundary import Boundary
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import ModelFile
 from pipelines.io.results import NOT_STORED
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.balance import Balance
 from pipelines.model.estimation.checks import Consistent
 from pipelines.model.estimation.compare import Compared

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
 from pipelines.fit.rational import Known
 from pipelines.io.log import ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.frf.grouping import Finding, GroupingConfig, Open, group_joint, seen_elsewhere
 from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
 from pipelines.model.frf.responses import How, Measured, measured_responses

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import RrridError
 from pipelines.io.model_file import parse_model
-from pipelines.model.arm import Arm
 from pipelines.model.frf.experiment import Turned
 from pipelines.model.frf.responses import Measured
 

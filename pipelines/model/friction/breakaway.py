@@ -14,10 +14,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.model.friction.fit import LawFit, Value
 from pipelines.model.friction.laws import gravity_columns
 from pipelines.model.friction.weak_form import Stretch
-from pipelines.model.rigid.body import Array
 
 __all__ = ["BreakAwayConfig", "Event", "break_away", "held_at_least"]
 

@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
 from pipelines.model.friction.fit import LawEquations, LawFit, fit_law
 from pipelines.model.friction.laws import OneJoint, law_named
 from pipelines.model.friction.weak_form import Stretch
-from pipelines.model.rigid.body import Array
 from pipelines.signal.extended import Advance, Extended, filter_extended
 
 __all__ = ["EKF_NAMES", "EkfStart", "filtered", "joint_step", "run_ekf"]

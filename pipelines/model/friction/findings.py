@@ -13,14 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, RrridError
 from pipelines.io.log import ExperimentLog
-from pipelines.model.arm import Arm
 from pipelines.model.friction.fit import Value
 from pipelines.model.friction.joint import JointFit
 from pipelines.model.friction.result import JointResult
 from pipelines.model.friction.ripple import Ripple
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.words import plain_number
 
 __all__ = ["NAMED", "FindingsConfig", "depends_in_words", "drift_in_words", "inertia_in_words",

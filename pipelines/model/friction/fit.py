@@ -19,10 +19,10 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.fit.varpro import Separable, SeparableFit, fit_separable, scan, search
 from pipelines.model.friction.laws import Law, OneJoint, law_named
 from pipelines.model.friction.weak_form import Stretch, Windows
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Columns", "Equations", "LawEquations", "LawFit", "Number", "Value", "fit_law",
            "ranked", "same_posture", "takes_power"]

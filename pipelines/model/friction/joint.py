@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.arm import Acting
+from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import with_block_covariance
 from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
-from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.breakaway import Event, break_away, held_at_least
 from pipelines.model.friction.ekf import filtered
@@ -45,7 +46,6 @@ from pipelines.model.friction.weak_form import (
     swaying,
 )
 from pipelines.model.motion import Reconstructed, encoder_resolution
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["METHODS", "JointFit", "JointLogs", "Seen", "by_method", "fit_joint", "fractions",
            "friction_of"]

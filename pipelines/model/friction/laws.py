@@ -23,12 +23,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion, RigidBody
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.io.robot import Joint, RobotDescription
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve
 from pipelines.model.effects.fast import from_motion, own_memory, shape_slopes
-from pipelines.model.rigid.body import Array, Motion, RigidBody
-from pipelines.model.rigid.choose import rigid_body
 
 __all__ = ["LADDER", "Law", "NonlinearNumber", "OneJoint", "gravity_acts", "gravity_columns",
            "gravity_names", "law_named", "with_further"]

@@ -17,11 +17,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.fit.varpro import held_out, linear_part
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.fit import Equations, LawFit, fit_law, takes_power
 from pipelines.model.friction.laws import LADDER, Law, with_further
-from pipelines.model.rigid.body import Array
 from pipelines.model.words import plain_number
 
 __all__ = ["CandidateFit", "Ladder", "Missing", "climb", "no_worse", "undecided"]

@@ -18,12 +18,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import UsageError
 from pipelines.model.effects.base import Hooks
 from pipelines.model.friction.fit import LawEquations, LawFit
 from pipelines.model.friction.laws import Law, OneJoint, gravity_columns
 from pipelines.model.friction.weak_form import Stretch
-from pipelines.model.rigid.body import Array, Motion
 
 __all__ = ["Simulated", "polished", "refuse_unpolished", "simulate_joint"]
 

@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import SeparableFit, search
 from pipelines.model.friction.fit import LawEquations, LawFit, fit_law, ranked
 from pipelines.model.friction.laws import Law, OneJoint, gravity_columns
 from pipelines.model.friction.weak_form import Mask, Stretch
-from pipelines.model.rigid.body import Array
 from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_smoother

@@ -6,11 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import ModelFile
 from pipelines.io.results import NOT_STORED
-from pipelines.model.arm import Arm
 from pipelines.model.estimation.logs import Fitted, Motions
 from pipelines.model.friction.breakaway import Event
 from pipelines.model.friction.fit import LawFit, Value

@@ -18,13 +18,13 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.orders import orders_along
 from pipelines.fit.varpro import fit_separable
 from pipelines.model.effects.base import ArmModel, Parameters, Quantity
 from pipelines.model.effects.fast import Fast
 from pipelines.model.friction.fit import Columns, Equations, LawFit, Value
 from pipelines.model.friction.laws import gravity_columns
-from pipelines.model.rigid.body import Array, Motion
-from pipelines.model.rigid.orders import orders_along
 
 __all__ = ["Along", "Ripple", "RippleConfig", "Wave", "ripple_of", "with_inertia"]
 

@@ -15,6 +15,7 @@ from typing import Self
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.estimation.logs import (
     Fitted,
     Motions,
@@ -30,7 +31,6 @@ from pipelines.model.friction.fit import Columns, Equations
 from pipelines.model.friction.laws import LADDER, Law, OneJoint
 from pipelines.model.friction.model_selection import Ladder, climb
 from pipelines.model.friction.ripple import Ripple, Wave, ripple_of
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.filters import LowPass, centre_samples, zero_phase
 
 __all__ = ["RowEquations", "SeveralFit", "fit_several"]

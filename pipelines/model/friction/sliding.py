@@ -29,6 +29,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array
 from pipelines.fit.bounded import least_between
 from pipelines.fit.flips import by_flips
 from pipelines.fit.varpro import held_out
@@ -36,7 +37,6 @@ from pipelines.model.friction.fit import LawEquations
 from pipelines.model.friction.laws import OneJoint
 from pipelines.model.friction.model_selection import no_worse
 from pipelines.model.friction.weak_form import Course, Mask, Stretch, blocks_of_time
-from pipelines.model.rigid.body import Array
 
 __all__ = ["DriftConfig", "Sliding", "SlidingConfig", "drift_of", "left_out", "sliding_rows"]
 

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.dynamics.body import Array
 from pipelines.model.effects import find_effect
 from pipelines.model.friction.fit import LawFit
 from pipelines.model.friction.model_selection import Ladder, Missing, undecided
 from pipelines.model.friction.weak_form import Mask, Stretch
-from pipelines.model.rigid.body import Array
 
 __all__ = ["Coverage", "coverage", "speed_map", "unseen"]
 

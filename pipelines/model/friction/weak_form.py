@@ -23,11 +23,11 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import InputRejected
 from pipelines.io.log import ExperimentLog
 from pipelines.model.friction.laws import gravity_acts, gravity_columns
 from pipelines.model.motion import Reconstructed, encoder_resolution
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_jerk

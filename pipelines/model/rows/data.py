@@ -30,10 +30,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.logs import Motions, Recipe, equations_of
 from pipelines.model.estimation.regression import Columns, LogEquations, Rows
-from pipelines.model.rigid.body import Motion
 from pipelines.signal.filters import AMPLE, COARSE, ample, fast_length, passed_both_ways, thinned
 from pipelines.signal.prediction import prediction_errors, prediction_weights
 

@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
 from pipelines.model.effects.fast import from_motion
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.regression import Columns
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import (
     Fit,

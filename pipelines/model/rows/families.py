@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
 from pipelines.errors import UsageError
 from pipelines.io.log import Array
-from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, everywhere
 from pipelines.model.effects.fast import from_motion, own_columns, several_columns
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.data import Data, LogData
 
 __all__ = ["Family", "Laid", "Wanted", "families", "first_samples", "lay_family", "place_of", "usable", "whole_motion"]

@@ -19,10 +19,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from pipelines.dynamics.arm import Acting, Arm
 from pipelines.fit.bootstrap import apart
 from pipelines.fit.differences import difference
 from pipelines.io.log import Array
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect, Values
 from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rows.data import Data

@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.parameter import Parameter
 from pipelines.io.log import Array
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import ArmModel, Effect, Quantity
 from pipelines.model.effects.fast import from_motion, several_columns
 from pipelines.model.effects.kinds import FrictionLaw, plainer
 from pipelines.model.estimation.regression import Columns
-from pipelines.model.parameter import Parameter
 from pipelines.model.rows.data import Data
 
 __all__ = ["Fit", "effect_rows", "fit_columns", "fit_nominal", "law_rows", "law_slopes",

@@ -15,13 +15,13 @@ from bench.experiments import excitation
 from bench.faults import make
 from bench.machine import Fault, Machine
 from bench.plant import Recording, run
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
-from pipelines.model.rigid.body import Motion
 
 __all__ = ["DURATION", "arm", "effect_of", "fault", "faulty", "left_over", "machine", "motion_and_torque", "planned", "rms"]
 

@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from bench.plant import as_log
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
 from pipelines.dynamics.functions import NUMBERS
 from pipelines.io.log import Array
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.contact import Contact
 from pipelines.model.effects.gravity_tilt import GravityTilt
 from pipelines.model.effects.link_length import LinkLength
 from pipelines.model.effects.spring import Spring
-from pipelines.model.rigid.body import Motion
 from pipelines.simulation import Experiment, Plant, run
 from tests.model.effects.on_bench import (
     arm,

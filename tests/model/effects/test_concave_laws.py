@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from pipelines.dynamics.body import Array
 from pipelines.dynamics.functions import NUMBERS
 from pipelines.model.effects.concave_friction import ConcaveFriction
-from pipelines.model.rigid.body import Array
 from sample_logs.make_model import synthetic_arm
 
 ARM = synthetic_arm()

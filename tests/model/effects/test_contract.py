@@ -9,7 +9,8 @@ from typing import ClassVar
 import numpy as np
 import pytest
 
-from pipelines.model.arm import Acting, Arm
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.base import (
     ArmModel,
     Effect,
@@ -19,7 +20,6 @@ from pipelines.model.effects.base import (
     Quantity,
     Words,
 )
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_closed_form import Fourier
 from sample_logs.make_model import synthetic_arm
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from pipelines.dynamics.body import Motion
 from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_lag import TorqueLag
-from pipelines.model.rigid.body import Motion
 from tests.model.effects.on_bench import arm as described
 
 _H, _T = 1e-3, 5e-3  # [s] sample time, time constant

@@ -11,13 +11,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import UsageError
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects, effect_names, find_effect
 from pipelines.model.effects.base import Effect, adds, everywhere
 from pipelines.model.effects.fast import own_columns
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 
 UNITS = {"1", "1/rev", "Hz", "s", "s/rad", "rad", "rad/s", "m", "kg", "kg m", "kg m^2", "N", "N m", "N m s/rad",

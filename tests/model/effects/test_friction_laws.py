@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 from pipelines.model.effects.two_sigmoid import TwoSigmoid
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import FRICTION, synthetic_arm
 
 

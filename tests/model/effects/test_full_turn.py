@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Motion
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.base import Effect
-from pipelines.model.rigid.body import Motion
 
 FREE: Any = SimpleNamespace(robot=SimpleNamespace(revolute=(True,), joints=(SimpleNamespace(position=(-np.inf, np.inf)),)))
 SLIDE: Any = SimpleNamespace(robot=SimpleNamespace(revolute=(False,), joints=(SimpleNamespace(position=(-np.inf, np.inf)),)))

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import ARRAYS, NUMBERS
 from pipelines.model.effects.asymmetric_friction import AsymmetricFriction
 from pipelines.model.effects.load_friction import LoadFriction
 from pipelines.model.effects.position_friction import PositionFriction
 from pipelines.model.effects.presliding import Presliding
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 from tests.seeds import rarely
 

@@ -7,14 +7,14 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from pipelines.model.arm import Acting
+from pipelines.dynamics.arm import Acting
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.effects.spring import Spring
 from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
 from pipelines.model.effects.torque_gain import TorqueGain
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
-from tests.model.rigid.rrr_arms import random_states
+from tests.dynamics.rrr_arms import random_states
 
 _STIFF, _MIXED, _GAIN = 1.75, -0.1, -0.08
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Arm
+from pipelines.dynamics.body import Motion
 from pipelines.dynamics.functions import ARRAYS, NUMBERS
-from pipelines.model.arm import Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.fast import Fast, own_load, own_memory
 from pipelines.model.effects.terms import summed
-from pipelines.model.rigid.body import Motion
 from tests.model.effects.test_every_effect import arm, drawn, every_effect, motion, placed
 
 __all__ = ["arm", "motion"]

@@ -7,14 +7,14 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from pipelines.model.arm import Acting, Arm
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.encoder_crosstalk import EncoderCrosstalk
 from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.effects.torque_offset import TorqueOffset
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
-from tests.model.rigid.rrr_arms import random_states
+from tests.dynamics.rrr_arms import random_states
 
 _PART, _ORDER, _AMPLITUDE = 0.015, 35.0, 0.08
 

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Array, Motion
 from pipelines.io.robot import Drive, Joint, LinkParameters, RobotDescription
 from pipelines.io.urdf import import_urdf
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, everywhere
 from pipelines.model.effects.coulomb import Coulomb
@@ -19,9 +20,8 @@ from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.kinds import Event
 from pipelines.model.effects.transmission_coupling import TransmissionCoupling
 from pipelines.model.effects.viscous import Viscous
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.simulation import Plant
-from tests.model.rigid.serial_arms import GANTRY, TX40, physical_links, table
+from tests.dynamics.serial_arms import GANTRY, TX40, physical_links, table
 
 ROBOTS: dict[str, Callable[[Path], RobotDescription]] = {
     "urdf": lambda shared: import_urdf(shared / TX40),

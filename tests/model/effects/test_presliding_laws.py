@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import least_squares
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects.presliding import Presliding
-from pipelines.model.rigid.body import Array, Motion
 from sample_logs.make_model import synthetic_arm
 
 H = 1e-4  # [s] of the laws' own steps

@@ -17,8 +17,9 @@ from scipy.signal import butter, sosfiltfilt
 
 from bench.config import SAMPLE_TIME
 from bench.plant import Recording, as_log
+from pipelines.dynamics.arm import Acting
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, Controller
-from pipelines.model.arm import Acting
 from pipelines.model.effects import find_effect
 from pipelines.model.effects.backlash import Backlash
 from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
@@ -26,7 +27,6 @@ from pipelines.model.effects.encoder_crosstalk import EncoderCrosstalk
 from pipelines.model.effects.encoder_eccentricity import EncoderEccentricity
 from pipelines.model.effects.joint_elasticity import JointElasticity
 from pipelines.model.effects.time_delay import TimeDelay
-from pipelines.model.rigid.body import Motion
 from pipelines.simulation import Experiment, Plant, run, simulate_windows
 from tests.model.effects.on_bench import arm, fault, faulty, healthy, machine, planned, rms
 from tests.seeds import rarely, usually

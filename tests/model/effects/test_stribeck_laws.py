@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from pipelines.dynamics.body import Array
 from pipelines.model.effects.stribeck import Stribeck
-from pipelines.model.rigid.body import Array
 from sample_logs.make_model import synthetic_arm
 
 ARM = synthetic_arm()

@@ -9,11 +9,11 @@ from functools import lru_cache
 
 import numpy as np
 
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array, Controller, ExperimentLog
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.effects.viscous import Viscous
-from pipelines.model.rigid.body import Motion
 from pipelines.simulation import Experiment, Noise, simulate
 from sample_logs.make_closed_form import (
     NOISE,

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Motion
 from pipelines.model.estimation.conditioning import wanted_cutoff
-from pipelines.model.rigid.body import Motion
 
 RATE = 500.0  # [Hz]
 FASTEST = 5.0  # [Hz]

@@ -10,13 +10,13 @@ import pinocchio as pin
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from pipelines.dynamics.rrr import rigid_body
 from pipelines.import_log import STAGE, Settings
 from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.logs import Fitted, Recipe, equations_of, fit_logs, motions_of
 from pipelines.model.estimation.nominal import nominal_columns
-from pipelines.model.rigid.choose import rigid_body
 from pipelines.model.tuned import Reconstruction
 from pipelines.stage import Request, run_stage
 

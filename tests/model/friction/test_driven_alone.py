@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
 from pipelines.model.friction.fit import LawFit
 from pipelines.model.friction.laws import OneJoint, law_named
 from pipelines.model.friction.refine import fit_driven_alone
-from pipelines.model.rigid.body import Motion
 from tests.model.friction.one_joint import (
     COSINE,
     ENCODER,

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pipelines.dynamics.body import Array
 from pipelines.fit.varpro import SeparableFit
 from pipelines.model.friction.fit import LawFit
 from pipelines.model.friction.laws import Law, OneJoint, law_named
 from pipelines.model.friction.output_error import simulate_joint
 from pipelines.model.friction.weak_form import Stretch
-from pipelines.model.rigid.body import Array
 from tests.model.friction.one_joint import INERTIA, JOINT, recorded
 
 T = np.arange(500) * 1e-3

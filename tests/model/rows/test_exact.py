@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.model.arm import Acting
+from pipelines.dynamics.arm import Acting
 from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.effects.base import Effect, adds
 from pipelines.model.estimation.logs import Recipe

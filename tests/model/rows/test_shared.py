@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Array, Motion
 from pipelines.model.effects import find_effect
 from pipelines.model.estimation.logs import Recipe
-from pipelines.model.rigid.body import Array, Motion
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal

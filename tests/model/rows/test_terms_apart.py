@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from pipelines.dynamics.body import Motion
 from pipelines.io.files import open_log
 from pipelines.io.log import Array
 from pipelines.model.effects.base import Effect
@@ -21,7 +22,6 @@ from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from pipelines.model.effects.viscous import Viscous
 from pipelines.model.estimation.logs import Recipe
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.fit import Refined, refine

@@ -10,8 +10,9 @@ import pytest
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import pose
 from pipelines.diagnosis.screening import best_of
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
 from pipelines.io.log import Array
-from pipelines.model.arm import Acting, Arm
 from pipelines.model.effects.base import Effect
 from pipelines.model.effects.cogging import Cogging
 from pipelines.model.effects.coulomb import Coulomb
@@ -22,7 +23,6 @@ from pipelines.model.effects.time_delay import TimeDelay
 from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.effects.viscous_drift import ViscousDrift
 from pipelines.model.estimation.logs import Recipe
-from pipelines.model.rigid.body import Motion
 from pipelines.model.rows.exact import Exact, nominal_slopes, slopes_of
 from pipelines.model.rows.fit import refine
 from pipelines.model.rows.nominal import fit_nominal, rigid_rows

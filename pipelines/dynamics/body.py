@@ -1,0 +1,163 @@
+"""What every rigid body offers, whatever computes it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.io.robot import RobotDescription
+
+__all__ = [
+    "Array", "BaseParameter", "Motion", "RigidBody", "TorqueParts", "refuse_other_length",
+    "refuse_other_shapes"
+]
+
+Array = npt.NDArray[np.float64]
+
+# numerics: torques of a motion: slopes of seven joints, of the arm and of the body, and two more
+_KEPT = 16  # numerics: see above
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Joint motion on one time base."""
+
+    t: Array  # [s] (samples,)
+    # [rad] (samples, joints), in the log's zero: offsets of the description are not yet added
+    q: Array
+    dq: Array  # [rad/s] (samples, joints)
+    ddq: Array  # [rad/s^2] (samples, joints)
+    # [N m] (samples, joints) as logged, held from each sample to the next; None: not known
+    tau: Array | None = None
+    # [N m] (joints,) measured torque at sample `since`, before which the motion is vague
+    logged: Array | None = None
+    since: int = field(default=0, kw_only=True)
+    # [s] this may be every other sample of it
+    log_sample_time: float | None = field(default=None, kw_only=True)
+    _kept: list[tuple[tuple[object, ...], Array]] = field(
+        default_factory=list, init=False, repr=False, compare=False)
+
+    @property
+    def sample_time(self) -> float:
+        """[s] between two samples of its log."""
+        return self.log_sample_time or (float(np.median(np.diff(self.t)))
+                                        if len(self.t) > 1 else 0.0)
+
+    def kept(self, key: tuple[object, ...], work: Callable[[], Array]) -> Array:
+        """Return what `work` makes of this motion: once for the objects of a key, of the last few.
+
+        It is not to be written to. Slopes by differences ask for the same torque once a number. Of
+        a motion whose arrays may be written to nothing is kept.
+        """
+        if any(x.flags.writeable for x in (self.q, self.dq, self.ddq)):
+            return work()
+        for place, (known, torque) in enumerate(self._kept):
+            if len(known) == len(key) and all(a is b for a, b in zip(key, known, strict=True)):
+                self._kept.insert(0, self._kept.pop(place))
+                return torque
+        torque = work()
+        torque.flags.writeable = False
+        self._kept.insert(0, (key, torque))
+        del self._kept[_KEPT:]
+        return torque
+
+
+@dataclass(frozen=True)
+class BaseParameter:
+    """One element of the base parameter set.
+
+    Its name, its unit, and the combination of link parameters it stands for.
+    """
+
+    name: str  # "p3", or the leading standard parameter of a general arm: "Ixx2"
+    unit: str  # "kg m^2"
+    combination: str  # readable: "m3 (a3 + x3)", "Ixx2 - Iyy2 - 0.04 m3"
+
+
+@dataclass(frozen=True)
+class TorqueParts:
+    """The rigid body's torque, split. Each (samples, joints) [N m]; their sum is the torque."""
+
+    inertia: Array  # D(q) ddq
+    coriolis: Array  # c(q, dq)
+    gravity: Array  # h(q)
+
+
+def refuse_other_shapes(columns: int, **states: Array) -> None:
+    """Refuse arrays that are not (samples, columns), all with as many samples.
+
+    A 1-D q would else give nonsense.
+
+    Args:
+        states: the arrays by their names.
+
+    Raises:
+        ValueError: says which array, the shape it has and the shape it must have.
+    """
+    samples = None
+    for name, values in states.items():
+        shape = np.shape(values)
+        if shape != (*shape[:1], columns):
+            raise ValueError(f"{name} has the shape {shape}, wanted is (samples, {columns})")
+        samples = shape[0] if samples is None else samples
+        if shape[0] != samples:
+            raise ValueError(
+                f"{name} has the shape {shape}, wanted is {(samples, columns)}, as before it")
+
+
+def refuse_other_length(parameters: int, p: Array, samples: int | None = None) -> None:
+    """Refuse p that is not (parameters,), nor (samples.
+
+    Parameters) where every sample may have its own arm.
+
+    Raises:
+        ValueError: says the shape it has and the shape it must have.
+    """
+    if np.shape(p) not in ((parameters,), (samples, parameters)):
+        raise ValueError(f"p has the shape {np.shape(p)}, wanted is ({parameters},)")
+
+
+class RigidBody(Protocol):
+    """A rigid arm whose torque is linear in its base parameters: τ = Y(q, dq, ddq) p, eq. (8)."""
+
+    robot: RobotDescription
+    parameters: tuple[BaseParameter, ...]
+
+    @property
+    def links_behind(self) -> Array:
+        """(10 · joints, parameters).
+
+        Standard parameters that have the torques of p, not to be written to.
+        """
+        ...
+
+    def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """Y (samples, joints, parameters) for q, dq, ddq (samples, joints)."""
+        ...
+
+    def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
+        """τ = Y p (samples, joints) [N m], without forming Y where that is faster."""
+        ...
+
+    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
+        """Inertial, Coriolis and gravity torque."""
+        ...
+
+    def mass_matrix(self, q: Array, p: Array) -> Array:
+        """D(q) (samples, joints, joints) [kg m^2]."""
+        ...
+
+    def tip(self, q: Array) -> Array:
+        """Tip position (samples, 3) [m] in the base frame."""
+        ...
+
+    def known_parameters(self) -> Array | None:
+        """p of the links the description knows, (parameters,).
+
+        Or None where it does not know them all.
+        """
+        ...

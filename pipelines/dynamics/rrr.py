@@ -1,0 +1,321 @@
+"""The dynamics of the RRR arm in closed form, linear in 15 base parameters.
+
+Kostić et al. 2004, eq. (8), (A4) and (A5), with the one wrong entry of the print corrected (erratum
+E1: the last trigonometric function of r34 is a cosine, as in r24). Conventions: `verified.md`,
+section 0.
+
+The letters: S = q2 + q3; c, s a cosine and sine; g the gravitational acceleration.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+
+from pipelines.dynamics import rrr_kinematics
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import (
+    BaseParameter,
+    RigidBody,
+    TorqueParts,
+    refuse_other_length,
+    refuse_other_shapes,
+)
+from pipelines.dynamics.chain import STANDARD, regressor, standard_parameters
+from pipelines.io.log import Array
+from pipelines.io.robot import RobotDescription
+
+__all__ = ["ACTING", "RRR", "combined", "fits", "rigid_body"]
+
+_TINY = 1e-12  # numerics: rounding
+_STATES, _SEED = 40, 7  # numerics: random states at which the general arm is compared
+
+# The columns that act on each joint. Row three has four columns of row two: the one's end is the
+# other's beginning.
+_SHARED = [4, 5, 7, 8]  # numerics: see above
+ACTING = (tuple(range(11)), (0, 1, 2, 3, 9, 10, 11, 12, 13, 14, *_SHARED), (*_SHARED, 2, 3, 12))
+
+_Rows = Array | dict[int, Array]
+
+_MOMENT, _INERTIA = "kg m", "kg m^2"
+_PARAMETERS = (("p1", _INERTIA, "a2^2 m3 + a2 m2 (a2 + 2 x2) - Ixx2 + Iyy2"),
+               ("p2", _INERTIA, "-2 (a2 m2 y2 + Ixy2)"), ("p3", _MOMENT,
+                                                          "m3 (a3 + x3)"), ("p4", _MOMENT, "m3 y3"),
+               ("p5", _INERTIA, "a3 m3 (a3 + 2 x3) - Ixx3 + Iyy3"), ("p6", _INERTIA,
+                                                                     "2 (a3 m3 y3 + Ixy3)"),
+               ("p7", _INERTIA,
+                "2 d2 m2 z2 + d2^2 m2 + 2 (d2 + d3) m3 z3 + (d2 + d3)^2 m3 + Iyy1 + Ixx2 + Ixx3"),
+               ("p8", _INERTIA,
+                "-(d2 + d3) m3 y3 - Iyz3"), ("p9", _INERTIA,
+                                             "-a3 m3 (z3 + d2 + d3) - (d2 + d3) m3 x3 - Ixz3"),
+               ("p10", _INERTIA,
+                "-d2 m2 y2 - Iyz2"), ("p11", _INERTIA,
+                                      "-a2 (m3 (z3 + d2 + d3) + m2 (d2 + z2)) - d2 m2 x2 - Ixz2"),
+               ("p12", _INERTIA, "(a2^2 + a3^2 + 2 a3 x3) m3 + a2 m2 (a2 + 2 x2) + Izz2 + Izz3"),
+               ("p13", _INERTIA,
+                "a3 m3 (a3 + 2 x3) + Izz3"), ("p14", _MOMENT,
+                                              "m2 (x2 + a2) + m3 a2"), ("p15", _MOMENT, "m2 y2"))
+
+
+def fits(robot: RobotDescription) -> bool:
+    """Return whether (A1)-(A5) describe `robot`.
+
+    DH with alpha = (pi/2, 0, 0), a1 = 0, gravity along -z, no tool.
+    """
+    if robot.convention != "dh" or robot.revolute != (True, True, True):
+        return False
+    one, two, three = robot.joints
+    zeros = (one.alpha - math.pi / 2, two.alpha, three.alpha, one.a, *robot.gravity[:2],
+             *robot.tool)
+    return all(abs(value) <= _TINY
+               for value in zeros) and min(two.a, three.a, -robot.gravity[2]) > _TINY
+
+
+class RRR:
+    """The RRR arm: τ = R(q, dq, ddq) p with the 15 elements of (A4)."""
+
+    def __init__(self, robot: RobotDescription) -> None:
+        if not fits(robot):
+            raise ValueError(f"'{robot.name}' is not an RRR arm as in Kostić et al. 2004")
+        self.robot = robot
+        self.parameters = tuple(BaseParameter(*row) for row in _PARAMETERS)
+        self.geometry = rrr_kinematics.rrr_geometry(robot)
+        self._a2 = robot.joints[1].a
+        self._g = -robot.gravity[2]
+        self._offset = np.array(self.geometry.offset)
+
+    @cached_property
+    def links_behind(self) -> Array:
+        """(30, 15): standard parameters that have the torques of p.
+
+        Zero outside the base set of the general arm.
+        """
+        general = BaseArm(self.robot)
+        rng = np.random.default_rng(_SEED)
+        states = rng.uniform(-3.0, 3.0, (_STATES, 3)), *rng.normal(size=(2, _STATES, 3))
+        ours, links = self.regressor(*states), regressor(general.chain, *states)
+        found = np.linalg.lstsq(ours.reshape(-1, 15), links.reshape(-1, 30), rcond=None)[0]
+        found[np.abs(found) < _TINY] = 0.0
+        chosen = found[:, list(general.base.chosen)]
+        return np.asarray(general.links_behind @ np.linalg.inv(chosen))
+
+    def tip(self, q: Array) -> Array:
+        """Return the tip (samples, 3) [m]."""
+        refuse_other_shapes(3, q=q)
+        return rrr_kinematics.tip(self.geometry, q)
+
+    def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
+        """R (samples, 3, 15), stored with samples fastest. Kostić et al. 2004, eq.
+
+        (A5), with r34 as in erratum E1.
+        """
+        refuse_other_shapes(3, q=q, dq=dq, ddq=ddq)
+        shape = np.shape(q)[:-1]
+        R = np.zeros((3, 15, *shape))
+        angles, v, u = (np.moveaxis(np.asarray(x, dtype=np.float64), -1, 0) for x in (q, dq, ddq))
+        trigonometry = self._trigonometry_of(angles[1], angles[2])
+        doubled = _doubled(trigonometry)
+        self._fill_waist_row(R[0], trigonometry, doubled, v, u)
+        self._fill_other_rows(R[1], R[2], trigonometry, doubled, v, u)
+        R[2, _SHARED] = R[1, _SHARED]
+        return np.moveaxis(R, (0, 1), (-2, -1))
+
+    def acting_rows(self, q: Array, dq: Array, ddq: Array,
+                    out: Array) -> tuple[Array, Array, Array]:
+        """Return what is not always zero in R, of each joint (columns, samples).
+
+        `ACTING` tells which columns.
+
+        Written to `out` (28, samples), in which the columns that rows two and three share stand
+        once: a fit then reads no zero and copies nothing. For q, dq, ddq (samples, 3).
+        """
+        angles, v, u = (np.ascontiguousarray(np.transpose(x), dtype=np.float64)
+                        for x in (q, dq, ddq))
+        trigonometry = self._trigonometry_of(angles[1], angles[2])
+        waist, two, three = out[:11], out[11:25], out[21:28]
+        doubled = _doubled(trigonometry)
+        self._fill_waist_row(waist, trigonometry, doubled, v, u)
+        self._fill_other_rows(dict(zip(ACTING[1], two, strict=True)),
+                              dict(zip(ACTING[2], three, strict=True)), trigonometry, doubled, v, u)
+        return waist, two, three
+
+    def _fill_waist_row(self, one: _Rows, trigonometry: tuple[Array, ...],
+                        doubled: tuple[Array, ...], dq: Array, ddq: Array) -> None:
+        c2, s2, _, _, cS, sS = trigonometry
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = doubled
+        v1, v2, v3 = dq
+        u1, u2, u3 = ddq
+        a2, v, u = self._a2, v2 + v3, u2 + u3
+        v12, v13, v1v, v22, vv, half = v1 * v2, v1 * v3, v1 * v, v2 * v2, v * v, 0.5 * u1
+        one[0][...] = u1 * (c2 * c2) - v12 * sin22
+        one[1][...] = half * sin22 + v12 * cos22
+        one[2][...] = (2 * a2) * ((u1 * cS - v13 * sS) * c2 - v12 * sin223)
+        one[3][...] = (-2 * a2) * ((u1 * sS + v13 * cS) * c2 + v12 * cos223)
+        one[4][...] = u1 * (cS * cS) - v1v * sin2S
+        one[5][...] = -half * sin2S - v1v * cos2S
+        one[6][...] = u1
+        one[7][...] = u * cS - vv * sS
+        one[8][...] = u * sS + vv * cS
+        one[9][...] = u2 * c2 - v22 * s2
+        one[10][...] = v22 * c2 + u2 * s2
+
+    def _fill_other_rows(self, two: _Rows, three: _Rows, trigonometry: tuple[Array, ...],
+                         doubled: tuple[Array, ...], dq: Array, ddq: Array) -> None:
+        """Row two, and of row three what differs from it: see `_SHARED`."""
+        c2, s2, c3, s3, cS, sS = trigonometry
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = doubled
+        v1, v2, v3 = dq
+        u1, u2, u3 = ddq
+        a2, g, half = self._a2, self._g, 0.5 * v1 * v1
+        turning, slanted, fore = 0.5 * v3 * v3 + v2 * v3, u2 + 0.5 * u3, half + v2 * v2
+        up3, up4, bent3, bent4 = g * cS, g * sS, half * sin223, half * cos223
+        np.multiply(half, sin22, out=two[0])
+        np.multiply(half, -cos22, out=two[1])
+        two[2][...] = (2 * a2) * (slanted * c3 - turning * s3 + bent3) + up3
+        two[3][...] = (2 * a2) * (bent4 - slanted * s3 - turning * c3) - up4
+        np.multiply(half, sin2S, out=two[4])
+        np.multiply(half, cos2S, out=two[5])
+        np.multiply(u1, cS, out=two[7])
+        np.multiply(u1, sS, out=two[8])
+        np.multiply(u1, c2, out=two[9])
+        np.multiply(u1, s2, out=two[10])
+        two[11][...] = u2
+        two[12][...] = u3
+        np.multiply(g, c2, out=two[13])
+        np.multiply(-g, s2, out=two[14])
+
+        three[2][...] = a2 * (fore * s3 + c3 * u2 + bent3) + up3
+        three[3][...] = a2 * (fore * c3 - s3 * u2 + bent4) - up4
+        np.add(u2, u3, out=three[12])
+
+    def torque(self, q: Array, dq: Array, ddq: Array, p: Array) -> Array:
+        """τ (samples, 3) [N m].
+
+        `p` is (15,), or (samples, 15) where every sample has its own arm.
+        """
+        parts = self.torque_parts(q, dq, ddq, p)
+        return parts.inertia + parts.coriolis + parts.gravity
+
+    def torque_parts(self, q: Array, dq: Array, ddq: Array, p: Array) -> TorqueParts:
+        """D(q) ddq, c(q, dq) and h(q): the terms of (A5) gathered by what they multiply."""
+        refuse_other_shapes(3, q=q, dq=dq, ddq=ddq)
+        refuse_other_length(15, p, len(q))
+        trigonometry = self._trigonometry(q)
+        D11, D12, D13, D22, D23, D33 = self._mass(trigonometry, p)
+        u1, u2, u3 = np.moveaxis(ddq, -1, 0)
+        inertia = np.stack([D11 * u1 + D12 * u2 + D13 * u3, D12 * u1 + D22 * u2 + D23 * u3,
+                            D13 * u1 + D23 * u2 + D33 * u3], axis=-1)
+        return TorqueParts(inertia, self._coriolis(trigonometry, dq, p),
+                           self._gravity(trigonometry, p))
+
+    def mass_matrix(self, q: Array, p: Array) -> Array:
+        """D(q) (samples, 3, 3) [kg m^2]."""
+        refuse_other_shapes(3, q=q)
+        refuse_other_length(15, p, len(q))
+        D11, D12, D13, D22, D23, D33 = np.broadcast_arrays(*self._mass(self._trigonometry(q), p))
+        entries = np.stack([D11, D12, D13, D12, D22, D23, D13, D23, D33], axis=-1)
+        return entries.reshape(*entries.shape[:-1], 3, 3)
+
+    def known_parameters(self) -> Array | None:
+        """Return p (15,) of the links of the description; None where it does not know them all."""
+        links = [joint.link for joint in self.robot.joints if joint.link is not None]
+        if len(links) < self.robot.n_joints:
+            return None
+        return combined(self.robot) @ standard_parameters(links)
+
+    def _trigonometry(self, q: Array) -> tuple[Array, ...]:
+        """cos and sin of q2, q3 and S.
+
+        Of S by the addition theorem, which costs a third of two more calls.
+        """
+        return self._trigonometry_of(q[..., 1], q[..., 2])
+
+    def _trigonometry_of(self, q2: Array, q3: Array) -> tuple[Array, ...]:
+        q2, q3 = q2 + self._offset[1], q3 + self._offset[2]
+        c2, s2, c3, s3 = np.cos(q2), np.sin(q2), np.cos(q3), np.sin(q3)
+        return c2, s2, c3, s3, c2 * c3 - s2 * s3, s2 * c3 + c2 * s3
+
+    def _mass(self, trigonometry: tuple[Array, ...], p: Array) -> tuple[Array, ...]:
+        """D11, D12, D13, D22, D23, D33: what multiplies ddq in (A5).
+
+            D11 = p1 c2^2 + p2 s2 c2 + 2 a2 c2 (p3 cS - p4 sS) + p5 cS^2 - p6 sS cS + p7
+            D13 = p8 cS + p9 sS;  D12 = D13 + p10 c2 + p11 s2
+            D22 = p12 + 2 a2 (p3 c3 - p4 s3);  D23 = p13 + a2 (p3 c3 - p4 s3);  D33 = p13
+        """
+        c2, s2, c3, s3, cS, sS = trigonometry
+        p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11, p12, p13, _, _ = np.moveaxis(
+            np.asarray(p), -1, 0)
+        D11 = (p1 * c2 + p2 * s2 + 2 * self._a2 *
+               (p3 * cS - p4 * sS)) * c2 + (p5 * cS - p6 * sS) * cS + p7
+        D13 = p8 * cS + p9 * sS
+        bent = self._a2 * (p3 * c3 - p4 * s3)
+        return D11, D13 + p10 * c2 + p11 * s2, D13, p12 + 2 * bent, p13 + bent, p13
+
+    def _coriolis(self, trigonometry: tuple[Array, ...], dq: Array, p: Array) -> Array:
+        """c(q, dq): what is left of (A5) without ddq and g."""
+        c2, s2, c3, s3, cS, sS = trigonometry
+        v1, v2, v3 = np.moveaxis(dq, -1, 0)
+        p1, p2, p3, p4, p5, p6, _, p8, p9, p10, p11, _, _, _, _ = np.moveaxis(np.asarray(p), -1, 0)
+        a2, v, half = self._a2, v2 + v3, 0.5 * v1**2
+        sin22, cos22, sin2S, cos2S, sin223, cos223 = _doubled(trigonometry)
+        upper, fore, both = p1 * sin22 - p2 * cos22, p5 * sin2S + p6 * cos2S, a2 * (p3 * sin223
+                                                                                    + p4 * cos223)
+        bent = a2 * (p3 * s3 + p4 * c3)
+        return np.stack([
+            -v1 * (v2 * (upper + 2 * both) + v * fore + v3 * (2 * a2 * c2) * (p3 * sS + p4 * cS))
+            + v**2 * (p9 * cS - p8 * sS) + v2**2 * (p11 * c2 - p10 * s2),
+            half * (upper + fore + 2 * both) - (v3 + 2 * v2) * v3 * bent,
+            half * (fore + both + bent) + v2**2 * bent,
+        ], axis=-1)
+
+    def _gravity(self, trigonometry: tuple[Array, ...], p: Array) -> Array:
+        """h(q): h3 = g (p3 cS - p4 sS);  h2 = h3 + g (p14 c2 - p15 s2).
+
+        H1 = 0, for the first axis is vertical.
+        """
+        c2, s2, _, _, cS, sS = trigonometry
+        p3, p4, p14, p15 = np.moveaxis(np.asarray(p)[..., [2, 3, 13, 14]], -1, 0)
+        h3 = self._g * (p3 * cS - p4 * sS)
+        return np.stack([np.zeros_like(h3), h3 + self._g * (p14 * c2 - p15 * s2), h3], axis=-1)
+
+
+def _doubled(trigonometry: tuple[Array, ...]) -> tuple[Array, ...]:
+    """sin and cos of 2 q2, of 2 S and of 2 q2 + q3."""
+    c2, s2, _, _, cS, sS = trigonometry
+    return (2 * s2 * c2, c2**2 - s2**2, 2 * sS * cS, cS**2 - sS**2, s2 * cS + c2 * sS,
+            c2 * cS - s2 * sS)
+
+
+def combined(robot: RobotDescription) -> Array:
+    """L (15, 30) with p = L φ, φ the standard parameters. Kostić et al. 2004, eq. (A4)."""
+    (_, a2, a3), (_, d2, d3) = ([getattr(joint, key) for joint in robot.joints]
+                                for key in ("a", "d"))
+    d = d2 + d3
+    rows: tuple[dict[str, float], ...] = (
+        {"m3": a2**2, "m2": a2**2,
+         "mx2": 2 * a2, "Ixx2": -1.0, "Iyy2": 1.0}, {"my2": -2 * a2,
+                                                     "Ixy2": -2.0}, {"m3": a3, "mx3": 1.0},
+        {"my3": 1.0}, {"m3": a3**2, "mx3": 2 * a3, "Ixx3": -1.0, "Iyy3": 1.0},
+        {"my3": 2 * a3,
+         "Ixy3": 2.0}, {
+             "mz2": 2 * d2,
+             "m2": d2**2, "mz3": 2 * d, "m3": d**2,
+             "Iyy1": 1.0, "Ixx2": 1.0, "Ixx3": 1.0
+         }, {"my3": -d, "Iyz3": -1.0}, {"mz3": -a3, "m3": -a3 * d, "mx3": -d, "Ixz3": -1.0},
+        {"my2": -d2, "Iyz2": -1.0
+         }, {"mz3": -a2, "m3": -a2 * d, "mz2": -a2, "m2": -a2 * d2, "mx2": -d2, "Ixz2": -1.0},
+        {"m3": a2**2 + a3**2, "mx3": 2 * a3, "m2": a2**2, "mx2": 2 * a2, "Izz2": 1.0,
+         "Izz3": 1.0}, {"m3": a3**2, "mx3": 2 * a3, "Izz3": 1.0}, {"mx2": 1.0, "m2": a2,
+                                                                   "m3": a2}, {"my2": 1.0})
+    combine = np.zeros((15, 30))
+    for row, entries in zip(combine, rows, strict=True):
+        for name, value in entries.items():
+            row[10 * (int(name[-1]) - 1) + STANDARD.index(name[:-1])] = value
+    return combine
+
+
+def rigid_body(robot: RobotDescription) -> RigidBody:
+    """Return the closed form where `robot` has its geometry, the general recursion otherwise."""
+    return RRR(robot) if fits(robot) else BaseArm(robot)

@@ -1,1 +1,0 @@
-"""The rigid body: geometry, kinematics, inverse dynamics, base parameters."""

@@ -1,0 +1,137 @@
+"""Torques, regressor and mass matrix of every kind of arm against Pinocchio and against the laws of mechanics."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipelines.dynamics import chain as serial
+from pipelines.dynamics.kinematics import serial_chain
+from pipelines.io.robot_files import load_robot
+from tests.dynamics.serial_arms import ARMS, HALF, Arm, by_hand, physical_links, table
+
+BAR = 1e-11  # of the largest torque
+
+
+def test_regressor_and_recursion_equal_pinocchio(arm: Arm) -> None:
+    """On 250 random states, each with other links, Y φ and the recursion give Pinocchio's torque to 1e-11 of the largest.
+
+    A new random φ for every state makes every column count: no error in one can hide behind another.
+    """
+    rng = np.random.default_rng(21)
+    q, dq, ddq = arm.states(250, seed=22)
+    chain, data = serial_chain(arm.robot), arm.model.createData()
+    y = serial.regressor(chain, q, dq, ddq)
+    theirs, ours, recursive = (np.empty((250, arm.n)) for _ in range(3))
+    for k, posture in enumerate(arm.offset(q)):
+        phi = physical_links(arm.n, rng)
+        arm.load(phi)
+        theirs[k] = pin.rnea(arm.model, data, posture, dq[k], ddq[k])
+        ours[k] = y[k] @ phi
+        recursive[k] = serial.inverse_dynamics(chain, q[k:k + 1], dq[k:k + 1], ddq[k:k + 1], phi)[0]
+    largest = np.abs(theirs).max()
+    assert np.abs(ours - theirs).max() <= BAR * largest
+    assert np.abs(recursive - theirs).max() <= BAR * largest
+
+
+_ANGLES = st.sampled_from([0.0, HALF, -HALF, math.pi]) | st.floats(-3.0, 3.0)
+_LENGTHS = st.just(0.0) | st.floats(-0.5, 0.5)
+_ROW = st.tuples(st.sampled_from(["revolute", "prismatic"]), _ANGLES, _LENGTHS, _LENGTHS, _ANGLES)
+
+
+@given(st.lists(_ROW, min_size=1, max_size=5), st.sampled_from(["dh", "mdh"]), st.integers(0, 2**31))
+@settings(max_examples=60, deadline=None)
+def test_any_table_equals_pinocchio(rows: list[tuple[str, float, float, float, float]], convention: str,
+                                    seed: int) -> None:
+    """Whatever the table, distal or modified, turning or sliding: Pinocchio's torque, and a mass matrix like its own."""
+    arm = by_hand(table("any", convention, rows))
+    phi = physical_links(arm.n, np.random.default_rng(seed))
+    arm.load(phi)
+    q, dq, ddq = arm.states(5, seed)
+    chain, data = serial_chain(arm.robot), arm.model.createData()
+    theirs = np.array([pin.rnea(arm.model, data, p, dq[k], ddq[k]) for k, p in enumerate(arm.offset(q))])
+    bar = BAR * max(np.abs(theirs).max(), 1.0)
+    assert np.abs(serial.regressor(chain, q, dq, ddq) @ phi - theirs).max() <= bar
+    assert np.abs(serial.inverse_dynamics(chain, q, dq, ddq, phi) - theirs).max() <= bar
+    d = serial.mass_matrix(chain, q, phi)
+    np.testing.assert_allclose(d, d.transpose(0, 2, 1), atol=1e-12 * np.abs(d).max())
+
+
+@pytest.mark.parametrize("name", ["tx40", "puma-mdh", "gantry-mdh", "skew-urdf"])
+def test_regressor_columns_equal_pinocchio_where_frames_coincide(name: str, shared: Path, tmp_path: Path) -> None:
+    """Where our link frame is Pinocchio's joint frame, the two regressors agree column by column."""
+    arm = ARMS[name](shared, tmp_path)
+    assert all(link.isIdentity() for link in arm.link_in_joint)
+    q, dq, ddq = arm.states(1000, seed=23)
+    y, data = serial.regressor(serial_chain(arm.robot), q, dq, ddq), arm.model.createData()
+    ours_in_theirs = np.array([0, 1, 2, 3, 4, 6, 9, 5, 7, 8])  # theirs: m, h, xx, xy, yy, xz, yz, zz
+    sign = np.array([1, 1, 1, 1, 1, 1, 1, -1, -1, -1])  # ours: products positive
+    order = np.concatenate([10 * i + ours_in_theirs for i in range(arm.n)])
+    theirs = np.array([pin.computeJointTorqueRegressor(arm.model, data, p, dq[k], ddq[k])[:, order]
+                       for k, p in enumerate(arm.offset(q))]) * np.tile(sign, arm.n)
+    assert np.abs(y - theirs).max() <= BAR * np.abs(theirs).max()
+
+
+def test_mass_matrix_equals_pinocchio(arm: Arm) -> None:
+    """D(q) is Pinocchio's, symmetric and positive definite, on 100 random postures."""
+    phi = physical_links(arm.n, np.random.default_rng(24))
+    arm.load(phi)
+    q, _, _ = arm.states(100, seed=25)
+    ours, data = serial.mass_matrix(serial_chain(arm.robot), q, phi), arm.model.createData()
+    for k, posture in enumerate(arm.offset(q)):
+        theirs = np.triu(pin.crba(arm.model, data, posture))
+        theirs = theirs + np.triu(theirs, 1).T
+        np.testing.assert_allclose(ours[k], theirs, atol=1e-12 * np.abs(theirs).max())
+        assert np.linalg.eigvalsh(ours[k]).min() > 0.0
+
+
+def test_coriolis_torque_has_the_power_of_the_changing_mass_matrix(arm: Arm) -> None:
+    """dqᵀ c = ½ dqᵀ Ḋ dq: inertia forces only move kinetic energy around. Ḋ by differences along the motion."""
+    phi = physical_links(arm.n, np.random.default_rng(26))
+    q, dq, _ = arm.states(50, seed=27)
+    chain, h = serial_chain(arm.robot), 1e-3
+    c = serial.inverse_dynamics(chain, q, dq, np.zeros_like(q), phi, gravity=np.zeros(3))
+    energies = [np.einsum("si,sij,sj->s", dq, serial.mass_matrix(chain, q + k * h * dq, phi), dq)
+                for k in (-2, -1, 1, 2)]
+    rate = (energies[0] - 8.0 * energies[1] + 8.0 * energies[2] - energies[3]) / (12.0 * h)
+    np.testing.assert_allclose((dq * c).sum(axis=1), 0.5 * rate, atol=1e-7 * np.abs(rate).max())
+
+
+def test_acceleration_torque_is_the_mass_matrix(arm: Arm) -> None:
+    """At rest and without weight τ = D q̈, the recursion and the sum over links agreeing."""
+    phi = physical_links(arm.n, np.random.default_rng(28))
+    q, _, ddq = arm.states(200, seed=29)
+    chain = serial_chain(arm.robot)
+    tau = serial.inverse_dynamics(chain, q, np.zeros_like(q), ddq, phi, gravity=np.zeros(3))
+    d = serial.mass_matrix(chain, q, phi)
+    np.testing.assert_allclose(np.einsum("sij,sj->si", d, ddq), tau, atol=1e-12 * np.abs(tau).max())
+
+
+def test_a_joint_does_not_feel_the_links_before_it(arm: Arm) -> None:
+    """The regressor is block upper triangular."""
+    y = serial.regressor(serial_chain(arm.robot), *arm.states(10, seed=30))
+    for j in range(1, arm.n):
+        assert not y[:, j, :10 * j].any()
+
+
+def test_memory_given_is_written_all_over(arm: Arm) -> None:
+    """Whatever stood in `out` before, afterwards it is the regressor."""
+    chain = serial_chain(arm.robot)
+    motion, columns = arm.states(50, seed=33), [k for k in range(10 * arm.n) if k % 3]
+    out = np.full((arm.n, len(columns), 50), np.nan)
+    y = serial.regressor(chain, *motion, columns, out=out)
+    assert np.shares_memory(y, out)
+    np.testing.assert_array_equal(y, serial.regressor(chain, *motion, columns))
+
+
+@pytest.mark.parametrize("columns", [[3, 2], [1, 1], [-1], [30]])
+def test_columns_that_do_not_exist_or_are_out_of_order_are_refused(columns: list[int]) -> None:
+    """A wrong choice of columns is an error, never another column."""
+    with pytest.raises(ValueError, match="increasing"):
+        serial.regressor(serial_chain(load_robot("rrr")), *np.zeros((3, 2, 3)), columns)

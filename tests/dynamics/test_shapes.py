@@ -1,0 +1,56 @@
+"""Whoever computes with a body from Python and hands over the wrong shape is told the right one, by every body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipelines.dynamics.base_parameters import BaseArm
+from pipelines.dynamics.body import Array, RigidBody
+from pipelines.dynamics.rrr import RRR
+from pipelines.dynamics.rrr_kinematics import inverse
+from pipelines.io.robot_files import load_robot
+
+ROBOT = load_robot("rrr")
+SIX = replace(ROBOT, name="six", joints=ROBOT.joints + ROBOT.joints)
+BODIES = {"closed form": RRR(ROBOT), "recursion": BaseArm(ROBOT), "six joints": BaseArm(SIX)}
+METHODS: dict[str, Callable[[RigidBody, Array, Array], object]] = {
+    "regressor": lambda body, q, p: body.regressor(q, q, q),
+    "torque": lambda body, q, p: body.torque(q, q, q, p),
+    "torque_parts": lambda body, q, p: body.torque_parts(q, q, q, p),
+    "mass_matrix": lambda body, q, p: body.mass_matrix(q, p),
+    "tip": lambda body, q, p: body.tip(q),
+}
+
+
+@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
+@pytest.mark.parametrize("method", METHODS.values(), ids=METHODS)
+def test_wrong_shapes_are_told_the_right_one(body: RigidBody, method: Callable[..., object]) -> None:
+    """One posture as a vector, transposed samples, too many joints: a ValueError, never a number, never a TypeError."""
+    n, p = body.robot.n_joints, np.zeros(len(body.parameters))
+    method(body, np.zeros((5, n)), p)
+    for wrong in (np.zeros(n), np.zeros((n, 5)), np.zeros((5, n + 1)), np.zeros((2, 5, n)), np.zeros(())):
+        with pytest.raises(ValueError, match=rf"q has the shape \(.*\), wanted is \(samples, {n}\)"):
+            method(body, wrong, p)
+
+
+@pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
+def test_a_wrong_parameter_vector_and_unequal_samples(body: RigidBody) -> None:
+    """A vector of another arm, or speeds of another log, is not spread over the samples by broadcasting."""
+    n, count = body.robot.n_joints, len(body.parameters)
+    q = np.zeros((5, n))
+    for wrong in (np.zeros(count - 1), np.zeros((count, 1)), np.zeros(())):
+        for method in ("torque", "torque_parts", "mass_matrix"):
+            with pytest.raises(ValueError, match=rf"p has the shape .*, wanted is \({count},\)"):
+                METHODS[method](body, q, wrong)
+    with pytest.raises(ValueError, match=rf"dq has the shape \(1, {n}\), wanted is \(5, {n}\)"):
+        body.torque(q, q[:1], q, np.zeros(count))
+
+
+def test_a_tip_is_three_numbers() -> None:
+    """The inverse kinematics as well: one tip is (1, 3)."""
+    with pytest.raises(ValueError, match=r"tips has the shape \(3,\), wanted is \(samples, 3\)"):
+        inverse(RRR(ROBOT).geometry, np.zeros(3))
