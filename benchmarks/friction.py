@@ -22,12 +22,12 @@ import statistics
 
 import numpy as np
 
-from pipelines.model.friction.ekf import joint_step
-from pipelines.model.friction.fit import LawFit
-from pipelines.model.friction.laws import OneJoint, law_named
-from pipelines.model.friction.refine import fit_driven_alone
+from pipelines.friction.ekf import joint_step
+from pipelines.friction.fit import LawFit
+from pipelines.friction.laws import OneJoint, law_named
+from pipelines.friction.refine import fit_driven_alone
 from pipelines.signal.kalman import ExtendedTextbook
-from tests.model.friction.one_joint import (
+from tests.friction.one_joint import (
     ENCODER,
     INERTIA,
     JOINT,

@@ -25,11 +25,11 @@ from benchmarks.hidden_effects.table import wilson
 from pipelines import fit_friction
 from pipelines.errors import RrridError
 from pipelines.fit_friction import Settings
+from pipelines.friction.result import JointResult
 from pipelines.io.files import Opened
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.friction.result import JointResult
 from pipelines.stage import Inputs
-from tests.model.friction.closed_loop import KINDS, Machine, draw, logs_of
+from tests.friction.closed_loop import KINDS, Machine, draw, logs_of
 
 _PLACES = (0.25, 0.5, 0.9)  # of the fastest speed of the fit
 

@@ -1,7 +1,8 @@
 """Fit the friction law of each joint, and choose it.
 
-Reads    "friction" logs of role "identify", each of one joint driven alone; those of role "validate" judge; "hold" logs;
-         without them "excitation" and "free" logs: friction then is fitted with the base parameters
+Reads    "friction" logs of role "identify", each of one joint driven alone; those of role
+         "validate" judge; "hold" logs; without them "excitation" and "free" logs: friction then is
+         fitted with the base parameters
 Writes   result.json, result.h5, model.json with the friction, logs/ with its torque, report.html
 Source   Kostić et al. 2004, Section IV.B, eq. (10)-(11), Table III, Figs. 5 and 6
 """
@@ -16,19 +17,12 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array
-from pipelines.dynamics.parameter import Parameter
+from pipelines.dynamics.parameter import Origin, Parameter
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
-from pipelines.io.files import write_log
-from pipelines.io.log import ExperimentLog, derive, digest_of, recording
-from pipelines.io.model_file import ModelFile, Source, read_model, write_model
-from pipelines.io.option import option
-from pipelines.io.results import encode
-from pipelines.model.estimation.logs import Recipe
-from pipelines.model.estimation.nominal import fitted_arm
-from pipelines.model.estimation.outcome import validity
-from pipelines.model.friction.findings import log_findings, misfits, nuisance_findings
-from pipelines.model.friction.joint import (
+from pipelines.friction.config import FolderConfig
+from pipelines.friction.findings import log_findings, misfits, nuisance_findings
+from pipelines.friction.joint import (
     METHODS,
     JointFit,
     JointLogs,
@@ -37,10 +31,17 @@ from pipelines.model.friction.joint import (
     fit_joint,
     friction_of,
 )
-from pipelines.model.friction.laws import LADDER, Law, law_named
-from pipelines.model.friction.output_error import refuse_unpolished
-from pipelines.model.friction.result import Result, joint_result, several_results
-from pipelines.model.friction.several import fit_several
+from pipelines.friction.laws import LADDER, Law, law_named
+from pipelines.friction.result import Result, joint_result, several_results
+from pipelines.friction.several import fit_several
+from pipelines.io.files import write_log
+from pipelines.io.log import ExperimentLog, derive, digest_of, recording
+from pipelines.io.model_file import ModelFile, Source, read_model, write_model
+from pipelines.io.option import option
+from pipelines.io.results import encode
+from pipelines.model.estimation.logs import Recipe
+from pipelines.model.estimation.nominal import fitted_arm
+from pipelines.model.estimation.outcome import validity
 from pipelines.model.motion import reconstruct
 from pipelines.model.tuned import Reconstruction
 from pipelines.quality.checks import Subject, accepted
@@ -51,15 +52,20 @@ from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
 __all__ = ["STAGE", "Result", "Settings", "compute", "report"]
 
 
+MOVING = ("excitation", "free")  # experiments in which all joints move
+WINDOWS = (1e-3, 1.0)  # numerics: [s] shortest and longest window of the equations
+
+
 @dataclass(frozen=True)
 class Settings:
     """Law, method and windows of the fit."""
 
-    law: str | None = option(None, "Law to fit, as the report names it. [the simplest that is not worse]")
-    method: str = option("varpro", "varpro, output-error, or ekf (Kostić et al. 2004).")
-    window: float = option(0.02, "Windows of the equations [s], the shortest.")
+    law: str | None = option(
+        None, "Law to fit, as the report names it. [the simplest that is not worse]")
+    method: str = option("varpro", "varpro, or ekf (Kostić et al. 2004).")
+    window: float = option(FolderConfig.window, "Windows of the equations [s], the shortest.")
     order: int = Reconstruction.order  # of the smoother that motion begins with
-    together: bool = True  # where no joint was driven alone: friction with the base parameters, from logs in which all move
+    together: bool = True  # where no joint was driven alone: friction with the base parameters
 
 
 def compute(inputs: Inputs, settings: Settings) -> Result:
@@ -68,154 +74,183 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     Raises:
         NothingMatched: C06, no friction log to fit.
         UsageError: C02, settings that do not fit.
-        InputRejected: the doctor rejects a log: its first reason; T08, too few windows are left.
+        InputRejected: a check rejects a log: its first reason; T08, too few windows are left.
     """
     law = _law(settings)
     measured = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
     logs = [log for log in measured if log.experiment in ("friction", "hold")]
+    moving = [log for log in measured if log.experiment in MOVING]
     identify = [log for log in logs if log.role == "identify" and log.experiment == "friction"]
-    together = [log for log in measured if log.role == "identify" and log.experiment in ("excitation", "free")]
+    together = any(log.role == "identify" for log in moving)
     if not identify and together and settings.together:
-        return _together(together, [log for log in measured if log.role == "validate" and log.experiment in ("excitation", "free")],
-                         settings, law, inputs.label)
+        return _together(moving, settings, law, inputs.label)
     if not identify:
-        kinds = ", ".join(sorted({f"{o.log.experiment} ({o.log.role})" for o in inputs.logs})) or "none"
-        raise NothingMatched("C06", f"no friction log of role identify; there are: {kinds}", where=inputs.label,
-                             remedy="drive each joint alone, the others held, and record it as experiment 'friction'" + (
-                                 "; fit-friction by itself also takes logs in which all move" if together else ""))
+        kinds = sorted({f"{one.log.experiment} ({one.log.role})" for one in inputs.logs})
+        there = ", ".join(kinds) or "none"
+        also = "; fit-friction by itself also takes logs in which all move" if together else ""
+        raise NothingMatched(
+            "C06", f"no friction log of role identify; there are: {there}", where=inputs.label,
+            remedy="drive each joint alone, the others held, and record it as "
+            f"experiment 'friction'{also}")
     used = [log for log in logs if log.experiment == "hold" or log.role in ("identify", "validate")]
-    seen, said = _examined(used, Reconstruction(order=settings.order))
-    joints = [by_method(fit_joint(part, settings.window, law), settings.method) for part in _by_joint(seen)]
+    seen, checks = _examined(used, Reconstruction(order=settings.order))
+    joints = [by_method(fit_joint(part, settings.window, law), settings.method)
+              for part in _by_joint(seen)]
     robot = identify[0].robot
-    results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method) for joint in joints)
-    found = (*(check for joint in joints for check in log_findings(joint)),
-             *(check for pair in zip(joints, results, strict=True) for check in nuisance_findings(*pair)),
-             *misfits(results, inputs.label))
+    results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method)
+                    for joint in joints)
+    checks += [check for joint in joints for check in log_findings(joint)]
+    for joint, result in zip(joints, results, strict=True):
+        checks += nuisance_findings(joint, result)
+    checks += misfits(results, inputs.label)
     arm = _arm(identify[0], joints)
     notes = ["friction fitted by rrrid fit-friction, joint by joint"]
     if arm.body.known_parameters() is None:
-        notes.append("base parameters were not fitted and are not known: zero stands for them; rrrid estimate-bps finds them")
-    model = _model(arm, tuple(pair for joint in joints for pair in joint.logs.identify), *notes)
-    return Result(identify[0].robot_name, results, "one joint at a time", (*said, *found), model=model,
-                  derived=tuple(_derived(pair, joint, arm, settings) for joint in joints
-                                for pair in (*joint.logs.identify, *joint.logs.validate)))
+        notes.append("base parameters were not fitted and are not known: zero stands for them; "
+                     "rrrid estimate-bps finds them")
+    model = _model(arm, [pair for joint in joints for pair in joint.logs.identify], *notes)
+    derived = tuple(_derived(pair, joint, arm, settings) for joint in joints
+                    for pair in (*joint.logs.identify, *joint.logs.validate))
+    return Result(identify[0].robot_name, results, "one joint at a time", tuple(checks),
+                  model=model, derived=derived)
 
 
-def _together(identify: list[ExperimentLog], validate: list[ExperimentLog], settings: Settings, law: Law | None,
+def _together(logs: list[ExperimentLog], settings: Settings, law: Law | None,
               label: str) -> Result:
     """Fit friction with the base parameters, from logs in which all joints move."""
     how = Reconstruction(order=settings.order)
     if settings.method != "varpro":
-        raise UsageError("C02", f"'{settings.method}' needs joints that were driven alone", where="--method", remedy="take varpro")
+        raise UsageError("C02", f"'{settings.method}' needs joints that were driven alone",
+                         where="--method", remedy="take varpro")
     if law is not None and (law.sees_load or not law.pointwise):
-        raise UsageError("C02", f"{law.name} cannot be fitted while all joints move", where="--law",
-                         remedy="drive each joint alone, or choose a law of speed and position")
-    (seen, said), (others, said_too) = _examined(identify, how), _examined(validate, how)
+        raise UsageError("C02", f"{law.name} cannot be fitted while all joints move",
+                         where="--law", remedy="drive each joint alone, or choose a law of speed "
+                         "and position")
+    seen, checks = _examined([log for log in logs if log.role == "identify"], how)
+    others, more = _examined([log for log in logs if log.role == "validate"], how)
     found = fit_several(tuple(seen), tuple(others), Recipe(how), law)
-    arm = fitted_arm(found.fitted.estimate, identify[0].robot_name)
-    model = _model(arm, tuple(seen), "friction and base parameters fitted together by rrrid fit-friction")
-    derived = tuple(_with_friction(pair, arm.friction_torque(pair[1].motion), settings) for pair in (*seen, *others))
+    name = seen[0][0].robot_name
+    arm = fitted_arm(found.fitted.estimate, name)
+    model = _model(arm, seen, "friction and base parameters fitted together by rrrid fit-friction")
+    derived = tuple(_with_friction(pair, arm.friction_torque(pair[1].motion), settings)
+                    for pair in (*seen, *others))
     results = several_results(found, arm, tuple(others))
-    return Result(identify[0].robot_name, results, "all joints at once", (*said, *said_too, *misfits(results, label)),
+    return Result(name, results, "all joints at once", (*checks, *more, *misfits(results, label)),
                   model=model, derived=derived)
 
 
 def _law(settings: Settings) -> Law | None:
+    """Return the law to fit; None: choose one."""
     if settings.method not in METHODS:
-        raise UsageError("C02", f"'{settings.method}' is no method", where="--method", remedy=f"one of {', '.join(METHODS)}")
-    if not 1e-3 <= settings.window <= 1.0:
-        raise UsageError("C02", f"windows of {settings.window:g} s", where="--window", remedy="give 0.001 to 1 s")
+        raise UsageError("C02", f"'{settings.method}' is no method", where="--method",
+                         remedy=f"one of {', '.join(METHODS)}")
+    shortest, longest = WINDOWS
+    if not shortest <= settings.window <= longest:
+        raise UsageError("C02", f"windows of {settings.window:g} s", where="--window",
+                         remedy=f"give {shortest:g} to {longest:g} s")
     if settings.law is None:
         return None
-    names = [law.name for law in LADDER]
-    parts = settings.law.split("+")
     known = [name for law in LADDER for name in (law.name, *law.members)]
-    if unknown := [part for part in parts if part not in known]:
-        raise UsageError("C02", f"'{unknown[0]}' is no friction law{did_you_mean(unknown[0], known)}", where="--law",
-                         remedy=f"one of {', '.join(names)}, or several joined by +")
-    law = law_named(settings.law)
-    if settings.method == "output-error":
-        refuse_unpolished(law)
-    return law
+    if unknown := [part for part in settings.law.split("+") if part not in known]:
+        near = did_you_mean(unknown[0], known)
+        raise UsageError("C02", f"'{unknown[0]}' is no friction law{near}", where="--law",
+                         remedy=f"one of {', '.join(law.name for law in LADDER)}, or several "
+                         "joined by +")
+    return law_named(settings.law)
 
 
-def _examined(logs: Sequence[ExperimentLog], how: Reconstruction) -> tuple[list[Seen], tuple[Check, ...]]:
+def _examined(logs: Sequence[ExperimentLog],
+              how: Reconstruction) -> tuple[list[Seen], list[Check]]:
     """Return the motion of every log, and the findings of its quality checks."""
-    seen, said = [], []
+    seen, checks = [], list[Check]()
     for log in logs:
         subject = Subject(recording(log))
-        checks = accepted(subject)
+        checks += accepted(subject)
         seen.append((log, reconstruct(log, how, subject.good)))
-        said += checks
-    return seen, tuple(said)
+    return seen, checks
 
 
 def _by_joint(seen: Sequence[Seen]) -> list[JointLogs]:
     hold = tuple(pair for pair in seen if pair[0].experiment == "hold")
-    alone = [pair for pair in seen if pair[0].experiment == "friction"]
-    joints = sorted({log.joint for log, _ in alone if log.joint is not None and log.role == "identify"})
-    return [JointLogs(joint, tuple(pair for pair in alone if (pair[0].joint, pair[0].role) == (joint, "identify")),
-                      tuple(pair for pair in alone if (pair[0].joint, pair[0].role) == (joint, "validate")), hold)
-            for joint in joints]
+    parts: dict[tuple[int, str], list[Seen]] = {}
+    for pair in seen:
+        if pair[0].experiment == "friction" and pair[0].joint is not None:
+            parts.setdefault((pair[0].joint, pair[0].role), []).append(pair)
+    return [JointLogs(joint, tuple(own), tuple(parts.get((joint, "validate"), ())), hold)
+            for (joint, role), own in sorted(parts.items()) if role == "identify"]
 
 
 def _arm(log: ExperimentLog, joints: Sequence[JointFit]) -> Arm:
-    """Return the arm with this friction and the base parameters of the described links; unknown ones are zero and marked."""
+    """Return the arm with this friction and the described links; unknown numbers are marked."""
     body = rigid_body(log.robot)
     known = body.known_parameters()
-    base = tuple(Parameter(p.name, 0.0 if known is None else float(known[i]), None, p.unit,
-                           origin="assumed" if known is None else "known", visible=known is not None)
-                 for i, p in enumerate(body.parameters))
+    values = np.zeros(len(body.parameters)) if known is None else known
+    origin: Origin = "assumed" if known is None else "known"
+    base = tuple(Parameter(p.name, float(value), None, p.unit, origin=origin,
+                           visible=known is not None)
+                 for p, value in zip(body.parameters, values, strict=True))
     friction, at_rest = friction_of(joints, log.robot)
     return Arm(log.robot_name, body, base, friction, at_rest)
 
 
-def _model(arm: Arm, motions: tuple[Seen, ...], *notes: str) -> ModelFile:
+def _model(arm: Arm, motions: Sequence[Seen], *notes: str) -> ModelFile:
     """Return the model of `arm`, which was fitted to `motions`."""
-    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role) for log, _ in motions)
-    return arm.to_model(validity=validity(motions), sources=sources, notes=notes)
+    sources = tuple(Source(log.name, digest_of(recording(log)), log.experiment, log.role)
+                    for log, _ in motions)
+    return arm.to_model(validity=validity(tuple(motions)), sources=sources, notes=notes)
 
 
-def _derived(pair: Seen, joint: JointFit, arm: Arm, settings: Settings) -> tuple[str, ExperimentLog]:
+def _derived(pair: Seen, joint: JointFit, arm: Arm,
+             settings: Settings) -> tuple[str, ExperimentLog]:
     friction = arm.friction_torque(pair[1].motion)
     only = np.zeros_like(friction)  # of the joint that was driven: at rest eq. (10) has none
     only[:, joint.logs.joint - 1] = friction[:, joint.logs.joint - 1]
     return _with_friction(pair, only, settings)
 
 
-def _with_friction(pair: Seen, friction: Array, settings: Settings) -> tuple[str, ExperimentLog]:
+def _with_friction(pair: Seen, friction: Array,
+                   settings: Settings) -> tuple[str, ExperimentLog]:
     log, motion = pair
     how = Reconstruction(order=settings.order)
     with_motion = derive(log, "reconstruct", how.as_settings(), motion.signals())
-    return slug(log.name), derive(with_motion, "fit-friction", encode(settings)[0], {"tau_friction_model": friction})
+    signals = {"tau_friction_model": friction}
+    return slug(log.name), derive(with_motion, "fit-friction", encode(settings)[0], signals)
 
 
 def write(result: Result, folder: Path, request: Request) -> None:
-    """model.json, and every log with the torque of friction."""
+    """Write model.json, and every log with the torque of friction."""
     write_model(folder / "model.json", result.model)
     for name, log in result.derived:
         write_log(folder / f"logs/{name}.{request.format}", log)
 
 
 def report(result: Result) -> Report:
-    """The verdict, Table III, Figs. 5 and 6, the curve with its band, the candidate laws."""
+    """Report Table III, Figs. 5 and 6, the curve with its band, the candidate laws."""
     return friction_report(result)
 
 
 def _onward(result: Result, inputs: Inputs) -> Inputs:
-    """Later stages take the friction as known where every joint has its law."""
+    """Hand the friction to later stages as known, where every joint has its law."""
     arm = Arm.from_model(result.model)
     whole = result.source == "one joint at a time" and len(result.joints) == arm.n_joints
     return replace(inputs, material=arm) if whole else inputs
 
 
 def _reads(log: ExperimentLog, settings: Settings) -> bool:
-    return log.experiment in ("friction", "hold") or (settings.together and log.experiment in ("excitation", "free"))
+    moving = settings.together and log.experiment in MOVING
+    return log.experiment in ("friction", "hold") or moving
 
 
-STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report, read_logs, write,
-              lambda result, check: int(check and any(found.gate for found in result.checks)),
-              lambda result: result.checks, _onward,
-              # estimate-bps fits Coulomb and viscous friction itself: half a minute of choosing laws would not be handed on
+def _exit_code(result: Result, check: bool) -> int:
+    return int(check and any(found.gate for found in result.checks))
+
+
+def _restored(result: Result, folder: Path) -> Result:
+    return replace(result, model=read_model(folder / "model.json"))
+
+
+STAGE = Stage("fit-friction", "Fit the friction law of each joint", Settings, compute, report,
+              read_logs, write, _exit_code, lambda result: result.checks, _onward,
+              # estimate-bps fits Coulomb and viscous friction itself
               in_run=Settings(together=False), hands_on="material", uses=Uses(_reads),
-              restored=lambda result, folder: replace(result, model=read_model(folder / "model.json")), sessions="one")
+              restored=_restored, sessions="one")

@@ -34,10 +34,10 @@ from pipelines.diagnosis.result import (
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
 from pipelines.fit.joint_table import Array
+from pipelines.friction.laws import LADDER
 from pipelines.model.effects import all_effects
 from pipelines.model.effects.base import Effect, Quantity
 from pipelines.model.effects.kinds import FrictionLaw
-from pipelines.model.friction.laws import LADDER
 
 __all__ = ["Limits", "limits_of", "without_limit"]
 

@@ -43,7 +43,6 @@ CODES: Final[dict[str, str]] = {
     "D18": "torque without its compensation",
     "D19": "the model misses held-out torque",
     "D20": "feed-forward does not help",
-    "D21": "torque that depends on the angle alone",
     "D26": "friction that changes in time",
     "F01": "empty file",
     "F02": "truncated or damaged file",

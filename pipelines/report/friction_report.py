@@ -8,19 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pipelines.friction.config import BreakAwayConfig, FindingsConfig
+from pipelines.friction.findings import drift_in_words
+from pipelines.friction.fit import Value
+from pipelines.friction.laws import law_named
+from pipelines.friction.result import JointResult, Result, Series
 from pipelines.model.effects import find_effect
-from pipelines.model.friction.breakaway import BreakAwayConfig
-from pipelines.model.friction.findings import (
-    NAMED,
-    FindingsConfig,
-    depends_in_words,
-    drift_in_words,
-    inertia_in_words,
-)
-from pipelines.model.friction.fit import Value
-from pipelines.model.friction.laws import law_named
-from pipelines.model.friction.result import JointResult, Result, Series
-from pipelines.model.friction.ripple import Along
 from pipelines.model.words import plain_number
 from pipelines.report import style
 from pipelines.report.figures import (
@@ -28,8 +21,6 @@ from pipelines.report.figures import (
     draw_measured,
     draw_modelled,
     envelope,
-    legend_above,
-    one_figure,
     rows_figure,
 )
 from pipelines.report.report import Cell, Figure, Report, Section, Table, Tone
@@ -91,7 +82,7 @@ def _well(joint: JointResult) -> bool:
 def _tone(result: Result) -> Tone:
     if any(check.gate for check in result.checks):
         return "bad"
-    sure = all(_well(joint) and not (joint.unseen or joint.ripple) for joint in result.joints)
+    sure = all(_well(joint) and not joint.unseen for joint in result.joints)
     return "good" if sure else "attention"
 
 
@@ -111,9 +102,7 @@ def _verdict(result: Result) -> str:
                 "unit": _units(joint)[1],
             }
         )
-    remarks = [ripple_in_words(j) for j in result.joints] + [
-        drift_in_words(j) for j in result.joints
-    ]
+    remarks = [drift_in_words(joint) for joint in result.joints]
     return _say(
         "verdict",
         gates=[check.message for check in result.checks if check.gate],
@@ -201,7 +190,6 @@ def _joint_sections(joint: JointResult) -> list[Section]:
     text = _paragraphs("joint", joint, speed, drift, _sticking(joint), never, how.rest, how.within)
     sections = [
         Section(f"{name}: friction", text, _tables(joint), (_curve_figure(joint),)),
-        *_ripple_section(joint),
     ]
     if joint.validation.by:
         figures = (_simulation_figure(joint), _fraction_figure(joint))
@@ -209,24 +197,6 @@ def _joint_sections(joint: JointResult) -> list[Section]:
         sections.append(Section(f"{name}: simulation", said, figures=figures))
     choice = Section(f"{name}: choice of the law", _choice_words(joint), (_candidates(joint),))
     return [*sections, choice]
-
-
-def ripple_in_words(joint: JointResult) -> str:
-    """Return the size of a ripple, and why it is no friction; empty where there is none."""
-    depends = "" if joint.ripple is None else depends_in_words(joint, joint.ripple)
-    return _say("ripple", joint.name, joint.ripple, depends)
-
-
-def _ripple_section(joint: JointResult) -> list[Section]:
-    """Its size, what it does to the inertia, what to do, and the torque by angle."""
-    ripple = joint.ripple
-    if ripple is None:
-        return []
-    place = "angle" if joint.revolute else "position"
-    inertia = inertia_in_words(joint, ripple, lambda v: f"{_std(v)} {format_unit(v.unit)}")
-    text = _paragraphs("ripple_section", ripple_in_words(joint), ripple.share, inertia, NAMED)
-    figure = _ripple_figure(joint, ripple.along, place)
-    return [Section(f"{joint.name}: a torque of the {place}", text, figures=(figure,))]
 
 
 def _sticking(joint: JointResult) -> dict[str, str] | None:
@@ -377,20 +347,3 @@ def _simulation_figure(joint: JointResult) -> Figure:
 
     what = "measured and simulated motion. Gravity is compensated at the measured position."
     return Figure(f"simulation-{joint.joint}", f"{joint.name}: {what}", draw, (6.0, 4.0))
-
-
-def _ripple_figure(joint: JointResult, along: Along, place: str) -> Figure:
-    """Residual of the law against the angle: forth, back, and the fitted waves."""
-
-    def draw(axis: Axes) -> None:
-        axis.plot(along.angle, along.forth, ".", ms=3.5, color=style.VERMILLION, label="forth")
-        axis.plot(along.angle, along.back, ".", ms=3.5, color=style.GREEN, label="back")
-        axis.plot(along.angle, along.waves, color=style.BLUE, linewidth=1.0, label="fitted waves")
-        axis.set_xlabel("angle [rad]" if joint.revolute else "position [m]")
-        axis.set_ylabel("torque left [N m]" if joint.revolute else "force left [N]")
-        axis.margins(x=0.01)
-        legend_above(axis, 3)
-
-    what = f"what friction and inertia leave, by the {place} of the joint"
-    caption = f"{joint.name}: {what}: the same forth and back, as no friction is."
-    return one_figure(f"ripple-{joint.joint}", caption, draw, 3.0)

@@ -17,14 +17,14 @@ import pytest
 
 from pipelines import fit_friction
 from pipelines.fit_friction import Settings
+from pipelines.friction.findings import misfits
+from pipelines.friction.fit import Value
+from pipelines.friction.result import JointResult, Result
 from pipelines.io.files import Opened
 from pipelines.io.log import ExperimentLog
-from pipelines.model.friction.findings import misfits
-from pipelines.model.friction.fit import Value
-from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs
 from tests.cli.commands import rrrid
-from tests.model.friction.closed_loop import draw, logs_of
+from tests.friction.closed_loop import draw, logs_of
 
 
 def fitted(shared: Path, folder: Path, case: str) -> dict[str, Any]:

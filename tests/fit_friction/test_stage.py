@@ -13,15 +13,14 @@ from pipelines import fit_friction
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, NothingMatched, UsageError
 from pipelines.fit_friction import Settings
+from pipelines.friction.result import JointResult, Result
 from pipelines.io.files import Opened, open_log, write_log
 from pipelines.io.log import Controller, ExperimentLog, Signal
 from pipelines.io.model_file import read_model
 from pipelines.io.robot import format_robot
-from pipelines.model.friction.result import JointResult, Result
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from tests.cli.commands import rrrid
-from tests.healthy import begun
-from tests.model.friction.one_joint import (
+from tests.friction.one_joint import (
     COSINE,
     INERTIA,
     JOINT,
@@ -33,6 +32,7 @@ from tests.model.friction.one_joint import (
     recorded,
     relative,
 )
+from tests.healthy import begun
 
 QUICK = Settings(law="coulomb+viscous")
 
@@ -130,9 +130,9 @@ def test_the_derived_log_holds_the_friction(outcome: Outcome[Result]) -> None:
     assert relative(friction[:, 2], TRUTHS["three_sigmoid"].curve(log["dq_hat"][:, 2])) < 0.01
 
 
-@pytest.mark.parametrize("method", ["ekf", "output-error"])
+@pytest.mark.parametrize("method", ["ekf"])
 def test_other_methods(method: str) -> None:
-    """Beside variable projection, that of `outcome`, each gives inertia to 1 % and the curve to 1.2 % on a log of its own."""
+    """Beside variable projection, that of `outcome`, the filter gives inertia to 1 % and the curve to 1.2 % on a log of its own."""
     (joint,) = computed(recorded("three_sigmoid", 5, duration=10.0), settings=Settings(law="three_sigmoid", method=method)).joints
     assert joint.method == method
     assert joint.inertia.value == pytest.approx(INERTIA, rel=0.01)
@@ -225,8 +225,7 @@ def test_no_log_to_fit(good: ExperimentLog) -> None:
     assert refused.value.exit_code == 5
 
 
-@pytest.mark.parametrize("settings", [{"law": "stribek"}, {"method": "guess"}, {"window": 0.0}, {"window": 10.0},
-                                      {"law": "load_friction", "method": "output-error"}])
+@pytest.mark.parametrize("settings", [{"law": "stribek"}, {"method": "guess"}, {"window": 0.0}, {"window": 10.0}])
 def test_settings_have_bounds(settings: dict[str, object], good: ExperimentLog) -> None:
     with pytest.raises(UsageError) as refused:
         computed(good, settings=replace(QUICK, **settings))  # type: ignore[arg-type]

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from pipelines import fit_friction
+from pipelines.friction.result import CandidateLaw, Result
 from pipelines.io.files import open_log
-from pipelines.model.friction.result import CandidateLaw, Result
 from pipelines.stage import Inputs
 
 

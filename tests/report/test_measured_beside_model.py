@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipelines.model.friction.result import Series
+from pipelines.friction.result import Series
 from pipelines.model.rows.residual_analysis import Evidence
 from pipelines.report import style
 from pipelines.report.diagnosis_picture import residual_figures

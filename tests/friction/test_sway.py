@@ -7,7 +7,7 @@ import pytest
 
 from bench.draw import paper_machine
 from bench.dynamics import RigidDynamics
-from pipelines.model.friction.weak_form import Sway, sway_columns
+from pipelines.friction.weak_form import Sway, sway_columns
 
 HELD = np.array([0.4, -1.1, 0.7])  # [rad]
 

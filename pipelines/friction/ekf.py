@@ -17,20 +17,19 @@ import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.errors import UsageError
-from pipelines.model.friction.fit import LawEquations, LawFit, fit_law
-from pipelines.model.friction.laws import OneJoint, law_named
-from pipelines.model.friction.weak_form import Stretch
+from pipelines.friction.config import EkfConfig
+from pipelines.friction.fit import LawEquations, LawFit, fit_law
+from pipelines.friction.laws import OneJoint, law_named
+from pipelines.friction.weak_form import Stretch
 from pipelines.signal.extended import Advance, Extended, filter_extended
 
 __all__ = ["EKF_NAMES", "EkfStart", "filtered", "joint_step", "run_ekf"]
 
 EKF_NAMES = ("q", "dq", "1/J", "c", "f1", "f2", "f3", "w1", "w2", "w3", "b", "c'")
 
-_PARTS = 2  # midpoint steps a sample
-_PASSES = 2
-_SHARES = np.array([0.3, 0.8, -0.1])  # of Coulomb friction, sigmoids that the filter begins with,
-_SHARP = np.array([100.0, 40.0, 10.0])  # [s/rad] and their sharpness
-_UNSURE = 0.5  # of Coulomb friction, and of each sharpness
+CONSTANT = 11  # numerics: place of c', where the filter has it
+_CONFIG = EkfConfig()
+_SHARES, _SHARP = np.array(_CONFIG.shares), np.array(_CONFIG.sharp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,13 +44,13 @@ class EkfStart:
 
 def joint_step(step: float) -> Advance:
     """Return one sample of eq. (11) and (10) by midpoint steps, with its derivatives."""
-    h = step / _PARTS
+    h = step / _CONFIG.parts
 
     def acceleration(x: list[float], q: float, v: float,
                      u: float) -> tuple[float, float, float, list[float]]:
         """Return a, ∂a/∂q, ∂a/∂v, and ∂a/∂ of the constants."""
         theta, c, f1, f2, f3, w1, w2, w3, b = x[2:11]
-        d = x[11] if len(x) > 11 else 0.0
+        d = x[CONSTANT] if len(x) > CONSTANT else 0.0
         s, o = math.sin(q), math.cos(q)
         t1, t2, t3 = math.tanh(w1 * v), math.tanh(w2 * v), math.tanh(w3 * v)
         e1, e2, e3 = 1.0 - t1 * t1, 1.0 - t2 * t2, 1.0 - t3 * t3
@@ -65,7 +64,7 @@ def joint_step(step: float) -> Advance:
         values = x.tolist()
         q, v = values[:2]
         (dq, dv), change = np.eye(2, len(x)), np.zeros(len(x))
-        for _ in range(_PARTS):
+        for _ in range(_CONFIG.parts):
             a, aq, av, change[2:] = acceleration(values, q, v, u)
             q_mid, v_mid = q + 0.5 * h * v, v + 0.5 * h * a
             dq_mid = dq + (0.5 * h) * dv
@@ -113,7 +112,7 @@ def filtered(stretches: Sequence[Stretch], joint: OneJoint, resolution: float) -
         start.mean[:2] = stretch.q[0], stretch.dq[0]
         tau = stretch.known_tau - stretch.sway @ fit.at(stretch)[1]
         step = float(np.median(np.diff(stretch.t)))
-        run = run_ekf(stretch.measured, tau, step, start, _PASSES)
+        run = run_ekf(stretch.measured, tau, step, start, _CONFIG.passes)
         start, covariance = replace(start, mean=run.mean.copy()), run.covariance
     return _with_constants(fit, equations, start.mean, covariance)
 
@@ -128,8 +127,8 @@ def _start(coarse: LawFit, first: Stretch, resolution: float) -> EkfStart:
     torque = 0.2 * (abs(level) + math.hypot(*arm.gravity))
     mean = np.array([first.q[0], first.dq[0], 1.0 / arm.inertia, arm.gravity[0], *level * _SHARES,
                      *_SHARP, viscous, arm.gravity[1]])
-    std = np.array([resolution, 0.01, 0.1 / arm.inertia, torque, *[_UNSURE * level] * 3,
-                    *_UNSURE * _SHARP, 0.5 * abs(viscous) + 0.01 * level, torque])
+    std = np.array([resolution, 0.01, 0.1 / arm.inertia, torque, *[_CONFIG.unsure * level] * 3,
+                    *_CONFIG.unsure * _SHARP, 0.5 * abs(viscous) + 0.01 * level, torque])
     return EkfStart(mean, std, max(coarse.found.rms, 1e-9), resolution / np.sqrt(12.0))
 
 

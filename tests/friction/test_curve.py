@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.friction.ekf import filtered
-from pipelines.model.friction.fit import LawEquations, LawFit, fit_law
-from pipelines.model.friction.joint import JointLogs, by_method, fit_joint
-from pipelines.model.friction.laws import OneJoint, law_named
-from pipelines.model.friction.refine import refined
-from pipelines.model.friction.weak_form import Stretch, stretches_of
+from pipelines.friction.ekf import filtered
+from pipelines.friction.fit import LawEquations, LawFit, fit_law
+from pipelines.friction.laws import OneJoint, law_named
+from pipelines.friction.refine import refined
+from pipelines.friction.weak_form import Stretch, stretches_of
 from pipelines.model.motion import Reconstruction, reconstruct
-from tests.model.friction.one_joint import (
+from tests.friction.one_joint import (
     COSINE,
     ENCODER,
     INERTIA,
@@ -86,14 +85,3 @@ def test_the_curve_is_better_than_the_papers_filter(fits: dict[int, LawFit]) -> 
     theirs = [curve_error(seed, filtered(stretches("three_sigmoid", seed), joint, ENCODER)) for seed in SEEDS]
     assert np.median([curve_error(seed, fits[seed]) for seed in SEEDS]) < np.median(theirs)
     assert np.median(theirs) < 0.05, "the filter itself works"
-
-
-@pytest.mark.slow
-def test_output_error_polishes_from_there(fits: dict[int, LawFit]) -> None:
-    """The third method: the same curve to 0.4 %, the same inertia to three of its standard deviations."""
-    log = recorded("three_sigmoid", 0)
-    seen = ((log, reconstruct(log, Reconstruction())),)
-    joint = by_method(fit_joint(JointLogs(JOINT, seen), 0.02, LAW), "output-error")
-    assert curve_error(0, joint.fit) <= 0.004
-    assert abs(joint.fit.inertia - INERTIA) <= 3.0 * joint.fit.std[0]
-    assert joint.fit.std[0] < 0.01 * INERTIA

@@ -15,22 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.dynamics.body import Array
-from pipelines.model.friction.fit import LawFit, Value
-from pipelines.model.friction.laws import gravity_columns
-from pipelines.model.friction.weak_form import Stretch
+from pipelines.friction.config import BreakAwayConfig
+from pipelines.friction.fit import LawFit, Value
+from pipelines.friction.laws import gravity_columns
+from pipelines.friction.weak_form import Stretch
 
-__all__ = ["BreakAwayConfig", "Event", "break_away", "held_at_least"]
-
-
-@dataclass(frozen=True)
-class BreakAwayConfig:
-    """Limits that make a break-away; choices, not measured."""
-
-    creep: float = 5e-3  # of the fastest speed
-    rest: float = 0.1  # [s] rest before a break-away
-    runs: float = 5.0  # times the creeping speed: the joint runs
-    within: float = 1.0  # [s] from creeping to running, or it was no break-away
-    smooth: float = 0.01  # [s] mean over which torque is taken
+__all__ = ["Event", "break_away", "held_at_least"]
 
 
 _CONFIG = BreakAwayConfig()

@@ -8,13 +8,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipelines.model.friction.fit import LawEquations
-from pipelines.model.friction.laws import OneJoint
-from pipelines.model.friction.model_selection import climb, undecided
-from pipelines.model.friction.speed_map import coverage
+from pipelines.friction.fit import LawEquations
+from pipelines.friction.laws import OneJoint
+from pipelines.friction.model_selection import climb, undecided
+from pipelines.friction.speed_map import coverage
 from pipelines.model.words import plain_number
-from tests.model.friction.one_joint import JOINT, recorded
-from tests.model.friction.test_ladder import plateaus
+from tests.friction.one_joint import JOINT, recorded
+from tests.friction.test_model_selection import plateaus
 
 _SPEEDS = (0.2, 1.0, 3.0)
 

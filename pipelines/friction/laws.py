@@ -33,10 +33,10 @@ from pipelines.model.effects.fast import from_motion, own_memory, shape_slopes
 __all__ = ["LADDER", "Law", "NonlinearNumber", "OneJoint", "gravity_acts", "gravity_columns",
            "gravity_names", "law_named", "with_further"]
 
-_POSITIONS = 8  # of the driven joint, at which gravity is looked for
-_PARALLEL = 1e-6  # [rad] between axis and gravity: rounding of a description
+POSITIONS = 8  # numerics: of the driven joint, at which gravity is computed
+PARALLEL = 1e-6  # numerics: [rad] between axis and gravity: rounding of a description
 _SHARED = "sharpness"  # every law of a joint changes its sign over the same speed
-_SHARP = (10.0, 30.0, 100.0, 300.0)  # [s/rad] where a search for it begins
+SHARP = (10.0, 30.0, 100.0, 300.0)  # numerics: [s/rad] where a search for it begins
 
 
 @dataclass(frozen=True)
@@ -113,10 +113,10 @@ def gravity_acts(robot: RobotDescription, joint: int, others: Sequence[float]) -
         joint: counted from 1.
         others: (joints - 1,) positions of the other joints [rad].
     """
-    q = np.tile(np.asarray(others, dtype=np.float64), (_POSITIONS, 1))
-    q = np.insert(q, joint - 1, np.linspace(-3.0, 3.0, _POSITIONS), axis=1)
+    q = np.tile(np.asarray(others, dtype=np.float64), (POSITIONS, 1))
+    q = np.insert(q, joint - 1, np.linspace(-3.0, 3.0, POSITIONS), axis=1)
     row = rigid_body(robot).regressor(q, 0.0 * q, 0.0 * q)[:, joint - 1]
-    least = _PARALLEL * float(np.linalg.norm(robot.gravity))
+    least = PARALLEL * float(np.linalg.norm(robot.gravity))
     return bool(np.abs(row).max(initial=0.0) > least)
 
 
@@ -258,7 +258,7 @@ class Law:
         grids = [[effect] if {q.name for q in effect.parameters if q.shape} <= {_SHARED}
                  else list(effect.shapes(motion, arm)) for effect in self.effects]
         shared = np.array([number.name == _SHARED for number in self.nonlinear], dtype=bool)
-        widths = (sharpness,) if sharpness is not None else _SHARP
+        widths = (sharpness,) if sharpness is not None else SHARP
         for effects in itertools.product(*grids):
             for width in widths if shared.any() else (1.0,):
                 yield np.where(shared, math.log(width), self.theta(effects))

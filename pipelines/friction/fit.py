@@ -21,29 +21,14 @@ import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.fit.varpro import Separable, SeparableFit, fit_separable, scan, search
-from pipelines.model.friction.laws import Law, OneJoint, law_named
-from pipelines.model.friction.weak_form import Stretch, Windows
+from pipelines.friction.config import FitConfig
+from pipelines.friction.laws import Law, OneJoint, law_named
+from pipelines.friction.weak_form import Stretch, Windows
 
 __all__ = ["Columns", "Equations", "LawEquations", "LawFit", "Number", "Value", "fit_law",
            "ranked", "same_posture", "takes_power"]
 
 Columns = Callable[[Motion, OneJoint], Array]  # (nodes, k) of a motion
-
-
-@dataclass(frozen=True)
-class FitConfig:
-    """Where searches begin, and what a fit shows."""
-
-    scanned: int = 120  # rows that a scan for starts looks at
-    starts: int = 4  # of them, searched on these rows
-    brief: int = 10  # steps of those searches
-    at_once: int = 64  # starts of a scan: memory
-    others: int = 8  # starts where the best curve gives power back
-    rough: int = 240  # rows that these are searched on
-    rounded: float = 1e-12  # of θ: less is rounding of exp and log
-    carried: int = 3  # rounds in which a law that depends on the load sees that of the fit before
-    seen: float = 0.9  # share of a number in directions that the rows show: it is known
-    alike: float = 0.02  # [rad] by which locked joints may differ and the inertia be the same
 
 
 _CONFIG = FitConfig()

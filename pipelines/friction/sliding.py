@@ -33,49 +33,16 @@ from pipelines.dynamics.body import Array
 from pipelines.fit.bounded import least_between
 from pipelines.fit.flips import by_flips
 from pipelines.fit.varpro import held_out
-from pipelines.model.friction.fit import LawEquations
-from pipelines.model.friction.laws import OneJoint
-from pipelines.model.friction.model_selection import no_worse
-from pipelines.model.friction.weak_form import Course, Mask, Stretch, blocks_of_time
+from pipelines.friction.config import DriftConfig, SlidingConfig
+from pipelines.friction.fit import LawEquations
+from pipelines.friction.laws import OneJoint
+from pipelines.friction.model_selection import no_worse
+from pipelines.friction.weak_form import Course, Mask, Stretch, blocks_of_time
 
-__all__ = ["DriftConfig", "Sliding", "SlidingConfig", "drift_of", "left_out", "sliding_rows"]
+__all__ = ["Sliding", "drift_of", "left_out", "sliding_rows"]
 
-_FINE = 1e-2  # of the logarithm of a time constant
-_RANK = 1e-7  # singular values of unit columns below it: two columns that are one
-
-
-@dataclass(frozen=True)
-class SlidingConfig:
-    """Limits of sliding; judged on seeds never seen before by benchmarks.friction_nuisances."""
-
-    rest: float = 3.0  # standard deviations: a slower speed may be zero (two-sided .003)
-    # Median square of a class over that of the first rows: 3 std of the logarithm of that of
-    # 25 normal errors, exp(3 · 2.34/√25) (Kendall & Stuart 1977, eq. 10.29)
-    worse: float = 4.0
-    good: float = 0.03  # of friction: what a law is good for; `margin` leaves its fourth power
-    rows: int = 3  # for every column of the free curve, that the first class has at least
-    margin: float = 4.0  # times the travel: bristles straighten as exp(-travel) (Dahl 1968), 2 %
-    classes: int = 5  # of speed, a decade: friction runs straight over a factor of 1.6
-    decades: int = 4  # of speed; slower rows are one class
-    course: int = 8  # knots of friction in time: what drifts still is a function of speed
-    halving: float = 2.0  # of travel, from class to class
-    windows: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0, 16.0)  # times the shortest, tried in turn
-    attenuation: float = 2e-3  # noise of the acceleration over itself (variance): bias of inertia
-
-
-@dataclass(frozen=True)
-class DriftConfig:
-    """Limits of friction that drifts."""
-
-    chance: float = 1e-3  # to gain as much in blocks held out without a drift: none in 100 joints
-    block: float = 0.5  # [s] in which errors depend; .1 s apart they do by .15 (10 joints, one .28)
-    fewest: int = 12  # blocks: fewer give no covariance of two numbers to rely on
-    rows: int = 3  # for every other column: fewer leave no residual to judge by
-    ends: float = 0.08  # of all rows, that lie before and after a step
-    times: tuple[float, ...] = (0.1, 0.2, 0.4, 0.8, 1.5, 5.0)  # over the duration; 5: straight
-    least: float = 0.03  # of friction: a smaller change is within what a law is good for
-    sure: float = 2.0  # std by which a change is known, or a larger one excluded: two-sided .05
-    rounds: int = 4  # of scanning for a course and fitting the curve that changes
+FINE = 1e-2  # numerics: of the logarithm of a time constant
+RANK = 1e-7  # numerics: singular values of unit columns below it: two columns that are one
 
 
 _CONFIG, _DRIFT = SlidingConfig(), DriftConfig()
@@ -221,14 +188,14 @@ class _Fit:
         scale = np.linalg.norm(self.columns, axis=0)
         unit = self.columns[:, scale > 0.0] / scale[scale > 0.0]
         left, size, _ = np.linalg.svd(unit, full_matrices=False)
-        return np.asarray(left[:, size > _RANK * size.max(initial=0.0)])
+        return np.asarray(left[:, size > RANK * size.max(initial=0.0)])
 
     @cached_property
     def beta(self) -> Array:
         """Return the coefficients (columns,)."""
         scale = np.linalg.norm(self.columns, axis=0)
         scale = np.where(scale > 0.0, scale, 1.0)
-        return np.asarray(np.linalg.lstsq(self.columns / scale, self.y, rcond=_RANK)[0] / scale)
+        return np.asarray(np.linalg.lstsq(self.columns / scale, self.y, rcond=RANK)[0] / scale)
 
     @cached_property
     def residual(self) -> Array:
@@ -364,7 +331,7 @@ def _trend(form: str, shape: Array, rows: _Rows) -> Course:
     times = np.log(_DRIFT.times)
     k = int(np.argmin([loss(time) for time in times]))
     low, high = float(times[max(k - 1, 0)]), float(times[min(k + 1, len(times) - 1)])
-    return course(least_between(loss, low, high, _FINE))
+    return course(least_between(loss, low, high, FINE))
 
 
 def _step(form: str, shape: Array, rows: _Rows) -> Course:

@@ -16,6 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
+from pipelines.friction.fit import Columns, Equations
+from pipelines.friction.laws import LADDER, Law, OneJoint
+from pipelines.friction.model_selection import Ladder, climb
 from pipelines.model.estimation.logs import (
     Fitted,
     Motions,
@@ -27,10 +30,6 @@ from pipelines.model.estimation.logs import (
 from pipelines.model.estimation.nominal import nominal_columns
 from pipelines.model.estimation.regression import Columns as RigidColumns
 from pipelines.model.estimation.regression import LogEquations
-from pipelines.model.friction.fit import Columns, Equations
-from pipelines.model.friction.laws import LADDER, Law, OneJoint
-from pipelines.model.friction.model_selection import Ladder, climb
-from pipelines.model.friction.ripple import Ripple, Wave, ripple_of
 from pipelines.signal.filters import LowPass, centre_samples, zero_phase
 
 __all__ = ["RowEquations", "SeveralFit", "fit_several"]
@@ -105,8 +104,6 @@ class SeveralFit:
 
     ladders: tuple[Ladder, ...]
     fitted: Fitted
-    ripples: tuple[Ripple | None, ...]
-    beside_ripples: Fitted | None  # the same fit with every ripple known; None without any
 
 
 def fit_several(identify: Motions, validate: Motions, recipe: Recipe,
@@ -130,10 +127,4 @@ def fit_several(identify: Motions, validate: Motions, recipe: Recipe,
     shaped = [replace(effect, joint=j + 1) for j, fit in enumerate(fits)
               for effect in fit.law.shaped(fit.theta)]
     whole = RigidColumns(columns.body, columns.kept, (*shaped, *columns.laws), columns.arm)
-    ripples = tuple(ripple_of(one, fit) for one, fit in zip(own, fits, strict=True))
-    waves = [Wave(joint=j + 1, order=order) for j, ripple in enumerate(ripples)
-             if ripple is not None for order in ripple.orders]
-    known = None
-    if waves:
-        known = fit_logs(identify, replace(whole, laws=(*whole.laws, *waves)), recipe)
-    return SeveralFit(ladders, fit_logs(identify, whole, recipe), ripples, known)
+    return SeveralFit(ladders, fit_logs(identify, whole, recipe))

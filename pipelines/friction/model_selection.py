@@ -19,26 +19,13 @@ import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.fit.varpro import held_out, linear_part
+from pipelines.friction.config import LadderConfig
+from pipelines.friction.fit import Equations, LawFit, fit_law, takes_power
+from pipelines.friction.laws import LADDER, Law, with_further
 from pipelines.model.effects import find_effect
-from pipelines.model.friction.fit import Equations, LawFit, fit_law, takes_power
-from pipelines.model.friction.laws import LADDER, Law, with_further
 from pipelines.model.words import plain_number
 
 __all__ = ["CandidateFit", "Ladder", "Missing", "climb", "no_worse", "undecided"]
-
-
-@dataclass(frozen=True)
-class LadderConfig:
-    """Limits of a measurable difference between laws."""
-
-    sure: float = 2.0  # standard errors of a difference, beyond which it is one: two-sided .05
-    worth: float = 0.01  # of the mean square: a smaller difference does not count, .5 % rms
-    blocks: int = 20  # of the rows that judge, whose sums give a deviation: known to a sixth
-    folds: int = 10  # of the rows, each held out in turn (Kohavi 1995, IJCAI, p. 1137)
-    further: int = 2  # causes after the first
-    more: float = 0.1  # of the residual (mean square), the least that each of these explains
-    hopeful: int = 3  # of them that are fitted at a time: they explain most to first order
-    points: int = 60  # speeds, each way, at which curves are compared
 
 
 _CONFIG = LadderConfig()
@@ -101,7 +88,7 @@ def climb(identify: Equations, validate: Equations | None,
         if law.name == "coulomb+viscous":
             sharpness = float(np.exp(tried[-1].fit.theta[0]))
     # a law of several causes is no cause
-    causes = [law.name for law in laws if len(law.members) > 2 and law.name in law.members]
+    causes = [law.name for law in laws if law.members[2:] and law.name in law.members]
     for _ in range(_CONFIG.further):
         best = _best(tried)
         if best.law.name in ("viscous", "coulomb", "coulomb+viscous"):

@@ -25,8 +25,9 @@ import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import InputRejected
+from pipelines.friction.config import WeakFormConfig
+from pipelines.friction.laws import gravity_acts, gravity_columns
 from pipelines.io.log import ExperimentLog
-from pipelines.model.friction.laws import gravity_acts, gravity_columns
 from pipelines.model.motion import Reconstructed, encoder_resolution
 from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
@@ -37,25 +38,9 @@ __all__ = ["Course", "Mask", "Stretch", "Sway", "Windows", "blocks_of_time", "mo
 
 Mask = npt.NDArray[np.bool_]
 
-_PART = 1e-3  # of a finite difference, relative
-_KINKED = 2  # order of a smoother for motion whose acceleration jumps
-_GAUSS = 0.5 / np.sqrt(3.0)  # of their time, from its middle: where two nodes lie
-
-
-@dataclass(frozen=True)
-class WeakFormConfig:
-    """Limits of samples that make equations, of their nodes, and of joints that move."""
-
-    vague: float = 2.0  # times the usual std of the speed: near ends and gaps; a choice
-    sway: float = 10.0  # encoder steps: rounding moves a held joint by one
-    fast: float = 3.0  # std of a speed: a slower one (rms) may be zero (two-sided .003)
-    fewest: int = 10  # windows of a stretch that is worth using: a choice, not measured
-    shortest: int = 4  # samples of a window: a choice, not measured
-    parts: int = 8  # nodes of an interval in which speed passes zero
-    near: float = 2.0  # changes of speed in a sample: nearer to zero its sign may turn over
-    little: float = 1e-4  # of the fastest speed: slower creep does not need its every sample
-    steady: float = 8.0  # times its std: a mean speed that keeps its sign and most of its size
-    coarsest: float = 1e-2  # [s] of the samples that two nodes replace
+PART = 1e-3  # numerics: of a finite difference, relative
+KINKED = 2  # numerics: order of a smoother for motion whose acceleration jumps
+GAUSS = 0.5 / 3.0**0.5  # numerics: of their time, from its middle: where two nodes lie
 
 
 _CONFIG = WeakFormConfig()
@@ -148,8 +133,8 @@ class Course:
         since = 0.5 * (t[1:] + t[:-1]) - t[0]
         courses = [self.at(part, since)]
         if self.change != 0.0:
-            ends = [self._risen(since, self.time * (1.0 + side * _PART)) for side in (1.0, -1.0)]
-            courses.append(self.change * (ends[0] - ends[1]) / (2.0 * _PART))
+            ends = [self._risen(since, self.time * (1.0 + side * PART)) for side in (1.0, -1.0)]
+            courses.append(self.change * (ends[0] - ends[1]) / (2.0 * PART))
         value = np.stack(courses, axis=1) * self.shape(0.5 * (dq[1:] + dq[:-1]))[:, None]
         return np.vstack([value, np.zeros((1, len(courses)))])
 
@@ -345,7 +330,7 @@ def _nodes(t: Array, q: Array, dq: Array,
     parts, span = np.ones(len(change), dtype=np.int8), np.ones(len(change), dtype=np.int8)
     little = _CONFIG.little * float(np.abs(dq).max())
     mean, spread = np.zeros(0), np.zeros(0)
-    if size > 2:
+    if size >= _CONFIG.pair:
         whole = len(change) // size * size
         steady, mean, spread = _steady(middle[:whole].reshape(-1, size),
                                        change[:whole].reshape(-1, size), little)
@@ -363,7 +348,7 @@ def _nodes(t: Array, q: Array, dq: Array,
     part = 1.0 / np.repeat(count, count)
     share = step * part
     # in samples after `at`
-    place = np.where(pair, 0.5 + _GAUSS * (2.0 * step - 1.0), share + 0.5 * part) * reach
+    place = np.where(pair, 0.5 + GAUSS * (2.0 * step - 1.0), share + 0.5 * part) * reach
     begin, length = t[at], t[at + reach] - t[at]
     below = place.astype(np.intp)
     beyond, below = place - below, at + below
@@ -468,9 +453,9 @@ def _sway(found: Reconstructed, run: slice, k: int, step: float, nearer: bool) -
     rest = np.nanmedian(good.log.q[:, k])
     lean = (lean - rest)[:, None]
     try:
-        tuned = tune_jerk(lean, step, encoder_resolution(good)[[k]], _KINKED)
+        tuned = tune_jerk(lean, step, encoder_resolution(good)[[k]], KINKED)
     except InputRejected:
         rows = good.kept[run]
         return Sway(found.motion.q[rows, k] - rest, found.motion.dq[rows, k], nearer)
-    states = smooth(lean, design(step, tuned.jerk_std, tuned.noise_variance, _KINKED)).states
+    states = smooth(lean, design(step, tuned.jerk_std, tuned.noise_variance, KINKED)).states
     return Sway(states[0, :, 0], states[1, :, 0], nearer)

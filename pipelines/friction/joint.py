@@ -18,26 +18,22 @@ from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array, Motion
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import with_block_covariance
-from pipelines.io.log import ExperimentLog
-from pipelines.io.robot import RobotDescription
-from pipelines.model.effects import find_effect
-from pipelines.model.friction.breakaway import Event, break_away, held_at_least
-from pipelines.model.friction.ekf import filtered
-from pipelines.model.friction.fit import LawEquations, LawFit, fit_law, same_posture
-from pipelines.model.friction.laws import LADDER, Law, OneJoint, gravity_columns
-from pipelines.model.friction.model_selection import Ladder, Missing, climb, no_worse
-from pipelines.model.friction.output_error import Simulated, polished, simulate_joint
-from pipelines.model.friction.refine import refined
-from pipelines.model.friction.ripple import Ripple, ripple_of, with_inertia
-from pipelines.model.friction.sliding import (
+from pipelines.friction.breakaway import Event, break_away, held_at_least
+from pipelines.friction.config import JointConfig, SlidingConfig
+from pipelines.friction.ekf import filtered
+from pipelines.friction.fit import LawEquations, LawFit, fit_law, same_posture
+from pipelines.friction.laws import LADDER, Law, OneJoint, gravity_columns
+from pipelines.friction.model_selection import Ladder, Missing, climb, no_worse
+from pipelines.friction.refine import refined
+from pipelines.friction.simulation import Simulated, simulate_joint
+from pipelines.friction.sliding import (
     Sliding,
-    SlidingConfig,
     drift_of,
     left_out,
     sliding_rows,
 )
-from pipelines.model.friction.speed_map import Coverage, coverage, speed_map, unseen
-from pipelines.model.friction.weak_form import (
+from pipelines.friction.speed_map import Coverage, coverage, speed_map, unseen
+from pipelines.friction.weak_form import (
     Course,
     Mask,
     Stretch,
@@ -45,29 +41,20 @@ from pipelines.model.friction.weak_form import (
     stretches_of,
     swaying,
 )
+from pipelines.io.log import ExperimentLog
+from pipelines.io.robot import RobotDescription
+from pipelines.model.effects import find_effect
 from pipelines.model.motion import Reconstructed, encoder_resolution
 
 __all__ = ["METHODS", "JointFit", "JointLogs", "Seen", "by_method", "fit_joint", "fractions",
            "friction_of"]
 
-METHODS = ("varpro", "output-error", "ekf")
+METHODS = ("varpro", "ekf")
 # follows any curve: no law of the ladder is favoured
 _FLEXIBLE = Law("flexible", ("three_sigmoid", "asymmetric_friction"))
 
 Seen = tuple[ExperimentLog, Reconstructed]
 Stretches = tuple[Stretch, ...]
-
-
-@dataclass(frozen=True)
-class JointConfig:
-    """Numbers of the fit of one joint."""
-
-    bent: float = 1e-3  # of friction: a curve that bends less does not show whether it lags
-    memory: float = 1.0  # [s] over which errors of a law may depend: a joint moves some way in it
-    courses: int = 5  # steps of Gauss and Newton for the time constant of a drift
-    rounds: int = 2  # of refining before laws are compared
-    curve: int = 100  # points of a curve, each way, from 1e-3 of the fastest speed on
-    fastest: int = 9  # of them, that give its slope at the highest speeds: the upper half
 
 
 _CONFIG, _SLIDING = JointConfig(), SlidingConfig()
@@ -130,7 +117,6 @@ class JointFit:
     break_away: tuple[Event, ...]
     held: tuple[float, float] | None  # [N m] friction carried at rest, back and forth
     window: float  # [s]
-    ripple: Ripple | None
     sliding: Sliding
     course: Course | None  # of friction that changes in time
 
@@ -171,18 +157,15 @@ def fit_joint(logs: JointLogs, window: float, law: Law | None = None) -> JointFi
     identify, validate = both[:fitted], both[fitted:]
     if sticks:
         final = _with_dependent_errors(final, identify, sliding.attenuation)
-    equations, covered = LawEquations.of(identify, arm), coverage(identify)
-    ripple = ripple_of(equations, final)
-    if ripple is not None:
-        ripple = with_inertia(ripple, equations, final)
+    covered = coverage(identify)
     judging = max(validate or identify, key=lambda stretch: len(stretch.t))
     at_rest = [stretch for stretch in logs.stretches(logs.hold, window)
                if any(same_posture(stretch.posture, posture) for posture in final.postures)]
     return JointFit(
         logs, final, choice.ladder, identify, _simulated(judging, bool(validate), final), covered,
         unseen(covered, choice.ladder), speed_map(identify, final),
-        break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window, ripple,
-        sliding, course)
+        break_away((*identify, *at_rest), final), held_at_least(at_rest, final), window, sliding,
+        course)
 
 
 def _usable_rows(logs: JointLogs, window: float,
@@ -310,21 +293,14 @@ def _with_dependent_errors(fit: LawFit, stretches: Stretches, attenuation: float
 def by_method(joint: JointFit, method: str) -> JointFit:
     """Return `joint`, which was fitted by variable projection, with the numbers of `method`.
 
-    It is judged again. How a ripple changes the inertia another method does not give.
-
     Raises:
-        UsageError: C02, a law that the method cannot fit, or a prismatic joint for the filter.
+        UsageError: C02, a prismatic joint for the filter.
     """
     if method == "varpro":
         return joint
-    if method == "output-error":
-        fit = polished(joint.stretches, joint.fit)
-    else:
-        fit = filtered(joint.stretches, joint.fit.joint, joint.logs.resolution)
+    fit = filtered(joint.stretches, joint.fit.joint, joint.logs.resolution)
     driven = _simulated(joint.driven.stretch, joint.driven.judging, fit)
-    ripple = None if joint.ripple is None else replace(joint.ripple, inertia=None)
-    return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit),
-                   ripple=ripple)
+    return replace(joint, fit=fit, driven=driven, map=speed_map(joint.stretches, fit))
 
 
 def fractions(joint: JointFit) -> tuple[Array, Array, Array]:

@@ -20,29 +20,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.dynamics.body import Array
+from pipelines.friction.config import SpeedConfig
+from pipelines.friction.fit import LawFit
+from pipelines.friction.model_selection import Ladder, Missing, undecided
+from pipelines.friction.weak_form import Mask, Stretch
 from pipelines.model.effects import find_effect
-from pipelines.model.friction.fit import LawFit
-from pipelines.model.friction.model_selection import Ladder, Missing, undecided
-from pipelines.model.friction.weak_form import Mask, Stretch
 
 __all__ = ["Coverage", "coverage", "speed_map", "unseen"]
 
 _DRIVE = ("drive the joint alone at 7 to 10 constant speeds over two decades, in both directions, "
           "with ramps from rest")
-
-
-@dataclass(frozen=True)
-class SpeedConfig:
-    """Classes of speed and position, and what logs should cover."""
-
-    classes: int = 5  # of speed, a decade
-    enough: int = 5  # rows that fill a class
-    decades: float = 1.6  # and
-    speeds: int = 7  # classes each way that are enough
-    vague: float = 0.5  # of a value, its standard deviation: hardly known
-    places: int = 36  # of position, a turn
-    slowest: float = 1e-3  # of the fastest speed, of a pair
-    fewest: int = 2  # pairs for a point
 
 
 _CONFIG = SpeedConfig()

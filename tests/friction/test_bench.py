@@ -15,11 +15,11 @@ from bench.faults import make
 from bench.machine import Machine
 from bench.motions import gravity_of
 from bench.plant import record
+from pipelines.friction.joint import JointFit, JointLogs, fit_joint
+from pipelines.friction.laws import law_named
 from pipelines.io.log import Array
-from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
-from pipelines.model.friction.laws import law_named
 from pipelines.model.motion import Reconstruction, reconstruct
-from tests.model.friction.one_joint import relative
+from tests.friction.one_joint import relative
 
 
 def machine(seed: int) -> Machine:

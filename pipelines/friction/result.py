@@ -2,31 +2,29 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check
+from pipelines.friction.breakaway import Event
+from pipelines.friction.config import DriftConfig
+from pipelines.friction.fit import LawFit, Value
+from pipelines.friction.joint import JointFit, fractions
+from pipelines.friction.laws import gravity_names
+from pipelines.friction.model_selection import Ladder, Missing, undecided
+from pipelines.friction.several import SeveralFit
+from pipelines.friction.weak_form import moved
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.io.model_file import ModelFile
 from pipelines.io.results import NOT_STORED
 from pipelines.model.estimation.logs import Fitted, Motions
-from pipelines.model.friction.breakaway import Event
-from pipelines.model.friction.fit import LawFit, Value
-from pipelines.model.friction.joint import JointFit, fractions
-from pipelines.model.friction.laws import gravity_names
-from pipelines.model.friction.model_selection import Ladder, Missing, undecided
-from pipelines.model.friction.ripple import Ripple
-from pipelines.model.friction.several import SeveralFit
-from pipelines.model.friction.sliding import DriftConfig
-from pipelines.model.friction.weak_form import moved
 
 __all__ = ["CandidateLaw", "Drift", "JointResult", "Posture", "Result", "Series",
            "Sticking", "Validation", "joint_result", "several_results"]
 
-_POINTS = 1500  # of a figure
-_CURVE = 401
+POINTS, CURVE = 1500, 401  # numerics: of a figure
 _UNMOVED = Missing("the joint does not move in these logs: neither its inertia nor its friction is "
                    "shown", "record it while it is driven through its range, its brake released")
 
@@ -39,7 +37,7 @@ class Validation:
     velocity_error_without: float | None
     by: str  # the log
     held_out: bool
-    torque_error: float | None = None  # what the chosen law leaves of torque that was held out, over that torque, both rms
+    torque_error: float | None = None  # residual of held-out torque, over that torque (rms)
 
 
 @dataclass(frozen=True)
@@ -75,7 +73,7 @@ class Drift:
     speed: float  # [rad/s] at which
     holds_at: float  # [s] since the start of a log, when friction is the law; of a step, before it
     log: str
-    when_std: float | None = None  # [s] of a time constant; null of a step, and of a trend that runs straight
+    when_std: float | None = None  # [s] of a time constant; null of a step or a straight trend
 
 
 @dataclass(frozen=True)
@@ -134,7 +132,6 @@ class JointResult:
     driven: tuple[float, float]  # [rad/s] slowest and fastest
     logs: tuple[str, ...]
     series: Series
-    ripple: Ripple | None = None
     moved: bool = True  # whether the logs move it at all
     drift: Drift | None = None  # of friction in time
     sticking: Sticking | None = None  # rows that were left out
@@ -169,7 +166,8 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
         error = driven.error(simulated)
         errors.append(error if np.isfinite(error) else None)
     drift, open_ = _drift(joint), joint.unseen
-    if drift is not None and not (_shown(drift) and joint.course is not None and joint.course.named):
+    named = joint.course is not None and joint.course.named
+    if drift is not None and not (named and _shown(drift)):
         open_ = (*open_, _not_excluded(drift))
         drift = None
     return JointResult(
@@ -180,7 +178,7 @@ def joint_result(joint: JointFit, name: str, method: str) -> JointResult:
         _candidates(ladder), ladder.by, open_, joint.break_away, joint.held,
         (joint.covered.slowest, joint.covered.fastest),
         tuple(log.name for log, _ in (*joint.logs.identify, *joint.logs.validate)),
-        _series(joint), joint.ripple, True, drift, _sticking(joint))
+        _series(joint), True, drift, _sticking(joint))
 
 
 def _posture(joint: JointFit, k: int) -> Posture:
@@ -257,14 +255,14 @@ def _torque_error(ladder: Ladder) -> float | None:
 
 def _curve(fit: LawFit, fastest: float) -> tuple[Array, Array, Array]:
     """Return speeds up to the fastest, dense about zero, the curve and its deviation (points,)."""
-    side = np.concatenate([[0.0], np.geomspace(1e-3 * fastest, fastest, _CURVE // 2)])
+    side = np.concatenate([[0.0], np.geomspace(1e-3 * fastest, fastest, CURVE // 2)])
     speed = np.concatenate([-side[:0:-1], side])
     return speed, fit.curve(speed), fit.curve_std(speed)
 
 
 def _series(joint: JointFit) -> Series:
     driven, stretch = joint.driven, joint.driven.stretch
-    every = max(1, len(stretch.t) // _POINTS)
+    every = max(1, len(stretch.t) // POINTS)
     samples = (stretch.t - stretch.t[0], stretch.tau, *fractions(joint), stretch.q, stretch.dq,
                driven.with_friction.q, driven.with_friction.dq, driven.without.q,
                driven.without.dq)
@@ -289,7 +287,7 @@ def several_results(found: SeveralFit, arm: Arm, validate: Motions) -> tuple[Joi
 
 def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
              names: tuple[str, ...], moves: bool) -> JointResult:
-    ladder, ripple = found.ladders[j], found.ripples[j]
+    ladder = found.ladders[j]
     fit, law, first = ladder.chosen.fit, ladder.chosen.law, f":{j + 1}:"
     known = {key.replace(first, "."): parameter for key, parameter in arm.parameters.items()
              if first in key}
@@ -301,8 +299,6 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
                for key, p in known.items() if key.partition(".")[0] in law.members}
     fastest, slowest = float(speed.max()), float(np.quantile(speed, 0.02))
     inertia = _inertia(found.fitted, arm, j, middle)
-    if ripple is not None and found.beside_ripples is not None:
-        ripple = replace(ripple, inertia=_inertia(found.beside_ripples, arm, j, middle))
     missing: tuple[Missing, ...] = (_UNMOVED,)
     if moves:
         missing = undecided(ladder, slowest, fastest, alone=False)
@@ -311,8 +307,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
         (Posture(tuple(map(float, middle)), inertia, {}),),
         Validation(None, None, "", False, _torque_error(ladder)), _candidates(ladder), ladder.by,
         missing, (), None, (slowest, fastest), names,
-        Series(*_curve(fit, fastest), *(np.zeros(0),) * 15),
-        ripple if moves else None, moves)
+        Series(*_curve(fit, fastest), *(np.zeros(0),) * 15), moves)
 
 
 def _inertia(fitted: Fitted, arm: Arm, j: int, q: Array) -> Value:

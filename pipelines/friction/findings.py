@@ -2,50 +2,31 @@
 
     S14 S10 D18 D10     torque with the wrong sign, in amperes, incomplete; motion one way only
     D26 D08 D09 S14     a drift, a coarse encoder, nothing to judge by, negative viscous friction
-    D19 S14 D21         most of the torque left, negative inertia, a torque of the joint's angle
+    D19 S14             most of the torque left, negative inertia
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 
 import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, RrridError
+from pipelines.friction.config import FindingsConfig
+from pipelines.friction.fit import Value
+from pipelines.friction.joint import JointFit
+from pipelines.friction.result import JointResult
 from pipelines.io.log import ExperimentLog
-from pipelines.model.friction.fit import Value
-from pipelines.model.friction.joint import JointFit
-from pipelines.model.friction.result import JointResult
-from pipelines.model.friction.ripple import Ripple
 from pipelines.model.words import plain_number
 
-__all__ = ["NAMED", "FindingsConfig", "depends_in_words", "drift_in_words", "inertia_in_words",
-           "log_findings", "misfits", "nuisance_findings"]
+__all__ = ["drift_in_words", "log_findings", "misfits", "nuisance_findings"]
 
-_SEED = 20040509
+ROUNDING = 1e-9  # numerics: of a regressor
+SEED = 20040509  # numerics: of postures at which gravity is computed
 _FALLING = {"stribeck", "concave_friction", "three_sigmoid"}  # laws that may fall with speed
-NAMED = "let 'rrrid diagnose' say what makes it: a motor that cogs, a spring, a cable, a stop"
-
-
-@dataclass(frozen=True)
-class FindingsConfig:
-    """When a fit shows that its logs are wrong, and what it may leave."""
-
-    sure: float = 3.0  # std below zero (two-sided .003)
-    far: float = 2.0  # times the inertia of the described links; a choice, not measured
-    nothing: float = 0.01  # of the torque (std): no gravity; a choice, not measured
-    coarse: float = 0.05  # bias of the inertia by errors in variables; a choice, not measured
-    poor: float = 0.5  # of the held-out torque (rms): a quarter of its power is not described
-    seen: float = 2.0  # std: an inertia that is less may be zero (two-sided .05)
-    resolved: float = 0.9  # of a wave along the travel, by which two differ (Rayleigh: 1)
-    several: float = 4.0  # waves along the travel: fewer, with others like it, a bend has as well
-    most: float = 0.5  # of all waves (mean square): the largest is more than all others together
-    moved: float = 0.1  # of the inertia: more is not to be relied on; a choice
-    many: float = 10.0  # deviations in a value: it has digits before the first of the deviation
 
 
 _CONFIG = FindingsConfig()
@@ -111,8 +92,8 @@ def _compensated(joint: JointFit, log: ExperimentLog) -> Check | None:
     control, j = log.controller, joint.logs.joint - 1
     if control is None or "gravity" not in (control.feedforward or ()):
         return None
-    q = np.random.default_rng(_SEED).uniform(-3.0, 3.0, (16, log.n_joints))
-    acts = np.abs(rigid_body(log.robot).regressor(q, 0.0 * q, 0.0 * q)[:, j]).max() > 1e-9
+    q = np.random.default_rng(SEED).uniform(-3.0, 3.0, (16, log.n_joints))
+    acts = np.abs(rigid_body(log.robot).regressor(q, 0.0 * q, 0.0 * q)[:, j]).max() > ROUNDING
     least = _CONFIG.nothing * float(np.nanstd(log.tau[:, j]))
     if not acts or float(np.hypot.reduce(joint.fit.gravity)) > least:
         return None
@@ -186,12 +167,12 @@ def _negative_viscous(joint: JointFit) -> Check | None:
 
 
 def misfits(joints: Sequence[JointResult], where: str) -> tuple[Check, ...]:
-    """D19 where the law leaves most of a torque, S14 a negative inertia, D21 where a joint ripples.
+    """D19 where the law leaves most of a torque, S14 a negative inertia.
 
     D19 is a gate, of joints that were never driven alone: the others are judged by simulated speed.
     """
     return _known(*(check for joint in joints for check in (
-        _unexplained(joint, where), _negative(joint, where), _rippling(joint, where))))
+        _unexplained(joint, where), _negative(joint, where))))
 
 
 def _unexplained(joint: JointResult, where: str) -> Check | None:
@@ -217,55 +198,6 @@ def _negative(joint: JointResult, where: str) -> Check | None:
         "S14", "warn", f"the inertia of joint {joint.joint} comes out negative, "
         f"{_written(joint.inertia)}, and no inertia is: {meaning}", where=where,
         remedy="drive the joint alone, with accelerations that take most of its torque")
-
-
-def _rippling(joint: JointResult, where: str) -> Check | None:
-    ripple = joint.ripple
-    if ripple is None:
-        return None
-    inertia = inertia_in_words(joint, ripple, _written)
-    return Check.of(
-        "D21", "warn", f"{plain_number(ripple.rms.value)} {ripple.rms.unit} rms of the "
-        f"{'torque' if joint.revolute else 'force'} of joint {joint.joint} "
-        f"{depends_in_words(joint, ripple)}: {100.0 * ripple.share:.0f} % of what friction and "
-        f"inertia leave (mean square){inertia and f'. {inertia}'}", where=where, remedy=NAMED)
-
-
-def depends_in_words(joint: JointResult, ripple: Ripple) -> str:
-    """Return on what a ripple depends, and how it is known to be no friction.
-
-    The largest wave is named but where it is a bend: where others are too near for the travel to
-    tell them apart, and it is few or not most. Orders of a slide count waves in 2π metres.
-    """
-    order, *others = ripple.orders
-    apart = 2.0 * math.pi / max(float(np.ptp(ripple.along.angle)), 1e-12)
-    near = any(abs(other - order) < _CONFIG.resolved * apart for other in others)
-    few = order < _CONFIG.several * apart or not ripple.largest_share >= _CONFIG.most
-    size = f"about {plain_number(order)} cycles per revolution"
-    if not joint.revolute:
-        size = f"a wave every {plain_number(2000.0 * math.pi / order)} mm"
-    waves = "" if near and few else f", {'mostly ' if others else ''}{size}"
-    return (f"depends on its {'angle' if joint.revolute else 'position'} alone{waves}, the same at "
-            "all speeds and both ways")
-
-
-def inertia_in_words(joint: JointResult, ripple: Ripple, shown: Callable[[Value], str]) -> str:
-    """Return what the ripple does to the inertia; empty where only one of the two is known.
-
-    Args:
-        shown: a value with its uncertainty and unit, in writing.
-    """
-    without, known = joint.inertia, ripple.inertia
-    if known is None:
-        return ""
-    words = (f"The inertia {shown(without)} is fitted without it; with it the same logs give "
-             f"{shown(known)}")
-    if known.std is not None and known.value < -_CONFIG.seen * known.std:
-        return f"{words}: no inertia is negative; look at the sign of this torque"
-    if known.std is None or known.value <= _CONFIG.seen * known.std:
-        return f"{words}: these logs do not show it, and neither is to be relied on"
-    moved = abs(known.value - without.value) > _CONFIG.moved * known.value
-    return f"{words}: do not rely on the first" if moved else words
 
 
 def _written(value: Value) -> str:

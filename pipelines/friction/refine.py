@@ -13,41 +13,24 @@ over a sample.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from pipelines.dynamics.body import Array
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import SeparableFit, search
-from pipelines.model.friction.fit import LawEquations, LawFit, fit_law, ranked
-from pipelines.model.friction.laws import Law, OneJoint, gravity_columns
-from pipelines.model.friction.weak_form import Mask, Stretch
+from pipelines.friction.config import RefineConfig
+from pipelines.friction.fit import LawEquations, LawFit, fit_law, ranked
+from pipelines.friction.laws import Law, OneJoint, gravity_columns
+from pipelines.friction.weak_form import Mask, Stretch
 from pipelines.signal.observer import design
 from pipelines.signal.smoother import smooth
 from pipelines.signal.tuning import tune_smoother
 
 __all__ = ["fit_driven_alone", "refined"]
 
-_ORDER = 2  # of the deviation
-
-
-@dataclass(frozen=True)
-class RefineConfig:
-    """Numbers of a refined motion, and of the rough fit that it is first refined about."""
-
-    least: float = 1e-6  # of the torque: its noise, where a fit leaves none
-    share: int = 4  # samples that a window keeps for the rough fit
-    shortest: int = 4  # samples of a window
-    fewest: int = 10  # windows
-    ends: float = 0.05  # [s] at either end, where no later or earlier sample helps the smoother
-    order: int = 3  # of the smoother that the motion begins with
-    freedom: float = 2.0  # a rough fit draws the motion to its errors: twice the noise halves that
-    rough: int = 240  # rows of a rough fit
-    glanced: int = 80  # rows that its starts are ranked by
-    sparse: int = 3  # of the starts it looks at every third
-    steps: int = 3  # of a rough fit from a fit before
-    first: int = 1  # of the first one, from the best of its starts
+ORDER = 2  # numerics: of the smoother of the deviation
 
 
 _CONFIG = RefineConfig()
@@ -74,7 +57,7 @@ def refined(stretch: Stretch, fit: LawFit, resolution: float, freedom: float = 1
     # Δθ²/12, or more where second differences show it; they are 6 R + σ² T⁴/2
     second = np.diff(deviation, n=2)
     shown = (np.mean(np.square(second[np.isfinite(second)])) - 0.5 * jerk**2 * step**4) / 6.0
-    observer = design(step, jerk, np.maximum(shown, resolution**2 / 12.0), _ORDER)
+    observer = design(step, jerk, np.maximum(shown, resolution**2 / 12.0), ORDER)
     states = smooth(deviation[:, None], observer).states[:, :, 0]
     return replace(stretch, q=q + states[0], dq=dq + states[1])
 
@@ -103,8 +86,9 @@ def _implied_motion(stretch: Stretch, fit: LawFit) -> tuple[Array, Array]:
     return q + (np.nanmedian(early) if np.isfinite(early).any() else 0.0), dq
 
 
-def fit_driven_alone(t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, resolution: float,
-                     window: float = 0.02, rounds: int = 1) -> LawFit:
+def fit_driven_alone(  # noqa: PLR0913
+        t: Array, q: Array, tau: Array, joint: OneJoint, law: Law, resolution: float,
+        window: float = 0.02, rounds: int = 1) -> LawFit:
     """Fit `law` with inertia and gravity of a joint driven alone: the whole way in one call.
 
     every few samples smoothed → a rough fit → all samples smoothed about what it implies → the fit

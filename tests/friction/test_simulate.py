@@ -10,11 +10,11 @@ from scipy.integrate import solve_ivp
 
 from pipelines.dynamics.body import Array
 from pipelines.fit.varpro import SeparableFit
-from pipelines.model.friction.fit import LawFit
-from pipelines.model.friction.laws import Law, OneJoint, law_named
-from pipelines.model.friction.output_error import simulate_joint
-from pipelines.model.friction.weak_form import Stretch
-from tests.model.friction.one_joint import INERTIA, JOINT, recorded
+from pipelines.friction.fit import LawFit
+from pipelines.friction.laws import Law, OneJoint, law_named
+from pipelines.friction.simulation import simulate_joint
+from pipelines.friction.weak_form import Stretch
+from tests.friction.one_joint import INERTIA, JOINT, recorded
 
 T = np.arange(500) * 1e-3
 TORQUE = 2.0 * np.sin(2 * np.pi * 0.9 * T) + 0.6 * np.sin(2 * np.pi * 2.3 * T)

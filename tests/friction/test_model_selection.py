@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.friction.fit import LawEquations
-from pipelines.model.friction.joint import JointFit, JointLogs, fit_joint
-from pipelines.model.friction.laws import OneJoint
-from pipelines.model.friction.model_selection import climb
-from pipelines.model.friction.speed_map import coverage, unseen
-from pipelines.model.friction.weak_form import Stretch
+from pipelines.friction.fit import LawEquations
+from pipelines.friction.joint import JointFit, JointLogs, fit_joint
+from pipelines.friction.laws import OneJoint
+from pipelines.friction.model_selection import climb
+from pipelines.friction.speed_map import coverage, unseen
+from pipelines.friction.weak_form import Stretch
 from pipelines.model.motion import Reconstruction, reconstruct
-from tests.model.friction.one_joint import JOINT, STEP, TRUTHS, driven_speeds, recorded, relative
+from tests.friction.one_joint import JOINT, STEP, TRUTHS, driven_speeds, recorded, relative
 
 
 def judged(law: str, seed: int = 1) -> JointFit:

@@ -7,11 +7,11 @@ import pytest
 
 from pipelines.dynamics.body import Motion
 from pipelines.errors import InputRejected
+from pipelines.friction.fit import LawFit
+from pipelines.friction.laws import OneJoint, law_named
+from pipelines.friction.refine import fit_driven_alone
 from pipelines.io.log import Array
-from pipelines.model.friction.fit import LawFit
-from pipelines.model.friction.laws import OneJoint, law_named
-from pipelines.model.friction.refine import fit_driven_alone
-from tests.model.friction.one_joint import (
+from tests.friction.one_joint import (
     COSINE,
     ENCODER,
     INERTIA,
