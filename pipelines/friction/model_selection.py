@@ -211,53 +211,27 @@ class Missing:
     record: str
 
 
-def undecided(ladder: Ladder, slowest: float, fastest: float,
-              alone: bool) -> tuple[Missing, ...]:
-    """Return, of every alternative, what is undecided, and what to record.
+def undecided(ladder: Ladder, slowest: float, fastest: float) -> tuple[Missing, ...]:
+    """Return every alternative, how far its curve lies from the chosen one, and what to record.
 
     Args:
         slowest, fastest: speeds that were driven [rad/s].
-        alone: the joint was driven alone: the first of a fit's rigid numbers is its inertia.
     """
     side = np.geomspace(max(slowest, 1e-3 * fastest), fastest, _CONFIG.points)
     speed = np.concatenate([-side[::-1], side])
-    chosen = ladder.chosen
-    return tuple(Missing(f"{chosen.law.title} or {other.law.title}: {_why(ladder, other)}; "
-                         f"{_difference(chosen.fit, other.fit, speed, alone)}",
-                         find_effect(other.law.members[-1]).words.experiment)
-                 for other in ladder.alternatives)
-
-
-def _why(ladder: Ladder, alternative: CandidateFit) -> str:
-    """Return in words why the chosen law was taken, and not `alternative`."""
-    chosen, best = ladder.chosen, ladder.best
-    sizes = f"{chosen.law.size} numbers against {alternative.law.size}"
-    judge = "held-out logs" if ladder.by == "logs" else "held-out blocks"
-    if not ladder.alike(alternative):
-        more = plain_number(100.0 * (alternative.validate_rms / best.validate_rms - 1.0))
-        than = "" if best is chosen else f" than {best.law.title}, the best of all"
-        return (f"of what was fitted both leave as much; the first, {sizes}, is taken because of "
-                f"the {judge} the second leaves {more} % more (rms){than}, which is more than "
-                "chance")
-    if chosen.law.size < alternative.law.size:
-        return f"nothing tells them apart, and the first is taken for it is plainer, {sizes}"
-    return (f"nothing tells them apart, and the first, {sizes}, is taken for it leaves a little "
-            f"less of the {judge}")
-
-
-def _difference(fit: LawFit, other: LawFit, speed: Array, alone: bool) -> str:
-    """Return in words how far two curves differ at most over `speed`, and two inertias."""
-    curve = fit.curve(speed)
-    apart = np.abs(curve - other.curve(speed))
-    most = int(np.argmax(apart))
-    units = [unit.replace("^2", "²") for unit in fit.joint.units]
-    share = 100.0 * float(apart[most]) / max(abs(float(curve[most])), 1e-300)
-    words = (f"what the choice changes: the curve by at most {plain_number(float(apart[most]))} "
-             f"{units[0]}, at {plain_number(abs(float(speed[most])))} {units[1]} "
-             f"({plain_number(share)} % of the friction there)")
-    if not alone:
-        return words
-    moved = abs(fit.inertia - other.inertia)
-    size = f"{plain_number(moved)} {units[2]}"
-    return f"{words}; the inertia by " + (
-        "less than its uncertainty" if moved < float(fit.std[0]) else size)
+    chosen, found = ladder.chosen, []
+    curve, (torque, unit, _) = chosen.fit.curve(speed), chosen.fit.joint.units
+    for other in ladder.alternatives:
+        apart = np.abs(curve - other.fit.curve(speed))
+        most = int(np.argmax(apart))
+        why = "nothing tells them apart, and the first has no more numbers"
+        if not ladder.alike(other):
+            why = "only the held-out rows speak against the second"
+        elif chosen.law.size > other.law.size:
+            why = "nothing tells them apart, and the first leaves a little less of held-out rows"
+        found.append(Missing(
+            f"{chosen.law.title} or {other.law.title}: {why}, {chosen.law.size} numbers against "
+            f"{other.law.size}; the curves differ by at most {plain_number(float(apart[most]))} "
+            f"{torque}, at {plain_number(abs(float(speed[most])))} {unit}",
+            find_effect(other.law.members[-1]).words.experiment))
+    return tuple(found)

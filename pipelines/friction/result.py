@@ -301,7 +301,7 @@ def _several(found: SeveralFit, arm: Arm, j: int, middle: Array, speed: Array,
     inertia = _inertia(found.fitted, arm, j, middle)
     missing: tuple[Missing, ...] = (_UNMOVED,)
     if moves:
-        missing = undecided(ladder, slowest, fastest, alone=False)
+        missing = undecided(ladder, slowest, fastest)
     return JointResult(
         j + 1, arm.robot.joints[j].name, law.name, "varpro", numbers, inertia, {},
         (Posture(tuple(map(float, middle)), inertia, {}),),

@@ -123,5 +123,5 @@ def unseen(covered: Coverage, ladder: Ladder) -> tuple[Missing, ...]:
         words = [f"{find_effect(effect).words.title}, {quantity.replace('_', ' ')}"
                  for effect, _, quantity in vague]
         gaps.append(f"hardly known: {'; '.join(words)}")
-    laws = undecided(ladder, covered.slowest, covered.fastest, alone=True)
+    laws = undecided(ladder, covered.slowest, covered.fastest)
     return (*(Missing(gap, _DRIVE) for gap in gaps), *laws)

@@ -20,7 +20,8 @@ def test_a_blank_line_of_the_template_ends_a_paragraph() -> None:
 
 
 def test_text_from_a_log_is_no_template_and_keeps_its_signs() -> None:
-    assert sentence("friction", "ripple_section", "{{ 7 * 7 }} % if", 0.5, "", "x").startswith("{{ 7 * 7 }} % if It explains 50 %")
+    said = sentence("friction", "curve", "{{ 7 * 7 }} % if", None, "N m", False, False)
+    assert said.startswith("{{ 7 * 7 }} % if: the fitted law")
 
 
 @pytest.mark.parametrize(("text", "said"), [("a word", "A word."), ("Done!", "Done!"), ("", "")])
