@@ -19,7 +19,7 @@ LAYERS = {
     "pipelines.fit": 4, "pipelines.signal": 4,
     "pipelines.dynamics": 5,
     "pipelines.model.effects": 6,
-    "pipelines.dynamics.arm": 6.5, "pipelines.dynamics.named_cause": 6.6, "pipelines.dynamics.parameter_names": 6.5,
+    "pipelines.dynamics.arm": 6.5, "pipelines.dynamics.draw": 6.6, "pipelines.dynamics.named_cause": 6.6, "pipelines.dynamics.parameter_names": 6.5,
     "pipelines.model.even": 6.5, "pipelines.model.measured": 6.5, "pipelines.model.tuned": 6.5,
     "pipelines.model.trackers": 6.6, "pipelines.model.motion": 6.7,
     "pipelines.simulation": 6.8, "pipelines.simulation.comparison": 7.5,

@@ -20,7 +20,6 @@ from pipelines.dynamics.body import Array
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check
 from pipelines.model.clock_offset import away_from_reversals, clock_offset
-from pipelines.model.commanded import against_command
 from pipelines.model.evidence import Evidence
 from pipelines.model.excited import excited
 from pipelines.model.mix_ups import (
@@ -33,6 +32,7 @@ from pipelines.model.mix_ups import (
 from pipelines.model.row_fit import sample_motion
 from pipelines.model.torque_scale import torque_scale
 from pipelines.quality.subject import NotTested, Subject, spread
+from pipelines.simulation.commanded import against_command
 
 __all__ = ["mismatches", "plausibility", "plausibility_findings"]
 

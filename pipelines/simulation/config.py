@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["EXAMPLE", "SIMULATION"]
+__all__ = ["COMMAND", "EXAMPLE", "SIMULATION"]
 
 
 @dataclass(frozen=True)
@@ -62,5 +62,23 @@ class ExampleConfig:
     observer_gain: tuple[float, ...] = (0.4156, 109.13, 14328.0)  # k of eq. (20)
 
 
+@dataclass(frozen=True)
+class CommandConfig:
+    """How a logged torque is told to be the command of the log's own controller."""
+
+    longest: int = 6000  # samples that are followed, from the first on: an observer starts there
+    fewest: int = 200
+    latest: float = 0.1  # [s]
+    late: float = 8e-3  # [s] a filter that is not described is later by less
+    samples: int = 1  # nor is it known of one sample whose it is
+    left: float = 0.05  # of the torque's standard deviation, that scale and time leave
+    left_late: float = 0.015  # the same of one that is late: half the described damping leaves .021
+    better: float = 3.0  # times what they leave, that the torque differs by as it stands
+    scale: float = 1.3  # by which a description may err, or a constant of a drive
+    scale_measured: float = 2.5  # by which a drive may
+    lags: tuple[float, ...] = (0.5, 0.7, 1.0, 1.4)  # times how late it is, of an equal low-pass
+
+
+COMMAND = CommandConfig()
 EXAMPLE = ExampleConfig()
 SIMULATION = SimulationConfig()

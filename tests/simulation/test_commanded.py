@@ -15,9 +15,9 @@ from bench.plant import record
 from pipelines.errors import InputRejected
 from pipelines.estimation.checks.gates import examined
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.commanded import against_command, commanded
 from pipelines.model.plausibility import mismatches
 from pipelines.quality.subject import Subject
+from pipelines.simulation.commanded import against_command, commanded
 from tests.healthy import with_signal
 from tests.seeds import rarely
 

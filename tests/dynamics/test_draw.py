@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from pipelines.dynamics.draw import drawn
 from pipelines.dynamics.parameter import Uncertainty
-from pipelines.model.draw import drawn
 from sample_logs.make_model import synthetic_arm
 
 

@@ -2,8 +2,9 @@
 
     other = drawn(arm, rng)
 
-The numbers are normal with the covariance of the fit. Of a model file only standard deviations are known: then the base
-parameters are drawn as if independent, and friction is held, because the numbers of one law are far from independent.
+The numbers are normal with the covariance of the fit. Of a model file only standard deviations are
+known: then the base parameters are drawn as if independent, and friction is held, because the
+numbers of one law are far from independent.
 """
 
 from __future__ import annotations
@@ -25,11 +26,14 @@ def drawn(arm: Arm, rng: np.random.Generator) -> Arm:
     off = dict(zip(names, _normal(covariance, rng), strict=True))
 
     def acting(law: Acting) -> Acting:
-        values = tuple(replace(p, value=p.value + off.get(f"{law.place}:{p.name}", 0.0)) for p in law.parameters)
+        values = tuple(
+            replace(p, value=p.value + off.get(f"{law.place}:{p.name}", 0.0))
+            for p in law.parameters)
         return Acting(law.effect.at({p.name: p.value for p in values}), values)
 
     base = tuple(replace(p, value=p.value + off.get(p.name, 0.0)) for p in arm.base)
-    return replace(arm, base=base, friction=tuple(map(acting, arm.friction)), effects=tuple(map(acting, arm.effects)))
+    return replace(arm, base=base, friction=tuple(map(acting, arm.friction)),
+                   effects=tuple(map(acting, arm.effects)))
 
 
 def _covariance(arm: Arm) -> tuple[tuple[str, ...], Array]:
@@ -49,5 +53,7 @@ def _normal(covariance: Array, rng: np.random.Generator) -> list[float]:
     scale = np.sqrt(np.diag(covariance))
     unit = np.where(scale > 0.0, scale, 1.0)
     values, vectors = np.linalg.eigh(covariance / np.outer(unit, unit))
-    draw: list[float] = (unit * (vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(unit))))).tolist()
+    draw: list[float] = (
+        unit *
+        (vectors @ (np.sqrt(np.maximum(values, 0.0)) * rng.standard_normal(len(unit))))).tolist()
     return draw
