@@ -41,7 +41,7 @@ class ManyChains:
     """D(q) a = τ - c(q, dq) - h(q), solved for a, for every replica."""
 
     def __init__(self, body: BaseArm, p: Array, added: Array, replicas: int) -> None:
-        """Take `p` (parameters,), or (replicas, parameters); `added` [kg m^2] goes to D."""
+        """Take `p` (parameters,); `added` (joints, joints) [kg m^2] goes to D."""
         chain = body.chain
         n = chain.n_joints
         self._added, self._offset = added[..., None], chain.offset[:, None]
@@ -54,10 +54,8 @@ class ManyChains:
         local = np.moveaxis(_local(before, after, turning), 0, -1)
         self._local = np.ascontiguousarray(local.reshape(n, 12, 3))
         self._shifting = np.flatnonzero(~turning)
-        moments = np.array([[_moments(link) for link in body.standard(own).reshape(n, 10)]
-                            for own in np.atleast_2d(p)])
-        spread = np.broadcast_to(np.transpose(moments, (1, 2, 3, 0)), (n, 4, 4, replicas))
-        self._moments = np.ascontiguousarray(spread)
+        moments = np.array([_moments(link) for link in body.standard(p).reshape(n, 10)])
+        self._moments = np.repeat(moments[..., None], replicas, axis=-1)
         self._before = np.tril(np.ones((n, n)))
         self._upper = np.triu(np.ones((n, n), dtype=bool))[..., None]
         self._features = np.ones((n, 3, replicas))
@@ -190,18 +188,14 @@ class ManyRRR:
     """
 
     def __init__(self, body: RRR, p: Array, added: Array) -> None:
-        """Take `p` (15,), or (replicas, 15); `added` (3, 3) [kg m^2] goes to D."""
-        self._table = np.einsum("kfp,...p->kf...", _linear_in_features(body), p)
+        """Take `p` (15,); `added` (3, 3) [kg m^2] goes to D."""
+        self._table = _linear_in_features(body) @ p
         for row, place in zip(self._table, _UPPER, strict=False):
             row[0] += added[place]
 
     def acceleration(self, q: Array, dq: Array, torque: Array, out: Array) -> None:
         """Write a (3, replicas) [rad/s^2] into `out`; `torque` is what is left for motion."""
-        features = _features(q)
-        if self._table.ndim > 2:  # noqa: PLR2004
-            rows = np.einsum("kfr,fr->kr", self._table, features)
-        else:
-            rows = self._table @ features
+        rows = self._table @ _features(q)
         bias = rows[6:].reshape(3, 7, -1) * _products(dq)
         rest = torque - np.add.reduce(bias, axis=1)
         first, second, third, fourth = rows[_COFACTORS]
@@ -272,7 +266,7 @@ def acceleration_of(body: RRR, p: Array, added: Array) -> Callable[..., tuple[fl
     that its elements share are worked out once. A closure holds the arm's numbers: attributes would
     cost a third more.
     """
-    p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11, p12, p13, p14, p15 = p.ravel().tolist()
+    p1, p2, p3, p4, p5, p6, p7, p8, p9, p10, p11, p12, p13, p14, p15 = p.tolist()
     joints, g = body.robot.joints, -body.robot.gravity[2]
     a2, offset2, offset3 = joints[1].a, joints[1].offset, joints[2].offset
     (m11, m12, m13), (_, m22, m23), (_, _, m33) = added.tolist()
@@ -326,8 +320,7 @@ def many_bodies(body: RigidBody, p: Array, added: Array,
         TypeError: no forward dynamics is known of it.
     """
     if isinstance(body, RRR):
-        one = replicas == 1 and p.size == len(body.parameters)
-        return OneRRR(body, p, added) if one else ManyRRR(body, p, added)
+        return OneRRR(body, p, added) if replicas == 1 else ManyRRR(body, p, added)
     if isinstance(body, BaseArm):
         return ManyChains(body, p, added, replicas)
     raise TypeError(f"no forward dynamics is known of a {type(body).__name__}")

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -54,7 +54,7 @@ class Simulated:
 
 
 def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = None,
-        seeds: Iterable[int] = (0, ), exact: bool = True,
+        seeds: Iterable[int] = (0,), exact: bool = True,
         ) -> Simulated:
     """Run one replica for each seed, with `steps` steps of the integrator a sample.
 
@@ -65,11 +65,11 @@ def run(plant: Plant, experiment: Experiment, steps: int, noise: Noise | None = 
         InputRejected: D15, the model's inertia matrix is singular or worse; D17, the simulated arm
             runs away.
     """
-    return run_together(plant, (experiment, ), steps, noise, seeds, exact)[0]
+    return run_together(plant, (experiment,), steps, noise, seeds, exact)[0]
 
 
 def run_together(plant: Plant, experiments: Sequence[Experiment], steps: int,
-                 noise: Noise | None = None, seeds: Iterable[int] = (0, ), exact: bool = True,
+                 noise: Noise | None = None, seeds: Iterable[int] = (0,), exact: bool = True,
                  ) -> list[Simulated]:
     """`run` several experiments at once, which costs hardly more than the longest alone.
 
@@ -125,7 +125,7 @@ class _Lane:
     def run_alone(self) -> None:
         """Run one replica after the other, each from the first to the last sample."""
         for r, seed in enumerate(self.seeds):
-            draws = _draws(self.noise, (seed, ), self.experiment.n_samples)
+            draws = _draws(self.noise, (seed,), self.experiment.n_samples)
             start = np.concatenate([self.state[:, r], self.states[r]])
             ran = run_alone(self.plant, self.experiment, self.steps, start, draws)
             self.motion[..., r], self.counted[..., r], self.commanded[..., r] = ran
@@ -145,8 +145,7 @@ class _Lane:
 def _advance(plant: Plant, lanes: Sequence[_Lane], exact: bool) -> None:
     """Move all lanes side by side to the end of the longest; an ended one keeps its torque."""
     width, time, n = len(lanes[0].t), lanes[0].experiment.sample_time, plant.n_joints
-    own = plant if plant.p.ndim == 1 else replace(plant, p=np.tile(plant.p, (len(lanes), 1)))
-    moving = own.prepared(width * len(lanes))
+    moving = plant.prepared(width * len(lanes))
     held = not exact and HeldBody.fits(moving)
     integrator = (HeldBody if held else RungeKutta)(moving, time, lanes[0].steps)
     t = np.concatenate([lane.t for lane in lanes])

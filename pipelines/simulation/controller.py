@@ -207,7 +207,7 @@ def _model_ahead(experiment: Experiment) -> Array | None:
     if law.law == "pd+feedforward":
         named = law.feedforward or ()
     elif law.law == "computed-torque":
-        named = _among(law.feedforward, ("friction", ))
+        named = _among(law.feedforward, ("friction",))
     if not named:
         return None
     samples: Array = np.arange(experiment.n_samples, dtype=np.float64)

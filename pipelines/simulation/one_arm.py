@@ -44,8 +44,7 @@ class OneArm:
     @staticmethod
     def fits(plant: Plant) -> bool:
         """Return whether nothing moves it but what is known in plain numbers."""
-        closed = isinstance(plant.body, RRR) and plant.p.size == len(plant.body.parameters)
-        return closed and all(_in_numbers(hook) for hook in plant.hooks)
+        return isinstance(plant.body, RRR) and all(_in_numbers(hook) for hook in plant.hooks)
 
     def moved(self, x: Numbers, torque: Numbers) -> Numbers:
         """Return the state after one control sample, not numbers where the arm ran away."""
@@ -133,7 +132,7 @@ def _curve(form: SpeedCurve) -> Callable[[float], float]:
     constant, viscous = form.constant, form.viscous
     pairs = list(zip(form.heights, form.sharpnesses, strict=True))
     if len(pairs) == 1:
-        ((f, w), ) = pairs
+        ((f, w),) = pairs
         return lambda v: constant + viscous * v + f * tanh(w * v)
     if len(pairs) == 3:  # noqa: PLR2004
         (f1, w1), (f2, w2), (f3, w3) = pairs

@@ -35,7 +35,7 @@ class Plant:
     """What moves, in parts."""
 
     body: RigidBody
-    p: Array  # (parameters,), or (replicas, parameters)
+    p: Array  # (parameters,)
     added: Array  # [kg m^2] (joints, joints) inertia of rotors
     curves: tuple[SpeedCurve, ...]  # friction of each joint that follows from its speed alone
     hooks: tuple[Hooks, ...]  # of all other effects
@@ -43,14 +43,8 @@ class Plant:
     records: tuple[Callable[[Array, Array], Array], ...] = ()  # between a command and the log
 
     @classmethod
-    def of(cls, arm: Arm, p: Array | None = None) -> Plant:
-        """Return `arm` in parts, with its own base parameters or with `p` (replicas, parameters).
-
-        Raises:
-            ValueError: p has another shape.
-        """
-        if p is not None and p.shape[1:] != arm.p.shape:
-            raise ValueError(f"p has the shape {p.shape}, wanted is (replicas, {len(arm.p)})")
+    def of(cls, arm: Arm) -> Plant:
+        """Return `arm` in parts."""
         rigid, acting_on = Arm(arm.name, arm.body, arm.base), cast("ArmModel", arm.nominal)
         curves: list[list[SpeedCurve]] = [[] for _ in range(arm.n_joints)]
         hooks, records, added = [], [], np.zeros((arm.n_joints, arm.n_joints))
@@ -67,10 +61,8 @@ class Plant:
             records += [own.record] if own.record else []
             if any((own.load, own.actuator, own.drive, own.sensor, own.settled, own.states)):
                 hooks.append(_alone(effect, values, own))
-        parameters = acting_on.p if p is None else _changed(p, arm.p, acting_on.p)
         gathered = tuple(_gathered(each) for each in curves)
-        needed = arm.nominal.torque
-        return cls(acting_on.body, parameters, added, gathered, tuple(hooks), needed,
+        return cls(acting_on.body, acting_on.p, added, gathered, tuple(hooks), arm.nominal.torque,
                    tuple(records))
 
     @property
@@ -90,8 +82,7 @@ class Plant:
             InputRejected: D15, some torque would accelerate the arm against itself, or without
                 bound.
         """
-        p = np.atleast_2d(self.p)[0]
-        values = np.linalg.eigvalsh(self.body.mass_matrix(q, p) + self.added)
+        values = np.linalg.eigvalsh(self.body.mass_matrix(q, self.p) + self.added)
         worst = int(np.argmin(values[:, 0] / values[:, -1]))
         if values[worst, 0] <= SIMULATION.singular * values[worst, -1]:
             where = ", ".join(f"{x:.3g}" for x in q[worst])
@@ -123,15 +114,6 @@ def _gathered(curves: list[SpeedCurve]) -> SpeedCurve:
                       tuple(height for curve in curves for height in curve.heights),
                       tuple(sharpness for curve in curves for sharpness in curve.sharpnesses),
                       )
-
-
-def _changed(p: Array, nominal: Array, true: Array) -> Array:
-    """Return each replica's parameters with the change that effects made to the nominal ones."""
-    if true.shape != nominal.shape:
-        raise ValueError(
-            "an effect changes the set of base parameters: replicas cannot have parameters of "
-            "their own")
-    return np.asarray(p + (true - nominal))
 
 
 class _Curves:

@@ -41,23 +41,17 @@ class Step:
 
 
 def simulate(arm: Arm, experiment: Experiment, noise: Noise | None = None,
-             seeds: Iterable[int] = (0, ), p: Array | None = None, step: Step | None = None,
-             ) -> Simulated:
+             seeds: Iterable[int] = (0,), step: Step | None = None) -> Simulated:
     """Return what `arm` would have logged in `experiment`, once for each seed.
 
     Args:
         noise: of drives and encoders; none where left out.
-        p: (replicas, parameters) base parameters of each replica, where they differ.
         step: of the integrator; by default as long as `choose_step` allows.
 
     Raises:
         InputRejected: D17, the arm runs away, or no step is small enough.
-        ValueError: p does not fit the arm or the seeds.
     """
-    seeds = tuple(seeds)
-    if p is not None and len(p) != len(seeds):
-        raise ValueError(f"p has {len(p)} rows for {len(seeds)} seeds")
-    plant = Plant.of(arm, p)
+    plant = Plant.of(arm)
     step = choose_step(plant, experiment, noise) if step is None else step
     return run(plant, experiment, step.per_sample, noise, seeds, step.exact)
 
@@ -69,22 +63,21 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
         InputRejected: D15, the model's inertia matrix is singular or worse; D17, the arm runs away
             however small the step, or the step would be too small to be of use.
     """
-    one = plant if plant.p.ndim == 1 else replace(plant, p=plant.p[0])
-    one.refuse_unphysical(experiment.q_ref[:1])
+    plant.refuse_unphysical(experiment.q_ref[:1])
     stretches = _stretches(experiment)
-    random = _noise_difference(one, stretches[:2], noise or Noise.none(experiment.n_joints))
+    random = _noise_difference(plant, stretches[:2], noise or Noise.none(experiment.n_joints))
     counted = experiment.resolution / np.sqrt(6.0)  # of the difference of two unrelated counts
     allowed = np.maximum(SIMULATION.share * np.maximum(random, counted), SIMULATION.unheard)
     calm = [_without_steps(stretch) for stretch in stretches]
-    held = HeldBody.fits(one.prepared(1))
+    held = HeldBody.fits(plant.prepared(1))
     coarse: list[Array] | None = None
     for steps in SIMULATION.steps:
-        fine = _positions(one, calm, 2 * steps)
+        fine = _positions(plant, calm, 2 * steps)
         if held:
-            error = _rms(_positions(one, calm, steps, exact=False), fine)
+            error = _rms(_positions(plant, calm, steps, exact=False), fine)
             if (error <= allowed).all():
                 return Step(steps, error, random, allowed, exact=False)
-        error = _rms(_positions(one, calm, steps) if coarse is None else coarse, fine)
+        error = _rms(_positions(plant, calm, steps) if coarse is None else coarse, fine)
         if (error <= allowed).all():
             return Step(steps, error, random, allowed, exact=True)
         coarse = fine
