@@ -15,12 +15,12 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pipelines.diagnosis.result import Diagnosis, NotIdentifiable
+from pipelines.effects import find_effect
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog
 from pipelines.io.option import option
 from pipelines.io.results import NOT_STORED
-from pipelines.model.effects import find_effect
 from pipelines.report.config import REPORT
 from pipelines.report.report import Report, Section, Table
 from pipelines.report.style import format_number, unit_in_words

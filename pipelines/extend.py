@@ -25,14 +25,14 @@ from pipelines.diagnosis.result import Extended, Extension
 from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.named_cause import refuse_unknown, wanted_cause
+from pipelines.effects import find_effect
+from pipelines.effects.base import Effect
 from pipelines.errors import NothingMatched, UsageError
 from pipelines.estimation.checks.gates import examined, logs_of_roles
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import Source, read_model, write_model
 from pipelines.io.option import option
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import Effect
 from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.estimation.logs import Motions
 from pipelines.model.estimation.outcome import torques, validity

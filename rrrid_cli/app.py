@@ -169,7 +169,7 @@ def _end(name: str) -> str:
         for stage, names in settable(name).items()
     ]
     if any(field.metadata.get("causes") for field in fields(stage_of(name).settings)):
-        from pipelines.model.effects import all_effects
+        from pipelines.effects import all_effects
 
         for scope, title in (("joint", "Causes at one joint"), ("arm", "Causes of the whole arm")):
             effects = [effect for effect in all_effects() if effect.scope == scope]

@@ -24,10 +24,10 @@ from bench.plan import Solid
 from bench.plant import record
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
+from pipelines.effects.three_sigmoid import ThreeSigmoid
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import RobotDescription
-from pipelines.model.effects.three_sigmoid import ThreeSigmoid
 
 SEED = 28  # numerics: of the machine and of its controllers' model
 # Bits behind the point that a number keeps, by its signal. What a computer computed is given to far

@@ -16,7 +16,7 @@ REPO = Path(__file__).resolve().parents[1]
 CONSTANTS = {
     "pipelines/diagnose.py": 1, "pipelines/diagnosis": 11, "pipelines/estimate_bps.py": 1,
     "pipelines/estimation": 30, "pipelines/fit": 54,
-    "pipelines/model": 235, "pipelines/report": 63, "pipelines/signal": 41,
+    "pipelines/model": 174, "pipelines/report": 63, "pipelines/signal": 41,
 }
 
 

@@ -18,7 +18,7 @@ LAYERS = {
     "pipelines.importers": 3,
     "pipelines.fit": 4, "pipelines.signal": 4,
     "pipelines.dynamics": 5,
-    "pipelines.model.effects": 6,
+    "pipelines.effects": 6,
     "pipelines.dynamics.arm": 6.5, "pipelines.dynamics.draw": 6.6, "pipelines.dynamics.named_cause": 6.6, "pipelines.dynamics.parameter_names": 6.5,
     "pipelines.model.even": 6.5, "pipelines.model.measured": 6.5, "pipelines.model.tuned": 6.5,
     "pipelines.model.trackers": 6.6, "pipelines.model.motion": 6.7,
@@ -40,7 +40,7 @@ LAYERS = {
 }
 CALL_STAGES = {"pipelines.run"}
 # Of the effects, all that one of them may import.
-CONTRACT = {f"pipelines.model.effects{end}" for end in ("", ".base", ".fast", ".kinds", ".placed", ".terms")}
+CONTRACT = {f"pipelines.effects{end}" for end in ("", ".base", ".config", ".drive_apart", ".kinds", ".terms")}
 FILES = ("pipelines.io", "pipelines.importers")
 DOORS: dict[str, str | tuple[str, ...]] = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": FILES,
@@ -56,7 +56,7 @@ CIRCLES = {
     ("pipelines.signal.observer", "pipelines.signal.segments", "pipelines.signal.tuning"),
 }
 # What finds its modules by name: stages and effects. Any other import is written out, where the rules can see it.
-BY_NAME = {"pipelines.run", "pipelines.rerender", "pipelines.executor", "pipelines.model.effects", "rrrid_cli.options"}
+BY_NAME = {"pipelines.run", "pipelines.rerender", "pipelines.executor", "pipelines.effects", "rrrid_cli.options"}
 HEAVY = ("pandas", "matplotlib", "scipy", "filterpy", "pyarrow", "pydantic", "jinja2", "mujoco")
 
 
@@ -112,8 +112,8 @@ def _breaches(module: str, imported: set[str]) -> list[str]:
                        and not (module.startswith("bench.faults.") and name.startswith("bench.faults")))
         elif name.startswith("bench"):
             allowed = False
-        elif module.startswith("pipelines.model.effects."):
-            allowed = _layer(name) < LAYERS["pipelines.model.effects"] or name in CONTRACT
+        elif module.startswith("pipelines.effects."):
+            allowed = _layer(name) < LAYERS["pipelines.effects"] or name in CONTRACT
         elif _layer(module) == LAYERS["pipelines"]:
             allowed = _layer(name) < LAYERS["pipelines"] or module in CALL_STAGES
         else:
@@ -130,7 +130,7 @@ def test_a_line_imports_only_lines_below() -> None:
 def test_the_rule_can_be_broken() -> None:
     """Each kind of breach is seen: upwards, sideways between stages, between effects, out of the bench."""
     for module, imported in (("pipelines.io.files", "pipelines.dynamics.body"), ("pipelines.convert", "pipelines.inspect"),
-                             ("pipelines.model.effects.coulomb", "pipelines.model.effects.viscous"),
+                             ("pipelines.effects.coulomb", "pipelines.effects.viscous"),
                              ("pipelines.signal", "pipelines.fit"), ("bench.plant", "pipelines.dynamics.arm"),
                              ("bench.faults.load", "bench.faults.drive"),
                              ("pipelines.run", "bench"),

@@ -32,10 +32,10 @@ from bench.plant import peak_torque
 from benchmarks.hidden_effects.cases import Hidden, SealedCase
 from benchmarks.hidden_effects.robots import ROBOTS
 from pipelines.dynamics.arm import Acting, Arm
+from pipelines.effects.coulomb import Coulomb
+from pipelines.effects.viscous import Viscous
 from pipelines.errors import UsageError
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.effects.viscous import Viscous
 from sample_logs.bench_session import ControllerModel, controller_model, recorded
 
 _BEFORE, _NOW = datetime(2026, 3, 2, 9, 0), datetime(2026, 5, 18, 9, 0)  # UTC

@@ -20,10 +20,10 @@ from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.unnamed import Key, Make, Unnamed
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
+from pipelines.effects import all_effects
+from pipelines.effects.base import Effect, everywhere
+from pipelines.effects.torque_lag import TorqueLag
 from pipelines.fit.joint_table import Array, Indices, Table
-from pipelines.model.effects import all_effects
-from pipelines.model.effects.base import Effect, everywhere
-from pipelines.model.effects.torque_lag import TorqueLag
 from pipelines.model.rows.families import Family, Laid, families, lay_family, whole_motion
 
 __all__ = ["Dictionary", "Group", "Kind", "laid"]

@@ -14,9 +14,9 @@ import numpy as np
 
 from pipelines.diagnosis.result import Answer, NotIdentifiable
 from pipelines.dynamics.arm import Acting, Arm
+from pipelines.effects import all_effects, find_effect
 from pipelines.errors import InputRejected
 from pipelines.io.log import ExperimentLog
-from pipelines.model.effects import all_effects, find_effect
 from pipelines.model.frf import findings as frf
 from pipelines.model.frf.modes import relative_acceleration
 

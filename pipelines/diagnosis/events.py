@@ -14,10 +14,10 @@ from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
 from pipelines.dynamics.arm import Arm
+from pipelines.effects.base import Effect
+from pipelines.effects.kinds import Event
 from pipelines.fit.bootstrap import chi2_bound, upper_point
 from pipelines.fit.joint_table import Array, Indices, by_joint
-from pipelines.model.effects.base import Effect
-from pipelines.model.effects.kinds import Event
 
 __all__ = ["DIRECTIONS", "Window", "push_of", "windows_of"]
 

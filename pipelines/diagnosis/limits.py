@@ -33,11 +33,11 @@ from pipelines.diagnosis.result import (
 )
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
+from pipelines.effects import all_effects
+from pipelines.effects.base import Effect, Quantity
+from pipelines.effects.kinds import FrictionLaw
 from pipelines.fit.joint_table import Array
 from pipelines.friction.laws import LADDER
-from pipelines.model.effects import all_effects
-from pipelines.model.effects.base import Effect, Quantity
-from pipelines.model.effects.kinds import FrictionLaw
 
 __all__ = ["Limits", "limits_of", "without_limit"]
 

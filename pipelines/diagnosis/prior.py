@@ -28,9 +28,9 @@ from pipelines.diagnosis.dataset import Dataset
 from pipelines.diagnosis.score import Blocks
 from pipelines.diagnosis.unnamed import FORM
 from pipelines.diagnosis.variance import Components, components
+from pipelines.effects import find_effect
+from pipelines.effects.kinds import FrictionLaw
 from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.kinds import FrictionLaw
 
 __all__ = ["RIDGE", "Belief", "Prior", "prior_of", "rubs"]
 

@@ -25,7 +25,7 @@ from pipelines.diagnosis.selection import Candidate, best_law, refit
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.trained import Standing, told
 from pipelines.diagnosis.unnamed import FORM, Key
-from pipelines.model.effects.base import adds
+from pipelines.effects.base import adds
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.fit import acting, refine
 

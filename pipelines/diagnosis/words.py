@@ -15,8 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from pipelines.diagnosis.result import Alternative, Diagnosis, Finding, Value
+from pipelines.effects import find_effect
 from pipelines.io.log import Array
-from pipelines.model.effects import find_effect
 from pipelines.model.words import plain_number, within
 
 __all__ = ["how_much", "of_any_size", "other_joint", "summary_of", "taken_in", "where"]

@@ -66,7 +66,7 @@ def _in_base(body: RigidBody, torque: Array) -> Array:
 
 
 def standard_of(body: RigidBody, p: Array) -> Array:
-    """Return Standard parameters (10 · joints,) with the torques of p."""
+    """Return standard parameters (10 · joints,) with the torques of p."""
     return np.asarray(body.links_behind @ p)
 
 
@@ -190,10 +190,6 @@ def tip_parameters(body: RigidBody) -> Array:
 
 
 def gravity_torque(body: RigidBody, q: Array, phi: Array, field: Array) -> Array:
-    """Return (samples.
-
-    Joints) [N m] at rest of standard parameters phi (10 · joints,) in a gravity of `field` (3,)
-    [m/s^2].
-    """
+    """Return the torque (samples, joints) at rest, of phi (10 · joints,) in a `field` (3,)."""
     still = np.zeros_like(q)
     return inverse_dynamics(chain_of(body), q, still, still, phi, field)

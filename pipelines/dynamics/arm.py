@@ -17,6 +17,8 @@ import numpy as np
 from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.parameter import Origin, Parameter, Uncertainty
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.effects import effect_names, find_effect
+from pipelines.effects.base import ArmModel, Effect, SpeedCurve, joints_of
 from pipelines.errors import InputRejected, UsageError, did_you_mean
 from pipelines.io.model_file import (
     ModelFile,
@@ -27,9 +29,6 @@ from pipelines.io.model_file import (
     Validity,
 )
 from pipelines.io.robot import RobotDescription, format_robot, parse_robot
-from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.effects.base import ArmModel, Effect, SpeedCurve, joints_of
-from pipelines.model.effects.fast import speed_curve
 
 __all__ = ["Acting", "Arm", "ArmTorque"]
 
@@ -186,7 +185,7 @@ class Arm:
         rigid = replace(self, friction=(), effects=())
         torque = np.zeros_like(motion.q)
         for law in self.friction:
-            curve = speed_curve(law.effect, law.values)
+            curve = law.effect.speed_curve(law.values)
             if curve is not None and law.effect.joint is not None:
                 torque[:, law.effect.joint - 1] += curve.torque(motion.dq[:, law.effect.joint - 1])
             else:
@@ -199,7 +198,7 @@ class Arm:
         None where one of them is more than that.
         """
         curves = [
-            speed_curve(law.effect, law.values) for law in self.friction
+            law.effect.speed_curve(law.values) for law in self.friction
             if law.effect.joint in (joint, None)
         ]
         known = tuple(curve for curve in curves if curve is not None)
@@ -279,7 +278,7 @@ def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: 
     effect = find_effect(stored.effect)
     if stored.joint not in (joints_of(effect, revolute) if effect.scope == "joint" else (None,)):
         turning = " that turns" if effect.scope == "joint" and not joints_of(effect,
-                                                                             (False, )) else ""
+                                                                             (False,)) else ""
         raise InputRejected(
             "S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where, remedy
             =f"it belongs to one {effect.scope}{turning}, and the arm has {len(revolute)} joints")

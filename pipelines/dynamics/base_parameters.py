@@ -81,7 +81,7 @@ def base_set(chain: SerialChain, rng: np.random.Generator) -> BaseSet:
 
 
 def _preference(chain: SerialChain) -> list[int]:
-    """Return Standard parameters, those that a joint shows first, of the last link first.
+    """Return standard parameters, those that a joint shows first, of the last link first.
 
     Mass that sits on a revolute joint's axis can be moved to the link before it: the mass, the
     first moment along the axis and one of the moments across it are left for last (Gautier & Khalil
@@ -168,7 +168,7 @@ class BaseArm:
         return serial.regressor(self.chain, q, dq, ddq, self.base.chosen)
 
     def standard(self, p: Array) -> Array:
-        """Return Standard parameters (joints * 10,) with the torques of p.
+        """Return standard parameters (joints * 10,) with the torques of p.
 
         Everything not in the base set is zero.
         """

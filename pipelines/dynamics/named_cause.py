@@ -15,9 +15,9 @@ import math
 from collections.abc import Sequence
 
 from pipelines.dynamics.arm import Acting
+from pipelines.effects import effect_names, find_effect
+from pipelines.effects.base import Effect, Quantity, joints_of
 from pipelines.errors import UsageError, did_you_mean
-from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.effects.base import Effect, Quantity, joints_of
 
 __all__ = ["acting_cause", "refuse_unknown", "wanted_cause"]
 

@@ -13,8 +13,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from pipelines.model.effects import effect_names, find_effect
-from pipelines.model.effects.base import Quantity
+from pipelines.effects import effect_names, find_effect
+from pipelines.effects.base import Quantity
 
 __all__ = ["Named", "named_in", "numbered", "part_of", "quantity_of"]
 

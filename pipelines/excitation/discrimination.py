@@ -24,13 +24,13 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array, Motion
+from pipelines.effects.base import Effect
 from pipelines.errors import Interrupted, UsageError
 from pipelines.excitation.config import CONFIG
 from pipelines.excitation.optimise import Design, Effort, design, finished, landscape
 from pipelines.excitation.regressor import grams_of_rows
 from pipelines.excitation.rehearsal import Rehearsal, rehearsed_design
 from pipelines.excitation.task import Task
-from pipelines.model.effects.base import Effect
 
 __all__ = ["Alike", "Apart", "Found", "Pair", "alike", "best", "refuse_hidden", "refuse_one",
            "told_apart"]

@@ -16,6 +16,7 @@ import numpy as np
 
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array, Motion
+from pipelines.effects import find_effect
 from pipelines.errors import InputRejected
 from pipelines.fit.varpro import with_block_covariance
 from pipelines.friction.breakaway import Event, break_away, held_at_least
@@ -43,7 +44,6 @@ from pipelines.friction.weak_form import (
 )
 from pipelines.io.log import ExperimentLog
 from pipelines.io.robot import RobotDescription
-from pipelines.model.effects import find_effect
 from pipelines.model.motion import Reconstructed, encoder_resolution
 
 __all__ = ["METHODS", "JointFit", "JointLogs", "Seen", "by_method", "fit_joint", "fractions",

@@ -25,10 +25,9 @@ import numpy as np
 
 from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.effects import find_effect
+from pipelines.effects.base import ArmModel, Effect, Quantity, SpeedCurve
 from pipelines.io.robot import Joint, RobotDescription
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, SpeedCurve
-from pipelines.model.effects.fast import from_motion, own_memory, shape_slopes
 
 __all__ = ["LADDER", "Law", "NonlinearNumber", "OneJoint", "gravity_acts", "gravity_columns",
            "gravity_names", "law_named", "with_further"]
@@ -185,13 +184,13 @@ class Law:
     @cached_property
     def pointwise(self) -> bool:
         """Return whether its torque at a moment depends on that moment alone, unlike presliding."""
-        return all(own_memory(effect, effect.values(np.ones(count))) is None
+        return all(effect.own_memory(effect.values(np.ones(count))) is None
                    for effect, count in zip(self.effects, self._counts, strict=True))
 
     @cached_property
     def sees_load(self) -> bool:
         """Return whether it depends on the torque that the joint carries."""
-        return not all(from_motion(effect) for effect in self.effects)
+        return not all(effect.from_motion for effect in self.effects)
 
     @cached_property
     def sloped(self) -> bool:
@@ -242,7 +241,7 @@ class Law:
         for k, (effect, part) in enumerate(zip(self.shaped(theta), parts, strict=True)):
             own = [i for i, number in enumerate(self.nonlinear) if k in number.effects]
             if own:
-                slopes = shape_slopes(effect, motion, part)
+                slopes = effect.shape_slopes(motion, part)
                 if slopes is None:
                     return None
                 total[own] += slopes.T

@@ -14,7 +14,6 @@ from pipelines.friction.config import SimulationConfig
 from pipelines.friction.fit import LawFit
 from pipelines.friction.laws import OneJoint, gravity_columns
 from pipelines.friction.weak_form import Stretch
-from pipelines.model.effects.fast import own_load, own_memory, speed_curve
 
 __all__ = ["Simulated", "simulate_joint"]
 
@@ -75,12 +74,12 @@ def _rate_of(fit: LawFit, joint: OneJoint) -> Rate:
     loads, memories, drives, tanh, inertia = [], [], [], math.tanh, joint.inertia
     values = fit.law.values(fit.theta, fit.amplitudes)
     for effect, own in zip(fit.law.shaped(fit.theta), values, strict=True):
-        if (curve := speed_curve(effect, own)) is not None:
+        if (curve := effect.speed_curve(own)) is not None:
             constant, viscous = constant + curve.constant, viscous + curve.viscous
             sigmoids += zip(curve.heights, curve.sharpnesses, strict=True)
-        elif (memory := own_memory(effect, own)) is not None:
+        elif (memory := effect.own_memory(own)) is not None:
             memories.append(memory)
-        elif (load_of := own_load(effect, own)) is not None:
+        elif (load_of := effect.own_load(own)) is not None:
             loads.append(load_of)
         elif (hook := effect.simulate(joint, own)).drive is not None:
             drives.append(hook.drive[1])  # friction that grows with load lowers the command

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.dynamics.body import Array
+from pipelines.effects import find_effect
 from pipelines.friction.config import SpeedConfig
 from pipelines.friction.fit import LawFit
 from pipelines.friction.model_selection import Ladder, Missing, undecided
 from pipelines.friction.weak_form import Mask, Stretch
-from pipelines.model.effects import find_effect
 
 __all__ = ["Coverage", "coverage", "speed_map", "unseen"]
 

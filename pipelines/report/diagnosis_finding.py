@@ -13,8 +13,8 @@ import numpy as np
 from pipelines.diagnosis.result import Answer, Finding, Gain, ResidualRms, TipError
 from pipelines.diagnosis.words import of_any_size, taken_in, where
 from pipelines.dynamics.parameter_names import numbered
+from pipelines.effects import find_effect
 from pipelines.io.log import Array
-from pipelines.model.effects import find_effect
 from pipelines.model.rows.residual_analysis import Proof
 from pipelines.report import style
 from pipelines.report.figures import (

@@ -21,8 +21,8 @@ from pipelines.diagnosis.result import (
     Value,
 )
 from pipelines.diagnosis.words import how_much, of_any_size, taken_in, where
+from pipelines.effects import find_effect
 from pipelines.io.log import Array
-from pipelines.model.effects import find_effect
 from pipelines.model.words import within
 from pipelines.report.diagnosis_finding import (
     all_together,

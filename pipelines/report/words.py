@@ -17,7 +17,7 @@ from pipelines.diagnosis.result import Diagnosis, Extension, Finding, Rejected, 
 from pipelines.diagnosis.result import Result as Diagnosed
 from pipelines.diagnosis.words import other_joint
 from pipelines.dynamics.parameter_names import Named, named_in, numbered, part_of
-from pipelines.model.effects import effect_names, find_effect
+from pipelines.effects import effect_names, find_effect
 from pipelines.model.rows.prepare import FewerTerms
 from pipelines.model.words import within
 from pipelines.report.sentences import capital, sentence

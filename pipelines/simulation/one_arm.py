@@ -16,9 +16,9 @@ import numpy as np
 
 from pipelines.dynamics.functions import NUMBERS
 from pipelines.dynamics.rrr import RRR
+from pipelines.effects.base import Hooks, SpeedCurve
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
-from pipelines.model.effects.base import Hooks, SpeedCurve
 from pipelines.simulation.bodies import acceleration_of
 from pipelines.simulation.config import SIMULATION
 from pipelines.simulation.controller import Feedback, ahead_of

@@ -20,10 +20,9 @@ import numpy as np
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion, RigidBody
 from pipelines.dynamics.functions import ARRAYS
+from pipelines.effects.base import ArmModel, Effect, Hooks, SpeedCurve, Values
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, SpeedCurve, Values
-from pipelines.model.effects.fast import own_load, own_memory, speed_curve
 from pipelines.simulation.bodies import ManyChains, many_bodies
 from pipelines.simulation.config import SIMULATION
 
@@ -50,7 +49,7 @@ class Plant:
         hooks, records, added = [], [], np.zeros((arm.n_joints, arm.n_joints))
         for place, acting in enumerate((*arm.friction, *arm.effects)):
             effect, values = acting.effect, {k: float(x) for k, x in acting.values.items()}
-            curve = speed_curve(effect, values)
+            curve = effect.speed_curve(values)
             if curve is not None and effect.joint is not None:
                 curves[effect.joint - 1].append(curve)
                 continue
@@ -101,7 +100,7 @@ def _alone(effect: Effect, values: Values, own: Hooks) -> Hooks:
     """Return the hooks of an effect, its load as a function of its joint where it is one."""
     if own.actuator or own.drive or effect.joint is None:
         return own
-    joint, load, memory = effect.joint - 1, own_load(effect, values), own_memory(effect, values)
+    joint, load, memory = effect.joint - 1, effect.own_load(values), effect.own_memory(values)
     if memory is not None:
         return replace(own, load=None, rate=None, remembering=(joint, memory))
     return own if load is None else replace(own, load=None, alone=(joint, load))

@@ -20,9 +20,9 @@ from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
 from pipelines.dynamics.draw import drawn
 from pipelines.dynamics.kinematics import serial_chain, tip_position
+from pipelines.effects.base import Hooks
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.effects.base import Hooks
 from pipelines.model.motion import Reconstructed
 from pipelines.simulation.closed_loop import run
 from pipelines.simulation.experiment import Experiment

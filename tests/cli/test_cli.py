@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 import pytest
 
+from pipelines.effects import all_effects
 from pipelines.io.files import open_log, write_log
-from pipelines.model.effects import all_effects
 from tests.cli.commands import REPO, rrrid
 from tests.healthy import good_log, with_signal
 from tests.io.logs import small_log

@@ -11,9 +11,9 @@ from bench import experiments
 from bench.draw import draw_machine
 from bench.faults import make
 from bench.plant import record
+from pipelines.effects import effect_names
 from pipelines.io.files import write_log
 from pipelines.io.log import ExperimentLog
-from pipelines.model.effects import effect_names
 
 __all__ = ["but", "healthy_again", "session", "written"]
 

@@ -14,8 +14,8 @@ from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.extension import extend
 from pipelines.diagnosis.limits import Limits, limits_of
 from pipelines.diagnosis.result import Diagnosis, Extended, Finding
+from pipelines.effects import find_effect
 from pipelines.io.files import open_log
-from pipelines.model.effects import find_effect
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 

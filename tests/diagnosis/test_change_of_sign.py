@@ -9,8 +9,8 @@ import pytest
 
 from pipelines.diagnosis.dataset import load
 from pipelines.dynamics.body import Motion
+from pipelines.effects.coulomb import Coulomb
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.effects.coulomb import Coulomb
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare
 from tests.diagnose.sessions import but

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Motion
+from pipelines.effects import find_effect
 from pipelines.io.log import Array
-from pipelines.model.effects import find_effect
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs
 from tests.diagnosis.arms import hidden, wave

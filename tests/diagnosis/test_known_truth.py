@@ -10,9 +10,9 @@ import pytest
 
 from pipelines import diagnose
 from pipelines.dynamics.body import Motion
+from pipelines.effects import find_effect
 from pipelines.io.files import open_log
 from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.effects import find_effect
 from pipelines.model.rows.prepare import Logs
 from pipelines.stage import Request
 from tests.diagnose.sessions import but, session, written

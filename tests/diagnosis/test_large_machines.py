@@ -11,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from pipelines.effects.quadratic_drag import QuadraticDrag
 from pipelines.io.log import Array, ExperimentLog, Signal
-from pipelines.model.effects.quadratic_drag import QuadraticDrag
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs
 from tests.diagnosis.asking import answered, extended

@@ -15,9 +15,9 @@ from bench.plant import record
 from pipelines.diagnosis.limits import without_limit
 from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
 from pipelines.dynamics.arm import Acting
+from pipelines.effects import effect_names
+from pipelines.effects.two_sigmoid import TwoSigmoid
 from pipelines.io.log import ExperimentLog
-from pipelines.model.effects import effect_names
-from pipelines.model.effects.two_sigmoid import TwoSigmoid
 from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but
 from tests.diagnosis.asking import answered, causes, diagnosed

@@ -10,13 +10,13 @@ import pytest
 from pipelines.diagnosis.trained import parameters, told
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
+from pipelines.effects.base import Effect
+from pipelines.effects.cogging import Cogging
+from pipelines.effects.gravity_tilt import GravityTilt
+from pipelines.effects.payload import Payload
+from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.effects.transmission_coupling import TransmissionCoupling
 from pipelines.io.log import Array
-from pipelines.model.effects.base import Effect
-from pipelines.model.effects.cogging import Cogging
-from pipelines.model.effects.gravity_tilt import GravityTilt
-from pipelines.model.effects.payload import Payload
-from pipelines.model.effects.torque_offset import TorqueOffset
-from pipelines.model.effects.transmission_coupling import TransmissionCoupling
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, Named
 from pipelines.model.rows.fit import Refined, _by_slopes, acting, refine

@@ -12,6 +12,17 @@ import pytest
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.parameter import Parameter
+from pipelines.effects.base import (
+    LARGE,
+    ArmModel,
+    Effect,
+    Parameters,
+    Predict,
+    Quantity,
+    Words,
+)
+from pipelines.effects.cogging import Cogging
+from pipelines.effects.viscous import Viscous
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.model_file import (
     ModelFile,
@@ -23,17 +34,6 @@ from pipelines.io.model_file import (
 )
 from pipelines.io.robot import Joint, LinkParameters, RobotDescription
 from pipelines.io.robot_files import load_robot
-from pipelines.model.effects.base import (
-    LARGE,
-    ArmModel,
-    Effect,
-    Parameters,
-    Predict,
-    Quantity,
-    Words,
-)
-from pipelines.model.effects.cogging import Cogging
-from pipelines.model.effects.viscous import Viscous
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.rrr_arms import column, random_states
 

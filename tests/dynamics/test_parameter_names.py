@@ -7,7 +7,7 @@ import math
 import pytest
 
 from pipelines.dynamics.parameter_names import quantity_of
-from pipelines.model.effects import effect_names, find_effect
+from pipelines.effects import effect_names, find_effect
 
 
 @pytest.mark.parametrize("effect", effect_names())

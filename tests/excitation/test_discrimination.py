@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from pipelines.effects.spring import Spring
+from pipelines.effects.torque_offset import TorqueOffset
 from pipelines.excitation import discrimination as telling
 from pipelines.excitation.discrimination import Pair, best
 from pipelines.excitation.optimise import Design, Effort, design, final_problem, finished
 from pipelines.excitation.task import Task, Wishes, plan_task
-from pipelines.model.effects.spring import Spring
-from pipelines.model.effects.torque_offset import TorqueOffset
 from tests.excitation.arms import described, rrr
 
 PAIR = Pair(Spring(joint=2), TorqueOffset(joint=2))

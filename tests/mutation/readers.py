@@ -18,10 +18,10 @@ from pipelines import import_log, inspect, reconstruct, simulate
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.named_cause import acting_cause
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.effects.base import Motion
 from pipelines.io.files import open_log, write_log
 from pipelines.io.model_file import model_text, read_model
 from pipelines.io.robot_files import load_robot
-from pipelines.model.effects.base import Motion
 from pipelines.stage import Request, Stage
 from rrrid_cli.options import make_settings
 from tests.healthy import fourier, make_log

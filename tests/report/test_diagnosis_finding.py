@@ -12,7 +12,7 @@ from matplotlib.figure import Figure as Drawing
 
 from pipelines.diagnosis.result import Answer, Finding, Gain, Rejected, ResidualRms, Value
 from pipelines.diagnosis.words import how_much, taken_in, where
-from pipelines.model.effects import find_effect
+from pipelines.effects import find_effect
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.model.rows.residual_analysis import Proof
 from pipelines.report.diagnosis_finding import draw_proof_in_time, finding_section

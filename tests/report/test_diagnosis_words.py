@@ -25,7 +25,7 @@ from pipelines.diagnosis.result import (
     Trial,
     Value,
 )
-from pipelines.model.effects import effect_names, find_effect
+from pipelines.effects import effect_names, find_effect
 from pipelines.model.rows.fit import TorqueGain
 from pipelines.report.diagnosis_finding import (
     finding_section,

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from pipelines.model.effects import effect_names, find_effect
+from pipelines.effects import effect_names, find_effect
 from pipelines.report.result_figures import fitted, residuals, robot_of
 from pipelines.report.words import figure_in_words
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
+from pipelines.effects.drive_lag import DriveLag
 from pipelines.errors import InputRejected
 from pipelines.io.log import ExperimentLog
-from pipelines.model.effects.drive_lag import DriveLag
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal

@@ -12,10 +12,10 @@ import pytest
 
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
+from pipelines.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
+from pipelines.effects.quadratic_drag import QuadraticDrag
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
-from pipelines.model.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
-from pipelines.model.effects.quadratic_drag import QuadraticDrag
 from pipelines.simulation import Plant, run
 from tests.seeds import rarely
 from tests.simulation.arms import KD, KP, TS, Case, experiment, rrr, rrr_friction, waving

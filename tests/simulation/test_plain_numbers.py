@@ -11,17 +11,17 @@ import pytest
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array
 from pipelines.dynamics.functions import ARRAYS, NUMBERS
+from pipelines.effects.cogging import Cogging
+from pipelines.effects.gravity_tilt import GravityTilt
+from pipelines.effects.load_friction import LoadFriction
+from pipelines.effects.presliding import Presliding
+from pipelines.effects.spring import Spring
+from pipelines.effects.stribeck import Stribeck
+from pipelines.effects.torque_crosstalk import TorqueCrosstalk
+from pipelines.effects.torque_gain import TorqueGain
+from pipelines.effects.torque_saturation import TorqueSaturation
 from pipelines.errors import InputRejected
 from pipelines.io.log import Controller
-from pipelines.model.effects.cogging import Cogging
-from pipelines.model.effects.gravity_tilt import GravityTilt
-from pipelines.model.effects.load_friction import LoadFriction
-from pipelines.model.effects.presliding import Presliding
-from pipelines.model.effects.spring import Spring
-from pipelines.model.effects.stribeck import Stribeck
-from pipelines.model.effects.torque_crosstalk import TorqueCrosstalk
-from pipelines.model.effects.torque_gain import TorqueGain
-from pipelines.model.effects.torque_saturation import TorqueSaturation
 from pipelines.simulation import Noise, Plant, run
 from pipelines.simulation.integrate import RungeKutta
 from pipelines.simulation.one_arm import OneArm, runs_alone

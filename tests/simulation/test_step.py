@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
+from pipelines.effects.coulomb import Coulomb
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
-from pipelines.model.effects.coulomb import Coulomb
 from pipelines.simulation import Noise, Plant, choose_step, run, simulate
 from tests.seeds import rarely
 from tests.simulation.arms import KD, KP, TS, experiment, rrr, rrr_friction, waving

@@ -15,9 +15,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from pipelines.effects import find_effect
+from pipelines.effects.base import everywhere
 from pipelines.errors import Check
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import everywhere
 from pipelines.model.estimation.estimate import Estimate, estimate
 from pipelines.model.estimation.regression import LogEquations
 

@@ -11,11 +11,11 @@ from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion, RigidBody
 from pipelines.dynamics.parameter import Parameter, Uncertainty
 from pipelines.dynamics.rrr import rigid_body
+from pipelines.effects import find_effect
+from pipelines.effects.base import Effect, everywhere
+from pipelines.effects.kinds import FrictionLaw
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import Effect, everywhere
-from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.estimate import Estimate
 from pipelines.model.estimation.regression import Columns
 

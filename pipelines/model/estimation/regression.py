@@ -20,9 +20,9 @@ import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion, RigidBody
 from pipelines.dynamics.rrr import ACTING, RRR
+from pipelines.effects.base import ArmModel, Effect
 from pipelines.fit.contrasts import of_mean
 from pipelines.fit.equations import Block
-from pipelines.model.effects.base import ArmModel, Effect
 from pipelines.model.estimation.conditioning import Conditioning
 from pipelines.model.estimation.peaks import bridged, near_peaks
 from pipelines.model.motion import Reconstructed

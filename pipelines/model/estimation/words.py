@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from pipelines.model.effects import find_effect
+from pipelines.effects import find_effect
 from pipelines.model.words import within
 
 __all__ = ["column_in_words", "columns_in_words"]

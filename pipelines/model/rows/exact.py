@@ -21,10 +21,9 @@ import numpy as np
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
+from pipelines.effects.base import ArmModel, Effect, Quantity, adds
+from pipelines.effects.kinds import FrictionLaw
 from pipelines.io.log import Array
-from pipelines.model.effects.base import ArmModel, Effect, Quantity, adds
-from pipelines.model.effects.fast import from_motion
-from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.nominal import (
@@ -193,7 +192,7 @@ class Exact:
         return self._nominal_rows(data)
 
     def _nominal_rows(self, data: Data) -> Array:
-        if not all(from_motion(law) for law in self.columns.laws):
+        if not all(law.from_motion for law in self.columns.laws):
             return data.lay(self.nominal.torque)
         kept = len(self.columns.kept)
         torque, first = rigid_rows(data, self.columns, self.beta[:kept]), kept

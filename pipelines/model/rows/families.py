@@ -19,11 +19,10 @@ import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
+from pipelines.effects import all_effects
+from pipelines.effects.base import Effect, everywhere
 from pipelines.errors import UsageError
 from pipelines.io.log import Array
-from pipelines.model.effects import all_effects
-from pipelines.model.effects.base import Effect, everywhere
-from pipelines.model.effects.fast import from_motion, own_columns, several_columns
 from pipelines.model.rows.data import Data, LogData
 
 __all__ = ["Family", "Laid", "Wanted", "families", "first_samples", "lay_family", "place_of", "usable", "whole_motion"]
@@ -110,7 +109,7 @@ def lay_family(data: Data, family: Family, arm: Arm) -> Iterator[Laid]:
 
 
 def _lay_some(data: Data, some: Sequence[Effect], first: int, arm: Arm) -> Laid:
-    joint = some[0].joint if from_motion(some[0]) else None
+    joint = some[0].joint if some[0].from_motion else None
     with np.errstate(all="ignore"):
         if joint is not None:
             acting = np.arange(data.n_joints) == joint - 1
@@ -125,7 +124,7 @@ def _lay_some(data: Data, some: Sequence[Effect], first: int, arm: Arm) -> Laid:
 
 def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Columns:
     """(shapes, k, rows of the joint) of effects that act on it alone."""
-    table = own_columns(some, one.motion, arm)
+    table = some[0].own_columns(some, one.motion, arm)
     for shape in table:
         shape[...] = _finite(shape)
     rows = one.lay_signals(table.reshape(-1, table.shape[2]).astype(np.float32), np.full(len(some) * table.shape[1], joint - 1))
@@ -134,7 +133,7 @@ def _laid_own(one: LogData, some: Sequence[Effect], joint: int, arm: Arm) -> Col
 
 def _laid_anywhere(one: LogData, some: Sequence[Effect], arm: Arm) -> Columns:
     """(shapes, k, joints, rows)"""
-    tables = [_finite(table).transpose(2, 1, 0) for table in several_columns(some, one.motion, arm)]
+    tables = [_finite(table).transpose(2, 1, 0) for table in some[0].several(some, one.motion, arm)]
     k, joints, samples = tables[0].shape
     acting = np.flatnonzero([any(table[:, j].any() for table in tables) for j in range(joints)])
     flat = np.empty((len(some), k, len(acting), samples), np.float32)

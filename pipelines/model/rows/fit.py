@@ -20,11 +20,11 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.arm import Acting, Arm
+from pipelines.effects.base import Effect, Values
+from pipelines.effects.kinds import FrictionLaw
 from pipelines.fit.bootstrap import apart
 from pipelines.fit.differences import difference
 from pipelines.io.log import Array
-from pipelines.model.effects.base import Effect, Values
-from pipelines.model.effects.kinds import FrictionLaw
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact, Named, Which, number_moved, slopes_of
 from pipelines.model.rows.nominal import rigid_rows

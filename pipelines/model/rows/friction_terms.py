@@ -18,10 +18,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from pipelines.effects import find_effect
+from pipelines.effects.base import Effect
+from pipelines.effects.kinds import plainer
 from pipelines.io.log import Array
-from pipelines.model.effects import find_effect
-from pipelines.model.effects.base import Effect
-from pipelines.model.effects.kinds import plainer
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data
 from pipelines.model.rows.exact import Exact

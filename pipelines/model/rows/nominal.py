@@ -18,10 +18,9 @@ import numpy as np
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.parameter import Parameter
+from pipelines.effects.base import ArmModel, Effect, Quantity
+from pipelines.effects.kinds import FrictionLaw, plainer
 from pipelines.io.log import Array
-from pipelines.model.effects.base import ArmModel, Effect, Quantity
-from pipelines.model.effects.fast import from_motion, several_columns
-from pipelines.model.effects.kinds import FrictionLaw, plainer
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data
 
@@ -140,7 +139,7 @@ def law_rows(data: Data, law: Effect, columns: Columns) -> Array:
 
 def effect_rows(data: Data, effect: Effect, arm: ArmModel, times: Array | None = None) -> Array:
     """(k, rows) columns of an effect in one shape, or (rows,) [N m] with the amplitudes `times`."""
-    if from_motion(effect):
+    if effect.from_motion:
         return data.lay_kept(effect, lambda motion: effect.columns(motion, arm), times)
     columns = data.lay(lambda motion: effect.columns(motion, arm))
     return columns if times is None else np.asarray(times @ columns)
@@ -148,9 +147,9 @@ def effect_rows(data: Data, effect: Effect, arm: ArmModel, times: Array | None =
 
 def several_rows(data: Data, shapes: Sequence[Effect], arm: ArmModel) -> list[Array]:
     """The same of several shapes of an effect, each (k, rows)."""
-    if not shapes or from_motion(shapes[0]):
+    if not shapes or shapes[0].from_motion:
         return [effect_rows(data, shape, arm) for shape in shapes]
-    laid = data.lay(lambda motion: np.concatenate(several_columns(shapes, motion, arm), axis=2))
+    laid = data.lay(lambda motion: np.concatenate(shapes[0].several(shapes, motion, arm), axis=2))
     return np.split(laid, len(shapes))
 
 

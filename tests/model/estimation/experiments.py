@@ -11,9 +11,9 @@ import numpy as np
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
+from pipelines.effects.coulomb import Coulomb
+from pipelines.effects.viscous import Viscous
 from pipelines.io.log import Array, Controller, ExperimentLog
-from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.effects.viscous import Viscous
 from pipelines.simulation import Experiment, Noise, simulate
 from sample_logs.make_closed_form import (
     NOISE,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.effects.torque_offset import TorqueOffset
-from pipelines.model.effects.viscous import Viscous
+from pipelines.effects.coulomb import Coulomb
+from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.effects.viscous import Viscous
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import Refined, dissipating, driving, refine

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting
-from pipelines.model.effects import all_effects, find_effect
-from pipelines.model.effects.base import Effect, adds
+from pipelines.effects import all_effects, find_effect
+from pipelines.effects.base import Effect, adds
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.nominal import fit_nominal
 from pipelines.model.rows.prepare import Logs, Prepared, prepare
 from tests.diagnosis.arms import hidden
-from tests.model.effects.test_every_effect import drawn, placed
+from tests.effects.test_every_effect import drawn, placed
 
 ACTING = [kind for kind in all_effects() if not adds(placed(kind))]
 STANDING = ("cogging", "stribeck", "torque_offset")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.model.effects import find_effect
+from pipelines.effects import find_effect
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import refine

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipelines.model.effects.base import Effect
-from pipelines.model.effects.gravity_tilt import GravityTilt
-from pipelines.model.effects.torque_gain import TorqueGain
-from pipelines.model.effects.viscous_drift import ViscousDrift
+from pipelines.effects.base import Effect
+from pipelines.effects.gravity_tilt import GravityTilt
+from pipelines.effects.torque_gain import TorqueGain
+from pipelines.effects.viscous_drift import ViscousDrift
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, slopes_of
 from pipelines.model.rows.fit import refine

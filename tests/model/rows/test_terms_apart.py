@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Motion
+from pipelines.effects.base import Effect
+from pipelines.effects.cogging import Cogging
+from pipelines.effects.coulomb import Coulomb
+from pipelines.effects.three_sigmoid import ThreeSigmoid
+from pipelines.effects.two_sigmoid import TwoSigmoid
+from pipelines.effects.viscous import Viscous
 from pipelines.io.files import open_log
 from pipelines.io.log import Array
-from pipelines.model.effects.base import Effect
-from pipelines.model.effects.cogging import Cogging
-from pipelines.model.effects.coulomb import Coulomb
-from pipelines.model.effects.three_sigmoid import ThreeSigmoid
-from pipelines.model.effects.two_sigmoid import TwoSigmoid
-from pipelines.model.effects.viscous import Viscous
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.families import Wanted

@@ -1,0 +1,265 @@
+"""A gap between a motor and its link."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.perturbation import perturbed_by, rate_of, rigid_slopes, shifted
+from pipelines.effects.base import (
+    ArmModel,
+    Effect,
+    Hooks,
+    Parameters,
+    Quantity,
+    Values,
+    friction_at,
+)
+from pipelines.effects.config import EFFECTS
+from pipelines.effects.drive_apart import DriveApart
+
+__all__ = ["Backlash", "Gaps", "followed"]
+
+_NOTHING = 1e-6  # numerics: [N m] that leave the link in the middle of the gap at first
+_THICKEST = 1e6  # numerics: [N m s/rad], or [N s/m]
+# More shapes than these share the slopes of the rigid torque, which cost less then and miss a
+# thousandth of a gap of 6.6 mrad.
+# Those of one shape moved a little, whose difference is a slope, are few: they are worked out
+# exactly.
+_SLOPES = 6  # numerics: see above
+_LENGTH, _EARLY = 600, 400  # numerics: samples of a stretch, and before it
+_FEW, _SHORT = 4, 300  # numerics: gaps whose arrays cost hardly more than a call; samples then
+# of the gap, by which two stretches may differ; [s] in which a speed counts as a way
+_SEAM, _TICK = 1e-12, 1e-3  # numerics: see above
+
+
+@dataclass(frozen=True)
+class Backlash(Effect):
+    """With x = q_link - q, the link's angle against the motor's.
+
+    Torque passes only where |x| > gap/2.
+
+        (D - J_m) ẍ = -(τ_j - J_m q̈_j) - c ẋ - flank,    flank = k (|x| - gap/2) sign x + d ẋ,
+        never pulling
+
+    Torque, friction and encoder sit on the motor's side. x follows from the measured motion and the
+    rigid torque, and with it τ = τ_rigid(q + x) - τ_rigid(q), J_m ẍ less on its own row. Where the
+    gap is crossed in no time, x = -gap/2 sign(τ_j). The flank is 80 Hz stiff and critically damped:
+    what rings on a stiffer one depends on the tooth and not on the gap.
+    """
+
+    gap: float = 1e-3  # [rad]
+    film: float = 1.0  # c [N m s/rad]
+    motor_inertia: float = 1e-3  # J_m [kg m^2]
+
+    name = "backlash"
+    parameters = Parameters(
+        Quantity("gap", "rad", 0.0, 0.1, "free play, from flank to flank", shape=True),
+        Quantity("film", "N m s/rad", 0.0, _THICKEST, "drag of the lubricant in the open gap",
+                 shape=True),
+        Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
+        Quantity("coefficient", "1", 0.0, 2.0,
+                 "share of its torque: 1 where the model of the gap is right", fixed=1.0),
+    )
+    evidence = "reversals"
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.several([self], motion, arm)[0]
+
+    def possible(self, values: Values) -> bool:
+        """Return whether it is more than the gap of precise gears, which is no fault."""
+        return super().possible(values) and values["gap"] > EFFECTS.tight_gap
+
+    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
+        """All gaps are followed at once; those of one motor share its forces."""
+        tau, felt = _rigid(arm, motion), _felt(arm, motion.q, self._index)
+        motors = list(dict.fromkeys(one.motor_inertia for one in shapes))
+        motor = np.array(motors if len(motors) == 1 else [one.motor_inertia
+                                                          for one in shapes])[:, None]
+        mass = np.maximum(felt - motor, EFFECTS.link_share * felt)
+        force = motor * self.own(motion.ddq) - tau[:, self._index]
+        flanks = {
+            one: _flank(float(np.mean(np.maximum(felt - one, EFFECTS.link_share * felt))), one)
+            for one in motors
+        }
+        half, film, k, d = np.array([[0.5 * one.gap, one.film, *flanks[one.motor_inertia]]
+                                     for one in shapes]).T
+        link = followed(motion.t, mass, force, Gaps(half, film, k, d))
+        slopes = rigid_slopes(arm.body, arm.p, motion,
+                              self._index) if len(shapes) > _SLOPES else None
+
+        def ahead(x: Array, rate: Array, second: Array) -> Array:
+            """τ_rigid(q + x) - τ_rigid(q)."""
+            if slopes is not None:
+                return perturbed_by(slopes, x, rate, second)
+            return _rigid(arm, shifted(motion, self._index, x, rate, second)) - tau
+
+        return [one._torque(motion, x, ahead) for one, x in zip(shapes, link, strict=True)]
+
+    def _torque(self, motion: Motion, x: Array, ahead: Callable[[Array, Array, Array],
+                                                                Array]) -> Array:
+        """Column of a link that is x (samples,) ahead of its motor.
+
+        Where the rigid arm needs as much more torque.
+        """
+        rate = rate_of(x, motion.t)
+        second = rate_of(rate, motion.t)
+        more = ahead(x, rate, second)
+        more[:, self._index] -= self.motor_inertia * second
+        return np.asarray(more[..., None])
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """Gaps a good third apart, for too small a gap explains nothing.
+
+        Lubricants a factor of three apart, for where one far too thin is looked for, the gap's
+        torque comes and goes by chance; a motor of a tenth of what the joint feels.
+        """
+        motor = 0.1 * float(np.mean(_felt(arm, motion.q, self._index)))
+        usual = float(np.median(np.abs(self.own(_rigid(arm, motion))))) or 1.0
+        for gap in np.geomspace(3e-4, 6.6e-3, 10).tolist():
+            for crossing in EFFECTS.crossings:
+                film = min(crossing * usual / gap, _THICKEST)
+                yield replace(self, gap=gap, film=film, motor_inertia=min(motor, 10.0))
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """Return the hooks of an arm that is the links; the motor is two states, with friction."""
+        still = np.zeros((1, arm.n_joints))
+        felt = float(_felt(arm, still, self._index)[0])
+        # of a motor without inertia nothing can be integrated
+        motor = max(values["motor_inertia"], 0.01 * felt)
+        half, film = 0.5 * values["gap"], values["film"]
+        k, d = _flank(max(felt - motor, EFFECTS.link_share * felt), motor)
+
+        def passed(angle: Array, speed: Array) -> Array:
+            over = angle - np.clip(angle, -half, half)
+            push = np.where(over > 0.0, np.maximum(k * over + d * speed, 0.0),
+                            np.minimum(k * over + d * speed, 0.0))
+            return np.asarray(film * speed + np.where(over == 0.0, 0.0, push))
+
+        drive = DriveApart(self._index, motor, friction_at(arm, self._index + 1), passed,
+                           lambda tau: half * np.clip(tau / _NOTHING, -1.0, 1.0) + tau / k)
+        return Hooks(actuator=drive.actuator, sensor=drive.sensor,
+                     inertia=drive.taken_out(arm.n_joints), states=2, settled=drive.settled,
+                     start=drive.start, rate=drive.rate)
+
+
+def _flank(link: float, motor: float) -> tuple[float, float]:
+    """Return stiffness and critical damping of a closed flank between two inertias [kg m^2]."""
+    # a badly determined arm may feel less than nothing
+    link, motor = max(link, 1e-12), max(motor, 1e-12)
+    k = link * (2.0 * pi * EFFECTS.flank_hz) ** 2
+    return k, 2.0 * sqrt(k * motor * link / (motor + link))
+
+
+def _rigid(arm: ArmModel, motion: Motion) -> Array:
+    """Torque of the rigid arm alone."""
+    return arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)
+
+
+def _felt(arm: ArmModel, q: Array, index: int) -> Array:
+    """Inertia (samples,) [kg m^2] that the joint feels, the others held."""
+    return arm.body.mass_matrix(q, arm.p)[:, index, index]
+
+
+@dataclass(frozen=True, eq=False)
+class Gaps:
+    """Several gaps of one joint."""
+
+    half: Array  # [rad] (gaps,) half the play
+    film: Array  # [N m s/rad] (gaps,) drag of the lubricant
+    stiffness: Array  # k [N m/rad] (gaps,) of a flank
+    damping: Array  # d [N m s/rad] (gaps,)
+
+
+def followed(t: Array, mass: Array, force: Array, gaps: Gaps) -> Array:
+    """x (gaps, samples) [rad] of the link against its motor.
+
+    T (samples,), mass [kg m^2] and force [N m] (gaps, samples), or (1, samples) where they are
+    those of all gaps.
+
+    Over a sample, trapezoids; flank and film implicit.
+    """
+    length = _SHORT if len(gaps.half) <= _FEW else _LENGTH
+    samples, count = len(t), max(1, -(-(len(t) - 1) // length))
+    h = np.append(np.diff(t), 0.0)
+    m, f = (np.append(0.5 * (x[:, 1:] + x[:, :-1]), np.zeros((len(x), 1)), axis=1)
+            for x in (mass, force))
+    early = np.arange(count) * length - _EARLY
+    steps = early + np.arange(length + _EARLY)[:, None]  # (steps, stretches)
+    within = np.where((steps >= 0) & (steps < samples - 1), steps, samples - 1)
+    inertia = np.where(m > 0.0, m, 1.0)  # outside the log no time goes by
+    start = _start(force[:, np.maximum(early, 0)], gaps)
+    x, v, seams = _moved(h[within], _stretched(inertia, within), _stretched(f, within), start, gaps)
+    for gap in range(len(gaps.half)):
+        place, speed = x[-1, gap, 0], v[gap, 0]
+        for k in range(1, count):
+            if abs(place - x[_EARLY, gap,
+                             k]) + _TICK * abs(speed - seams[gap, k]) > _SEAM * gaps.half[gap]:
+                own, before = within[_EARLY:, k], (float(place), float(speed))
+                inert, pull = m[gap % len(m), own], f[gap % len(f), own]
+                x[_EARLY:, gap, k], v[gap, k] = _step_by_step(h[own], inert, pull, before, gaps,
+                                                              gap)
+            place, speed = x[-1, gap, k], v[gap, k]
+    return np.concatenate([
+        x[_EARLY, :, :1], x[_EARLY + 1:].transpose(1, 2, 0).reshape(len(gaps.half), -1)
+    ], axis=1)[:, :samples]
+
+
+def _stretched(x: Array, within: npt.NDArray[np.intp]) -> Array:
+    """x (gaps, samples) at `within` (steps, stretches), as (steps, gaps, stretches)."""
+    return np.ascontiguousarray(x[:, within].transpose(1, 0, 2))
+
+
+def _start(force: Array, gaps: Gaps) -> Array:
+    """x (gaps, stretches) settled on the flank that the force presses on."""
+    return np.asarray(gaps.half[:, None] * np.sign(force) + force / gaps.stiffness[:, None])
+
+
+def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, Array, Array]:
+    """x (steps + 1, gaps, stretches), v (gaps, stretches) at the end, and where a stretch begins.
+
+    H (steps, stretches), m and f (steps, gaps, stretches), or one for all gaps.
+    """
+    k, d, half = gaps.stiffness[:, None], gaps.damping[:, None], gaps.half[:, None]
+    h = h[:, None]
+    out, v = np.empty((len(h) + 1, *x.shape)), np.zeros_like(x)
+    out[0], seams = x, v
+    drag, more = 0.5 * h * gaps.film[:, None], 0.5 * h * d + 0.25 * h * h * k
+    given, push, half_step = h * f, h * k, 0.5 * h
+    for i in range(len(h)):
+        over = x - np.minimum(np.maximum(x, -half), half)
+        over *= (k * over + d * v) * over > 0.0  # what is not closed does not push
+        slowing = drag[i] + more[i] * (over != 0.0)
+        after = (v * (m[i] - slowing) + given[i] - push[i] * over) / (m[i] + slowing)
+        x = x + half_step[i] * (v + after)
+        v = after
+        out[i + 1] = x
+        if i + 1 == _EARLY:
+            seams = v
+    return out, v, seams
+
+
+def _step_by_step(h: Array, m: Array, f: Array, start: tuple[float, float], gaps: Gaps,
+                  gap: int) -> tuple[Array, float]:
+    """x (samples,) of one gap from where the stretch before ended, and the speed at the end."""
+    k, d, half, film = (float(x[gap]) for x in (gaps.stiffness, gaps.damping, gaps.half, gaps.film))
+    x, v = start
+    found = [x]
+    for step, inertia, pull in zip(h.tolist(), m.tolist(), f.tolist(), strict=True):
+        if step:
+            over = x - half if x > half else x + half if x < -half else 0.0
+            closed = (k * over + d * v) * over > 0.0
+            c, spring = (0.5 * step *
+                         (film + d), 0.25 * step * step * k) if closed else (0.5 * step * film, 0.0)
+            after = (v * (inertia - c - spring) + step *
+                     (pull - (k * over if closed else 0.0))) / (inertia + c + spring)
+            x += 0.5 * step * (v + after)
+            v = after
+        found.append(x)
+    return np.array(found), v

@@ -1,0 +1,312 @@
+"""The contract of an effect: a physical cause is data plus one function.
+
+An effect is written by giving its words, its parameters and `columns`; the rest has a default.
+
+    Coulomb friction     columns = tanh(w v) on its own row; nothing else
+    Cogging              columns = sin kq, cos kq; `shapes` runs over k; `values` gives amplitude,
+    phase A clipped drive      columns to screen with; `apply` = clip(predict(motion, arm)) An
+    encoder fault     columns to screen with; `apply` = predict(corrected motion, arm) Tilted
+    gravity       columns to screen with; `apply` = predict(motion, arm.with_body(tilted body, p))
+
+An object is the effect in one place and one shape: `joint` and the *non-linear* parameters (speeds,
+orders, delays) are its fields. The *linear* parameters, its amplitudes, are not: a fit solves for
+them.
+
+    torque = columns(motion, arm) @ amplitudes      to first order; exactly for most
+
+Torque is a load: measured torque = torque of the model + torques of the effects. Columns are
+computed from the motion and the *predicted* torque, never from measured torque, whose noise would
+bias them. One exception: the torque that a drive keeps back above its limit follows from the
+commanded torque alone, which is `Motion.tau`. Columns need not be independent, nor all visible, on
+every arm: solve with a rank threshold. Each motion is one log from its first sample (time in a log
+counts from motion.t[0]).
+
+    terms.py     Quantity: what a parameter may be; the hooks of a simulation
+    kinds.py     what friction laws and events have besides
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from pathlib import Path
+from typing import Any, ClassVar, Literal, Self, TypeVar
+
+import numpy as np
+
+from pipelines.dynamics.body import Motion
+from pipelines.effects.terms import (
+    LARGE,
+    SAMPLED,
+    SHARPNESSES,
+    ArmModel,
+    Hooks,
+    OwnDrive,
+    OwnLoad,
+    OwnMemory,
+    Parameters,
+    Predict,
+    Quantity,
+    SpeedCurve,
+    Values,
+    Words,
+    friction_at,
+    predicted,
+    summed,
+    waves,
+)
+from pipelines.io.log import Array
+from pipelines.io.sandbox import parse_toml, read_small_text
+
+__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Hooks", "OwnDrive", "OwnLoad",
+           "OwnMemory", "Parameters", "Predict", "Quantity", "SpeedCurve", "Values", "Words",
+           "adds", "everywhere", "friction_at", "joints_of", "predicted", "waves"]
+
+E = TypeVar("E", bound="Effect")
+# numerics: of the range in which it was seen: behind that nobody knows how it goes on
+_BEYOND = 0.1  # numerics: see above
+
+
+class WordsOfCause:
+    """The words of an effect out of causes.toml, read when some are first asked for."""
+
+    def __init__(self) -> None:
+        self.every: dict[str, Any] = {}
+
+    def __get__(self, effect: Effect | None, kind: type[Effect]) -> Words:
+        """Return those of an effect by its name."""
+        if not self.every:
+            self.every = parse_toml(read_small_text(Path(__file__).with_name("causes.toml")))
+        return Words(**self.every[kind.name])
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """A physical cause at one joint, or of the whole arm."""
+
+    joint: int | None = None  # 1-based; None where scope is "arm"
+
+    name: ClassVar[str]  # identifier of causes.md, and the file's name
+    words: ClassVar[Words] = WordsOfCause()  # type: ignore[assignment]
+    scope: ClassVar[Literal["joint", "arm"]] = "joint"
+    parameters: ClassVar[Parameters]
+    acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"  # the order in which
+    # effects compose; the record, outermost, is a first-order low-pass, its amplitude the time
+    # constant [s]
+    clock: ClassVar[Literal["none", "session",
+                            "log"]] = "none"  # "session": its field `since` [s] is
+    # when the session began; "log": it happens once, and its shapes belong to that log
+    evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters",
+                               "none"]] = "residual"  # what a diagnosis may name it by; "none": a
+    # law that a nominal model has, and no cause
+
+    # its columns follow from the motion alone, whatever the arm
+    from_motion: ClassVar[bool] = False
+
+    def __post_init__(self) -> None:
+        if (self.scope == "joint") != (self.joint is not None and self.joint >= 1):
+            where = "one joint, counted from 1" if self.scope == "joint" else "the whole arm"
+            raise ValueError(f"{self.name} belongs to {where}, not to joint {self.joint}")
+        for q in self.parameters:  # another joint: the one before, if none is given
+            if q.joint and self.joint is not None and not getattr(self, q.name):
+                object.__setattr__(self, q.name, float(self.joint - 1 or 2))
+
+    @abstractmethod
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        """Return the torque per unit of each amplitude, to first order.
+
+        (samples, joints, amplitudes).
+        """
+
+    def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
+        """Return the effect in every shape worth trying on this motion.
+
+        On the grids of its parameters.
+        """
+        places = {q.name: q.grid or q.among(self.joint, arm.n_joints) for q in self.parameters}
+        grids = {name: values for name, values in places.items() if values is not None}
+        for numbers in product(*grids.values()):
+            shape: dict[str, Any] = dict(zip(grids, map(float, numbers), strict=True))
+            yield replace(self, **shape)
+
+    def forms(self) -> tuple[Self, ...]:
+        """Return the form that a finding is refitted with, then other laws of the same cause."""
+        return (self,)
+
+    def nuisance(self, arm: ArmModel) -> Array | None:
+        """Return directions (base parameters, k) in which it moves them beyond its columns.
+
+        Unknown how far.
+        """
+        return None
+
+    def apply(self, motion: Motion, arm: ArmModel, values: Values,
+              predict: Predict | None = None) -> Array:
+        """Return the torque (samples, joints) that a log shows with this effect, exactly.
+
+        `predict` says what it would show without; effects are thus put one around the other. To
+        warp a signal, hand another motion to `predict`; to change geometry or gravity, another arm;
+        to clip, treat what it returns.
+        """
+        without = predict(motion, arm) if predict is not None else arm.torque(motion)
+        return np.asarray(without + self.torque(motion, arm, values))
+
+    def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """Return how it enters the forward simulation; by default as a load."""
+        shaped, amplitudes = self.at(values), self.amplitudes(values)
+        return Hooks(load=lambda motion, _: summed(shaped.columns(motion, arm), amplitudes))
+
+    # numbers: a law may give others than it is fitted by
+
+    @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the shapes that a refit moves continuously."""
+        return tuple(q.name for q in self.parameters if q.shape and not q.discrete and not q.derived
+                     and (q.held is None or getattr(self, q.name) != q.held))
+
+    def at_end(self, name: str, by: float) -> bool:
+        """Return whether a shape is at the end of its range, and `by` points out of it."""
+        quantity = next(q for q in self.parameters if q.name == name)
+        here = float(getattr(self, name))
+        return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
+
+    def at(self, values: Values) -> Self:
+        """Return the effect with the shapes out of `values`."""
+        known = self.parameters.complete(values)
+        shape: dict[str, Any] = {q.name: known[q.name] for q in self.parameters if q.shape}
+        return replace(self, **shape)  # type: ignore[type-var]
+
+    def amplitudes(self, values: Values) -> Array:
+        """Return the amplitudes that belong to `values`, in the order of the columns."""
+        return np.array([values[q.name] for q in self.parameters if not q.shape])
+
+    def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
+        """Return every parameter by name; the inverse of `at` and `amplitudes`."""
+        linear = iter(amplitudes)
+        return {q.name: float(getattr(self, q.name) if q.shape else next(linear))
+                for q in self.parameters}
+
+    def possible(self, values: Values) -> bool:
+        """Return whether every parameter lies in its range."""
+        return all(q.low <= values[q.name] <= q.high for q in self.parameters)
+
+    def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
+        """Return the parameters of a finding, named as in causes.md; whole numbers are integers."""
+        return {q.name: int(values[q.name]) if q.discrete else values[q.name]
+                for q in self.parameters}
+
+    def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
+        """Return the torque (samples, joints) [N m] of first order."""
+        return summed(self.at(values).columns(motion, arm), self.amplitudes(values))
+
+    # its own joint, and how that moves
+
+    def sharpnesses(self, motion: Motion, count: int) -> list[float]:
+        """[s/rad] largest first.
+
+        A geometric grid between the slowest and the fastest speeds that this motion holds.
+        """
+        speed = np.abs(self.own(motion.dq))
+        moving = speed[speed > 0]
+        fast, slow = (moving.max(), np.quantile(moving, 0.02)) if moving.size else (1.0, 0.01)
+        return [float(w) for w in np.geomspace(1 / fast, 2 / max(slow, 1e-3 * fast), count)[::-1]]
+
+    def own(self, signal: Array) -> Array:
+        """Column of its own joint, (samples,)."""
+        return np.asarray(signal[..., self._index])
+
+    def goes_round(self, motion: Motion, but: float = 0.02) -> bool:
+        """Whether its own joint travels all of a circle but for a fiftieth, or such a part of it.
+
+        What it does there comes back to where it began.
+        """
+        return float(np.ptp(self.own(motion.q))) > (1.0 - but) * 2.0 * np.pi
+
+    def goes_beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
+        """Return whether its joint leaves its range of angles in `known` by more than a tenth."""
+        now, then = (np.concatenate([self.own(motion.q) for motion in some])
+                     for some in (motions, known))
+        return bool(max(now.max() - then.max(), then.min() - now.min()) > _BEYOND * np.ptp(then))
+
+    def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
+        """Return its torque (samples,) [N m] on its own joint against speed alone.
+
+        At rest otherwise.
+        """
+        still = np.zeros((len(dq), arm.n_joints))
+        motion = Motion(np.zeros(len(dq)), still, self.on_own_row(arm, dq)[..., 0], still)
+        return self.own(self.torque(motion, arm, values))
+
+    def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
+        """`columns`, each (samples,), as (samples, joints, columns).
+
+        They act on its own joint only. Samples lie side by side.
+        """
+        rows = np.zeros((arm.n_joints, len(columns), len(columns[0])))
+        for k, column in enumerate(columns):
+            rows[self._index, k] = column
+        return rows.transpose(2, 0, 1)
+
+    @property
+    def _index(self) -> int:
+        if self.joint is None:
+            raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
+        return self.joint - 1
+
+    # speed: without these every answer is the same, and takes longer
+
+    def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
+        """Return `columns` of several shapes of itself."""
+        return [shape.columns(motion, arm) for shape in shapes]
+
+    def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
+        """Return those of shapes that act on this joint alone: (shapes, amplitudes, samples)."""
+        return np.stack([shape.columns(motion, arm)[:, self._index].T for shape in shapes])
+
+    def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
+        """Return slopes of its torque on its own joint by the logarithm of each non-linear number.
+
+        (samples, numbers) [N m].
+        """
+        return None
+
+    def speed_curve(self, values: Values) -> SpeedCurve | None:
+        """Return its torque as a `SpeedCurve`, where it is one and nothing else.
+
+        `simulate` then is not asked.
+        """
+        return None
+
+    def own_load(self, values: Values) -> OwnLoad | None:
+        """Return the load of `simulate` as a function of angle and speed of its own joint.
+
+        Where it follows from these alone.
+        """
+        return None
+
+    def own_memory(self, values: Values) -> OwnMemory | None:
+        """Return the load of `simulate` where it has one state.
+
+        Whose rate follows from it and the speed of its own joint.
+        """
+        return None
+
+
+def adds(effect: Effect) -> bool:
+    """Return whether it only adds its columns to the torque, whatever else acts."""
+    return type(effect).apply is Effect.apply and type(effect).torque is Effect.torque
+
+
+def joints_of(kind: type[Effect] | Effect, revolute: Sequence[bool]) -> tuple[int, ...]:
+    """Return the joints (1-based) that can have it, of joints that turn (`revolute`) or slide."""
+    turning = any(q.revolute for q in kind.parameters)
+    return tuple(k for k, turns in enumerate(revolute, 1) if turns or not turning)
+
+
+def everywhere(kind: type[E], revolute: Sequence[bool]) -> tuple[E, ...]:
+    """Return one at every joint where it is looked for; or the one of the whole arm."""
+    places = joints_of(kind, revolute) if kind.scope == "joint" else (None,)
+    n = len(revolute)
+    return tuple(kind(joint=k) for k in places if all(q.found_at(k, n) for q in kind.parameters))

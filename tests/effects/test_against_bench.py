@@ -1,0 +1,236 @@
+"""Effects against faults of the same name on MuJoCo's plant, which shares no code with them: signs, units and exact forms.
+
+The same sealed answers that a diagnosis is judged by are put into the effect. What it then says of the log's torque, and of the
+motion in closed loop, must be what the fault did.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bench.plant import as_log
+from pipelines.dynamics.arm import Acting, Arm
+from pipelines.dynamics.body import Motion
+from pipelines.dynamics.functions import NUMBERS
+from pipelines.effects.base import Effect
+from pipelines.effects.contact import Contact
+from pipelines.effects.gravity_tilt import GravityTilt
+from pipelines.effects.link_length import LinkLength
+from pipelines.effects.spring import Spring
+from pipelines.io.log import Array
+from pipelines.simulation import Experiment, Plant, run
+from tests.effects.on_bench import (
+    arm,
+    effect_of,
+    fault,
+    faulty,
+    healthy,
+    left_over,
+    machine,
+    motion_and_torque,
+    planned,
+    rms,
+)
+from tests.seeds import rarely
+
+SAMPLES = 400  # simulated
+SHARE = 0.02  # of what a fault does to the torque may stay unexplained, beside what the healthy arm leaves
+
+CASES = (("cogging", 2), ("viscous_drift", 1), ("torque_gain", 3), ("torque_saturation", 2), ("torque_crosstalk", 3),
+         ("drive_lag", 1), ("torque_lag", 2), ("transmission_coupling", 3), ("payload", None), ("contact", None),
+         ("spring", 1), ("gravity_tilt", None), ("link_length", None))
+LONG = (("contact", None), ("gravity_tilt", None))  # simulated for longer
+NO_MOTION = {"torque_lag"}  # it changes the log, not what the arm does
+NO_OPPOSITE = {"torque_saturation", "link_length", "payload"}  # a limit is positive; what fits of base parameters tell has no sign
+
+every_case = pytest.mark.parametrize(("name", "joint"), CASES, ids=[name for name, _ in CASES])
+
+
+def fitted(name: str, joint: int | None) -> tuple[Arm, Effect, dict[str, float]]:
+    """Arm, effect and values: those of the sealed answer, and the numbers fitted that no answer gives.
+
+    The bench's spring is no polynomial; where the weight of a tilted waist lies, and the base parameters on a link of another
+    length, a level arm and a wrong length do not tell.
+    """
+    effect, values = effect_of(name, joint)
+    if name in FITTED:
+        return FITTED[name](effect, values)
+    return arm(), effect, values
+
+
+def _spring(effect: Effect, values: dict[str, float]) -> tuple[Arm, Effect, dict[str, float]]:
+    motion, tau = motion_and_torque(faulty("spring", effect.joint))
+    table = effect.columns(motion, arm())[:, (effect.joint or 1) - 1]
+    amplitudes = np.linalg.lstsq(table, effect.own(tau - arm().torque(motion)), rcond=None)[0]
+    return arm(), effect, effect.values(amplitudes.tolist())
+
+
+def _tilt(effect: Effect, values: dict[str, float]) -> tuple[Arm, Effect, dict[str, float]]:
+    motion, tau = motion_and_torque(faulty("gravity_tilt", None))
+    left = (tau - effect.apply(motion, arm(), values))[:, 0]
+    sine, cosine = np.linalg.lstsq(effect.columns(motion, arm())[:, 0, 2:], left, rcond=None)[0].tolist()
+    return arm(), effect, values | {"waist_sine": sine, "waist_cosine": cosine}
+
+
+def _length(effect: Effect, values: dict[str, float]) -> tuple[Arm, Effect, dict[str, float]]:
+    """Base parameters p with which the model that has the sealed length fits: its torque is linear in them."""
+    motion, tau = motion_and_torque(faulty("link_length", None))
+    friction = arm().friction_torque(motion)
+    columns = [effect.apply(motion, with_parameters(unit), values) - friction for unit in np.eye(len(arm().p))]
+    p = np.linalg.lstsq(np.stack(columns, axis=-1).reshape(-1, len(arm().p)), (tau - friction).ravel(), rcond=1e-10)[0]
+    return with_parameters(np.asarray(p, dtype=np.float64)), effect, values
+
+
+FITTED = {"spring": _spring, "gravity_tilt": _tilt, "link_length": _length}
+
+
+def with_parameters(p: Array) -> Arm:
+    return replace(arm(), base=tuple(replace(one, value=float(x)) for one, x in zip(arm().base, p, strict=True)))
+
+
+def floor() -> float:
+    """What is left of a healthy log: friction's change of sign between two samples."""
+    motion, _ = motion_and_torque(healthy())
+    return rms(left_over(healthy(), arm().torque(motion)))
+
+
+@every_case
+def test_the_log_of_a_faulty_machine_is_explained(name: str, joint: int | None) -> None:
+    """More than 99.9 % of the power that the fault adds to the torque, with the numbers of the sealed answer."""
+    model, effect, values = fitted(name, joint)
+    recording = faulty(name, joint)
+    motion, _ = motion_and_torque(recording)
+    before, after = (rms(left_over(recording, torque)) for torque in (arm().torque(motion), effect.apply(motion, model, values)))
+    assert before > 3.0 * floor()
+    assert after <= SHARE * before + 1.2 * floor(), after / before
+
+
+@pytest.mark.parametrize(("name", "joint"), [case for case in CASES if case[0] not in NO_OPPOSITE], ids=lambda x: str(x))
+def test_the_opposite_sign_is_wrong(name: str, joint: int | None) -> None:
+    """The other way round the effect makes the residual larger: no sign is right by chance."""
+    model, effect, values = fitted(name, joint)
+    recording = faulty(name, joint)
+    motion, _ = motion_and_torque(recording)
+    change = effect.apply(motion, model, values) - model.torque(motion)
+    assert rms(left_over(recording, model.torque(motion) - change)) > 1.5 * rms(left_over(recording, model.torque(motion)))
+
+
+@pytest.mark.parametrize(("name", "joint"), [
+    *(case for case in CASES if case not in LONG and case[0] not in NO_MOTION), *rarely(*LONG)], ids=lambda x: str(x))
+def test_the_closed_loop_does_what_the_faulty_machine_does(name: str, joint: int | None) -> None:
+    """Position under the same controller and reference: the difference that the fault makes is simulated to 3 %."""
+    model, effect, values = fitted(name, joint)
+    recording = faulty(name, joint)
+    log = as_log(machine(), planned(), recording)
+    simulated = run(Plant.of(model.extended(Acting.of(effect, values))), Experiment.of_log(log).part(0, SAMPLES), 4)
+    made = rms((recording.q - healthy().q)[:SAMPLES])
+    assert made > 1e-6
+    assert rms(simulated.q[0] - recording.q[:SAMPLES]) <= 0.03 * made
+
+
+def test_a_lagging_recorder_is_simulated() -> None:
+    """The arm does the same; the log differs, as the faulty machine's does."""
+    model, effect, values = fitted("torque_lag", 2)
+    recording = faulty("torque_lag", 2)
+    log = as_log(machine(), planned(), recording)
+    simulated = run(Plant.of(model.extended(Acting.of(effect, values))), Experiment.of_log(log).part(0, SAMPLES), 4)
+    np.testing.assert_allclose(simulated.q[0], healthy().q[:SAMPLES], atol=1e-9)
+    made = rms((recording.tau - healthy().tau)[:SAMPLES])
+    assert rms(simulated.tau[0] - recording.tau[:SAMPLES]) <= 1e-3 * made
+
+
+def test_a_spring_is_found_as_stiff_as_it_is() -> None:
+    """Where the joint passes the rest angle, the polynomial has the sealed stiffness there within 5 %, and the rest angle."""
+    _, _, found = fitted("spring", 3)
+    told = fault("spring", 3).parameters()
+    assert found["stiffness"] == pytest.approx(told["stiffness"], rel=0.05)
+    assert found["rest_angle"] == pytest.approx(told["rest_angle"], abs=0.02)
+    assert found["hardening"] > 0.0
+
+
+def test_the_length_that_fits_best_is_the_true_one() -> None:
+    """With base parameters refitted at each, the sealed length leaves less than 5 mm more or less, which leave less than none."""
+    effect, values = effect_of("link_length", None)
+    motion, _ = motion_and_torque(faulty("link_length", None))
+    left = []
+    for error in (0.0, values["error"] - 5e-3, values["error"], values["error"] + 5e-3):
+        model, _, tried = _length(effect, values | {"error": error})
+        left.append(rms(left_over(faulty("link_length", None), effect.apply(motion, model, tried))))
+    assert left[2] < min(left) + 1e-15
+    assert left[2] < 0.5 * min(left[1], left[3]) + floor()
+    assert isinstance(effect, LinkLength)
+
+
+def test_a_touch_is_looked_for_where_it_was() -> None:
+    """Among the windows that the residual speaks for is one that overlaps the touch by two thirds."""
+    motion, tau = motion_and_torque(faulty("contact", None))
+    told = fault("contact", None).parameters()
+    begin, lasting = float(told["start"]), float(told["duration"])  # type: ignore[arg-type]
+    shared = [min(begin + lasting, one.start + one.duration) - max(begin, one.start)
+              for one in Contact().promising(motion, arm(), tau - arm().torque(motion))]
+    assert max(shared) > 0.66 * lasting
+
+
+def test_a_level_arm_tells_nothing_of_its_waist() -> None:
+    """The two further amplitudes of a tilt act on joint 1 alone, and only where it stands upright."""
+    motion, _ = motion_and_torque(healthy())
+    columns = GravityTilt().columns(motion, arm())
+    assert not columns[:, 1:, 2:].any()
+    leaning = replace(machine().robot, gravity=(9.81, 0.0, 0.0))
+    assert not GravityTilt().columns(motion, Arm.from_links(leaning))[:, :, 2:].any()
+
+
+def test_a_spring_of_three_zeros_rests_at_the_one_near_its_line() -> None:
+    """(q - 1)(q - 2)(q + 3) = q³ - 7 q + 6: the line -7 q + 6 is zero at 0.86."""
+    found = Spring(1, degree=3).values([-7.0, 6.0, 0.0, 1.0])
+    assert found["rest_angle"] == pytest.approx(1.0)
+    assert found["stiffness"] == pytest.approx(-4.0)  # (1 - 2)(1 + 3)
+
+
+def test_a_spring_goes_straight_on_beyond_the_angles_it_was_fitted_to() -> None:
+    """By NumPy's tangent at either end, in columns, in the simulation, and after a model file."""
+    fitted = np.polynomial.Polynomial([0.3, -0.2, 0.4, 0.8, -0.1, 0.3])
+    spring = Spring(1, degree=5, seen_from=-0.7, seen_to=1.1)
+    q = np.linspace(-3.0, 3.0, 61)
+    ends = np.clip(q, -0.7, 1.1)
+    expected = fitted(ends) + fitted.deriv()(ends) * (q - ends)
+    assert np.abs(expected - fitted(q)).max() > 10.0  # the polynomial itself ends elsewhere
+    amplitudes = [fitted.coef[1], fitted.coef[0], *fitted.coef[2:]]
+    robot = Arm.from_links(machine().robot)
+    stored = robot.extended(Acting.of(spring, spring.values(amplitudes))).to_model()
+    read = Arm.from_model(stored).effects[0]
+    motion = Motion(np.arange(61.0), np.column_stack([q, q, q]), np.zeros((61, 3)), np.zeros((61, 3)))
+    columns = spring.columns(motion, robot)[:, 0] @ np.array(amplitudes)
+    np.testing.assert_allclose(columns, expected, atol=1e-12)
+    for effect, values in ((spring, spring.values(amplitudes)), (read.effect, read.values)):
+        load = effect.own_load(values)
+        assert load is not None
+        np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], expected, atol=1e-10)
+
+
+def test_a_spring_of_seven_powers_is_the_polynomial_that_was_fitted() -> None:
+    """NumPy's polynomial says so, wherever its zero lies; a file from before the sixth and seventh power says the same of five."""
+    fitted = np.array([0.3, -0.2, 0.4, 0.8, -0.1, 0.3, 0.05, -0.2])  # from the constant upwards
+    spring, q = Spring(1), np.linspace(-1.2, 1.2, 25)
+    values = spring.values([fitted[1], fitted[0], *fitted[2:]])
+    load = spring.own_load(values)
+    np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], np.polynomial.Polynomial(fitted)(q), atol=1e-12)
+    assert load(values["rest_angle"], 0.0, NUMBERS) == pytest.approx(0.0, abs=1e-12)
+    five = Spring(1, degree=5).values([fitted[1], fitted[0], *fitted[2:6]])
+    whole = Arm.from_links(machine().robot).extended(Acting.of(Spring(1, degree=5), five)).to_model()
+    before = {name: value for name, value in whole.effects[0].parameters.items() if name not in ("sixth", "seventh")}
+    arm_then = Arm.from_model(replace(whole, effects=(replace(whole.effects[0], parameters=before),)))
+    old = arm_then.effects[0]
+    load = old.effect.own_load(old.values)
+    assert load is not None
+    np.testing.assert_allclose([load(x, 0.0, NUMBERS) for x in q], np.polynomial.Polynomial(fitted[:6])(q), atol=1e-12)
+
+
+def test_a_gap_of_nothing_is_no_backlash() -> None:
+    """A refit that closes the gap has explained nothing by it."""
+    effect, values = effect_of("backlash", 2)
+    assert effect.possible(values)
+    assert not effect.possible(values | {"gap": 0.0})
