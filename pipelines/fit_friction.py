@@ -21,7 +21,7 @@ from pipelines.dynamics.parameter import Origin, Parameter
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, NothingMatched, UsageError, did_you_mean
 from pipelines.friction.config import FolderConfig
-from pipelines.friction.findings import log_findings, misfits, nuisance_findings
+from pipelines.friction.findings import findings_of, misfits
 from pipelines.friction.joint import (
     METHODS,
     JointFit,
@@ -99,9 +99,8 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
     robot = identify[0].robot
     results = tuple(joint_result(joint, robot.joints[joint.logs.joint - 1].name, settings.method)
                     for joint in joints)
-    checks += [check for joint in joints for check in log_findings(joint)]
     for joint, result in zip(joints, results, strict=True):
-        checks += nuisance_findings(joint, result)
+        checks += findings_of(joint, result)
     checks += misfits(results, inputs.label)
     arm = _arm(identify[0], joints)
     notes = ["friction fitted by rrrid fit-friction, joint by joint"]

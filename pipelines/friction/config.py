@@ -163,7 +163,6 @@ class FindingsConfig:
     nothing: float = 0.01  # of the torque (std): no gravity; a choice, not measured
     coarse: float = 0.05  # bias of the inertia by errors in variables; a choice, not measured
     poor: float = 0.5  # of the held-out torque (rms): a quarter of its power is not described
-    many: float = 10.0  # deviations in a value: it has digits before the first of the deviation
 
 
 @dataclass(frozen=True)

@@ -13,118 +13,106 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipelines.dynamics.arm import Arm
-from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import Check, RrridError
 from pipelines.friction.config import FindingsConfig
-from pipelines.friction.fit import Value
+from pipelines.friction.fit import Number
 from pipelines.friction.joint import JointFit
+from pipelines.friction.laws import gravity_acts
 from pipelines.friction.result import JointResult
 from pipelines.io.log import ExperimentLog
 from pipelines.model.words import plain_number
 
-__all__ = ["drift_in_words", "log_findings", "misfits", "nuisance_findings"]
+__all__ = ["drift_in_words", "findings_of", "misfits"]
 
-ROUNDING = 1e-9  # numerics: of a regressor
-SEED = 20040509  # numerics: of postures at which gravity is computed
 _FALLING = {"stribeck", "concave_friction", "three_sigmoid"}  # laws that may fall with speed
-
-
 _CONFIG = FindingsConfig()
 
 
-def _known(*checks: Check | None) -> tuple[Check, ...]:
-    return tuple(check for check in checks if check is not None)
-
-
-def _where(joint: JointFit) -> str:
-    log = joint.logs.identify[0][0]
-    return log.source or log.name
-
-
-def log_findings(joint: JointFit) -> tuple[Check, ...]:
-    """Return what the numbers of a joint show of its logs; each is a gate."""
+def findings_of(joint: JointFit, result: JointResult) -> list[Check]:
+    """Return what the fit of a joint that was driven alone shows of its logs."""
     log, number = joint.logs.identify[0][0], joint.logs.joint
-    sign = one_way = None
+    where, found = log.source or log.name, list[Check]()
+
+    def warn(code: str, message: str, remedy: str, gate: bool = True) -> None:
+        found.append(Check.of(code, "warn", message, where=where, remedy=remedy, gate=gate))
+
     if joint.fit.inertia <= -_CONFIG.sure * float(joint.fit.std[0]):
-        sign = Check.of(
-            "S14", "warn", f"the inertia of joint {number} comes out negative, "
-            f"{joint.fit.inertia:.3g}: torque and position have opposite signs, or are of "
-            "different joints", where=_where(joint), gate=True,
-            remedy="let 'rrrid inspect' look at logs that move every joint: if it finds no columns "
-            "mixed up, turn the sign of this joint's torque or position in the import")
+        warn("S14", f"the inertia of joint {number} comes out negative, {joint.fit.inertia:.3g}: "
+             "torque and position have opposite signs, or are of different joints",
+             "let 'rrrid inspect' look at logs that move every joint: if it finds no columns mixed "
+             "up, turn the sign of this joint's torque or position in the import")
+    if _is_current(log, number - 1):
+        warn("S10", f"torque of joint {number} is its motor current, sample for sample",
+             "give the torque constant at the import: torque_constant in [drive]")
+    elif (known := _other_inertia(joint, log)) is not None:
+        warn("S10", f"the inertia of joint {number} is {joint.fit.inertia:.3g}, that of the "
+             f"described links {known:.3g}: torque in A, at the motor's side of a gear, or links "
+             "that are not these",
+             "give torque constant and gear ratio at the import, or correct the links")
+    if _lacks_gravity(joint, log):
+        warn("D18", f"gravity of joint {number} was compensated, but the torque shows none: it is "
+             "not the whole", "log the total torque, compensation included")
     if not (joint.covered.forth and joint.covered.back):
-        one_way = Check.of(
-            "D10", "warn", f"joint {number} moves one way only: Coulomb friction is confounded "
-            "with an offset", where=_where(joint), gate=True,
-            remedy="record the joint in both directions")
-    return _known(sign, _amperes(joint, log), _compensated(joint, log), one_way)
+        warn("D10", f"joint {number} moves one way only: Coulomb friction is confounded with an "
+             "offset", "record the joint in both directions")
+    if words := drift_in_words(result):
+        warn("D26", words[:-1], "warm the joint up before it is measured, or record one speed for "
+             "minutes to see it settle", gate=False)
+    attenuation = joint.sliding.attenuation
+    if attenuation > _CONFIG.coarse or not math.isfinite(attenuation):
+        warn("D08", "the encoder is too coarse for these motions: "
+             f"{100.0 * min(attenuation, 1.0):.0f} % of the acceleration of joint {number} is "
+             "noise (variance), and its inertia comes out as much too small",
+             "record quicker changes of speed, at higher speeds, or a finer encoder")
+    if joint.logs.validate and not joint.driven.judging:
+        warn("D09", f"joint {number} slides in none of its validation logs: blocks of the "
+             "identification logs judge its law",
+             "record validation logs at the speeds of the identification logs", gate=False)
+    if (negative := _negative_viscous(joint)) is not None:
+        warn("S14", f"viscous friction of joint {number} comes out negative, "
+             f"{negative.value:.3g} ± {negative.std:.2g} {negative.unit}: torque falls as speed "
+             "rises", "look at the sign of this torque, at torque that a regenerating drive does "
+             "not log, at friction that warms up while speeds rise, or add slower speeds for a "
+             "Stribeck law", gate=False)
+    return found
 
 
-def _amperes(joint: JointFit, log: ExperimentLog) -> Check | None:
-    """S10: torque equal to the current, or an inertia far from that of the described links."""
-    j, inertia = joint.logs.joint - 1, joint.fit.inertia
-    if "current" in log and np.allclose(log["current"][:, j], log.tau[:, j], rtol=1e-6,
-                                        atol=1e-12, equal_nan=True):
-        return Check.of(
-            "S10", "warn", f"torque of joint {j + 1} is its motor current, sample for sample",
-            gate=True, where=_where(joint),
-            remedy="give the torque constant at the import: torque_constant in [drive]")
+def _is_current(log: ExperimentLog, j: int) -> bool:
+    return "current" in log and np.allclose(log["current"][:, j], log.tau[:, j], rtol=1e-6,
+                                            atol=1e-12, equal_nan=True)
+
+
+def _other_inertia(joint: JointFit, log: ExperimentLog) -> float | None:
+    """Return the inertia of the described links, where that of the fit is far from it."""
     try:
         arm = Arm.from_links(log.robot)
     except RrridError:
         return None
-    q, push = np.nanmedian(log.q, axis=0)[None], np.zeros((1, log.n_joints))
-    push[0, j] = 1.0
-    still = np.zeros_like(q)
-    known = float((arm.body.torque(q, still, push, arm.p)
-                   - arm.body.torque(q, still, still, arm.p))[0, j])
-    if inertia <= 0.0 or 1.0 / _CONFIG.far < inertia / known < _CONFIG.far:
-        return None
-    return Check.of(
-        "S10", "warn", f"the inertia of joint {j + 1} is {inertia:.3g}, that of the described "
-        f"links {known:.3g}: torque in A, at the motor's side of a gear, or links that are not "
-        "these", gate=True, where=_where(joint),
-        remedy="give torque constant and gear ratio at the import, or correct the links")
+    j, q = joint.logs.joint - 1, np.nanmedian(log.q, axis=0)[None]
+    known = float(arm.body.mass_matrix(q, arm.p)[0, j, j])
+    share = joint.fit.inertia / known
+    return None if share <= 0.0 or 1.0 / _CONFIG.far < share < _CONFIG.far else known
 
 
-def _compensated(joint: JointFit, log: ExperimentLog) -> Check | None:
-    """D18: the controller compensated gravity, and the logged torque lacks it."""
+def _lacks_gravity(joint: JointFit, log: ExperimentLog) -> bool:
+    """Return whether gravity was compensated and the logged torque shows none."""
     control, j = log.controller, joint.logs.joint - 1
     if control is None or "gravity" not in (control.feedforward or ()):
-        return None
-    q = np.random.default_rng(SEED).uniform(-3.0, 3.0, (16, log.n_joints))
-    acts = np.abs(rigid_body(log.robot).regressor(q, 0.0 * q, 0.0 * q)[:, j]).max() > ROUNDING
+        return False
     least = _CONFIG.nothing * float(np.nanstd(log.tau[:, j]))
-    if not acts or float(np.hypot.reduce(joint.fit.gravity)) > least:
+    others = np.delete(np.nanmedian(log.q, axis=0), j).tolist()
+    acts = gravity_acts(log.robot, joint.logs.joint, others)
+    return acts and float(np.hypot.reduce(joint.fit.gravity)) <= least
+
+
+def _negative_viscous(joint: JointFit) -> Number | None:
+    """Return viscous friction that is surely below zero, in a law that may not fall with speed."""
+    if set(joint.fit.law.members) & _FALLING:
         return None
-    return Check.of(
-        "D18", "warn", f"gravity of joint {j + 1} was compensated, but the torque shows none: it "
-        "is not the whole", where=_where(joint), gate=True,
-        remedy="log the total torque, compensation included")
-
-
-def nuisance_findings(joint: JointFit, result: JointResult) -> tuple[Check, ...]:
-    """D26 drift, D08 a coarse encoder, D09 nothing to judge by, S14 viscous friction below zero."""
-    drift = coarse = unjudged = None
-    if words := drift_in_words(result):
-        drift = Check.of(
-            "D26", "warn", words[:-1], where=_where(joint),
-            remedy="warm the joint up before it is measured, or record one speed for minutes to "
-            "see it settle")
-    attenuation = joint.sliding.attenuation
-    if attenuation > _CONFIG.coarse or not math.isfinite(attenuation):
-        coarse = Check.of(
-            "D08", "warn", "the encoder is too coarse for these motions: "
-            f"{100.0 * min(attenuation, 1.0):.0f} % of the acceleration of joint "
-            f"{joint.logs.joint} is noise (variance), and its inertia comes out as much too small",
-            where=_where(joint), gate=True,
-            remedy="record quicker changes of speed, at higher speeds, or a finer encoder")
-    if joint.logs.validate and not joint.driven.judging:
-        unjudged = Check.of(
-            "D09", "warn", f"joint {joint.logs.joint} slides in none of its validation logs: "
-            "blocks of the identification logs judge its law", where=_where(joint),
-            remedy="record validation logs at the speeds of the identification logs")
-    return _known(drift, coarse, unjudged, _negative_viscous(joint))
+    return next((number for tried in joint.ladder.tried
+                 if tried.law.name in ("coulomb+viscous", joint.fit.law.name)
+                 for number in tried.fit.numbers if number.name == "viscous.coefficient"
+                 and number.value < -_CONFIG.sure * number.std), None)
 
 
 def drift_in_words(joint: JointResult) -> str:
@@ -148,66 +136,31 @@ def drift_in_words(joint: JointResult) -> str:
             f"of {time} s; the law holds at {middle} s.")
 
 
-def _negative_viscous(joint: JointFit) -> Check | None:
-    if set(joint.fit.law.members) & _FALLING:
-        return None
-    numbers = [number for tried in joint.ladder.tried
-               if tried.law.name in ("coulomb+viscous", joint.fit.law.name)
-               for number in tried.fit.numbers if number.name == "viscous.coefficient"]
-    for number in numbers:
-        if number.value < -_CONFIG.sure * number.std:
-            return Check.of(
-                "S14", "warn", f"viscous friction of joint {joint.logs.joint} comes out negative, "
-                f"{number.value:.3g} ± {number.std:.2g} {number.unit}: torque falls as speed rises",
-                where=_where(joint),
-                remedy="look at the sign of this torque, at torque that a regenerating drive does "
-                "not log, at friction that warms up while speeds rise, or add slower speeds for a "
-                "Stribeck law")
-    return None
-
-
-def misfits(joints: Sequence[JointResult], where: str) -> tuple[Check, ...]:
-    """D19 where the law leaves most of a torque, S14 a negative inertia.
+def misfits(joints: Sequence[JointResult], where: str) -> list[Check]:
+    """Return D19 where the law leaves most of a torque, S14 where an inertia is negative.
 
     D19 is a gate, of joints that were never driven alone: the others are judged by simulated speed.
+    A surely negative inertia of a joint driven alone is a finding of its log.
     """
-    return _known(*(check for joint in joints for check in (
-        _unexplained(joint, where), _negative(joint, where))))
-
-
-def _unexplained(joint: JointResult, where: str) -> Check | None:
-    error = joint.validation.torque_error
-    if joint.validation.by or not joint.moved or error is None or error < _CONFIG.poor:
-        return None
-    return Check.of(
-        "D19", "warn", f"rigid body and friction leave {100.0 * error:.0f} % of the held-out "
-        f"torque of joint {joint.joint} (rms): neither this inertia nor this friction describes "
-        "it", where=where, gate=True, remedy="let 'rrrid diagnose' look for further causes")
-
-
-def _negative(joint: JointResult, where: str) -> Check | None:
-    """S14; that of a joint driven alone, where it is surely negative, is a finding of its log."""
-    value, std = joint.inertia.value, joint.inertia.std
-    surely = std is not None and value < -_CONFIG.sure * std
-    if not joint.moved or value >= 0.0 or (surely and joint.validation.by):
-        return None
-    meaning = "these logs do not show it, and it is not to be relied on"
-    if surely:
-        meaning = "torque and position have opposite signs, or the torque lacks a part"
-    return Check.of(
-        "S14", "warn", f"the inertia of joint {joint.joint} comes out negative, "
-        f"{_written(joint.inertia)}, and no inertia is: {meaning}", where=where,
-        remedy="drive the joint alone, with accelerations that take most of its torque")
-
-
-def _written(value: Value) -> str:
-    """Return both to the place of the deviation's first digit, "0.5305 ± 0.0004 kg m^2".
-
-    To its second where the value has no digit before that: "0.0000302 ± 0.0000096 kg m^2".
-    """
-    if value.std is None or not 0.0 < value.std < math.inf:
-        return f"{plain_number(value.value, 3)} {value.unit}"
-    digits = 1 if abs(value.value) >= _CONFIG.many * value.std else 2
-    place = max(0, digits - 1 - int(f"{value.std:.{digits - 1}e}".split("e")[1]))
-    rounded = round(value.value, place) + 0.0  # no minus before a zero
-    return f"{rounded:.{place}f} ± {value.std:.{place}f} {value.unit}"
+    found = []
+    for joint in joints:
+        error, alone = joint.validation.torque_error, bool(joint.validation.by)
+        value, std = joint.inertia.value, joint.inertia.std
+        surely = std is not None and value < -_CONFIG.sure * std
+        if joint.moved and not alone and error is not None and error >= _CONFIG.poor:
+            found.append(Check.of(
+                "D19", "warn", f"rigid body and friction leave {100.0 * error:.0f} % of the "
+                f"held-out torque of joint {joint.joint} (rms): neither this inertia nor this "
+                "friction describes it", where=where, gate=True,
+                remedy="let 'rrrid diagnose' look for further causes"))
+        if joint.moved and value < 0.0 and not (surely and alone):
+            meaning = "these logs do not show it, and it is not to be relied on"
+            if surely:
+                meaning = "torque and position have opposite signs, or the torque lacks a part"
+            doubt = "" if std is None else f" ± {plain_number(std)}"
+            found.append(Check.of(
+                "S14", "warn", f"the inertia of joint {joint.joint} comes out negative, "
+                f"{plain_number(value)}{doubt} {joint.inertia.unit}, and no inertia is: {meaning}",
+                where=where,
+                remedy="drive the joint alone, with accelerations that take most of its torque"))
+    return found
