@@ -86,7 +86,7 @@ class ArmTorque:
 
 @dataclass(frozen=True)
 class Arm:
-    """What we believe of an arm."""
+    """A model of an arm: rigid body, base parameters, friction and further effects."""
 
     name: str
     body: RigidBody
@@ -261,55 +261,48 @@ class Arm:
 
 
 def _stored(acting: Acting) -> StoredEffect:
-    return StoredEffect(
-        acting.effect.name, acting.effect.joint, {
-            parameter.name: StoredValue(parameter.value, parameter.std, parameter.unit,
-                                        parameter.origin)
-            for parameter in acting.parameters
-        })
+    values = {q.name: StoredValue(q.value, q.std, q.unit, q.origin) for q in acting.parameters}
+    return StoredEffect(acting.effect.name, acting.effect.joint, values)
 
 
 def _acting(stored: StoredEffect, revolute: tuple[bool, ...], kind: str, where: object) -> Acting:
-    if stored.effect not in effect_names():
-        raise InputRejected(
-            "S18", f"{kind}: '{stored.effect}' is not an effect that this version knows"
-            f"{did_you_mean(stored.effect, effect_names())}", where=where,
-            remedy="update rrrid, or correct the name")
-    effect = find_effect(stored.effect)
-    if stored.joint not in (joints_of(effect, revolute) if effect.scope == "joint" else (None,)):
-        turning = " that turns" if effect.scope == "joint" and not joints_of(effect,
-                                                                             (False,)) else ""
-        raise InputRejected(
-            "S18", f"{kind}: {stored.effect} cannot be at joint {stored.joint}", where=where, remedy
-            =f"it belongs to one {effect.scope}{turning}, and the arm has {len(revolute)} joints")
-    kind_of_joint = stored.joint is None or revolute[stored.joint - 1]
-    unsaid = {
-        q.name: StoredValue(q.unsaid, None, q.unit_at(kind_of_joint), "assumed")
-        for q in effect.parameters if q.unsaid is not None
-    }
-    said = {**unsaid, **stored.parameters}
-    _same_names(said, [q.name for q in effect.parameters], f"{kind}, {stored.effect}", where)
-    given = [(q, q.unit_at(kind_of_joint), said[q.name]) for q in effect.parameters]
-    parameters = tuple(
-        Parameter(q.name, v.value, v.std, v.unit, (q.low, q.high), v.origin) for q, _, v in given)
-    if wrong := [f"{q.name} in {v.unit}, not {unit}" for q, unit, v in given if v.unit != unit]:
-        raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(wrong)}", where=where,
-                            remedy="write the values in those units")
-    if unfit := [
-            why for q, _, v in given if (why := q.unfit(v.value, stored.joint, len(revolute)))
-    ]:
-        raise InputRejected("S18", f"{kind}, {stored.effect}: {'; '.join(unfit)}", where=where,
-                            remedy="write another number")
-    return Acting(effect(joint=stored.joint).at({p.name: p.value for p in parameters}), parameters)
+    """Return a stored effect; S18 where it does not fit its law or the robot."""
+    def refused(words: str, remedy: str) -> InputRejected:
+        return InputRejected("S18", f"{kind}{words}", where=where, remedy=remedy)
+
+    name, joint, joints = stored.effect, stored.joint, len(revolute)
+    if name not in effect_names():
+        near = did_you_mean(name, effect_names())
+        raise refused(f": '{name}' is not an effect that this version knows{near}",
+                      "update rrrid, or correct the name")
+    effect = find_effect(name)
+    own = effect.scope == "joint"
+    if joint not in (joints_of(effect, revolute) if own else (None,)):
+        turning = " that turns" if own and not joints_of(effect, (False,)) else ""
+        raise refused(f": {name} cannot be at joint {joint}",
+                      f"it belongs to one {effect.scope}{turning}, and the arm has {joints} joints")
+    turns = joint is None or revolute[joint - 1]
+    said = dict(stored.parameters)
+    for q in effect.parameters:
+        if q.unsaid is not None and q.name not in said:
+            said[q.name] = StoredValue(q.unsaid, None, q.unit_at(turns), "assumed")
+    _same_names(said, [q.name for q in effect.parameters], f"{kind}, {name}", where)
+    given = [(q, said[q.name]) for q in effect.parameters]
+    units = [(q.name, v.unit, q.unit_at(turns)) for q, v in given]
+    if wrong := [f"{one} in {unit}, not {own}" for one, unit, own in units if unit != own]:
+        raise refused(f", {name}: {'; '.join(wrong)}", "write the values in those units")
+    if unfit := list(filter(None, (q.unfit(v.value, joint, joints) for q, v in given))):
+        raise refused(f", {name}: {'; '.join(unfit)}", "write another number")
+    parameters = tuple(Parameter(q.name, v.value, v.std, v.unit, (q.low, q.high), v.origin)
+                       for q, v in given)
+    return Acting(effect(joint=joint).at({q.name: q.value for q in parameters}), parameters)
 
 
 def _same_names(given: Iterable[str], wanted: list[str], what: str, where: object) -> None:
     names = list(given)
-    for name in names:
-        if name not in wanted:
-            raise InputRejected(
-                "S18", f"{what}: no parameter is called '{name}'{did_you_mean(name, wanted)}",
-                where=where, remedy="rename or remove it")
+    if strange := next((name for name in names if name not in wanted), None):
+        words = f"{what}: no parameter is called '{strange}'{did_you_mean(strange, wanted)}"
+        raise InputRejected("S18", words, where=where, remedy="rename or remove it")
     if missing := [name for name in wanted if name not in names]:
-        raise InputRejected("S18", f"{what}: {', '.join(missing)} missing", where=where,
-                            remedy="write them")
+        words = f"{what}: {', '.join(missing)} missing"
+        raise InputRejected("S18", words, where=where, remedy="write them")

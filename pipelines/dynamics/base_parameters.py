@@ -45,7 +45,7 @@ _UNITS = ("kg", "kg m", "kg m", "kg m") + 6 * ("kg m^2",)
 
 @dataclass(frozen=True, eq=False)
 class BaseSet:
-    """Which standard parameters stand for the base set, and what each of them takes along."""
+    """The standard parameters that represent the base set, and their combinations."""
 
     # increasing indices of standard parameters, 10 · link + position in STANDARD
     chosen: tuple[int, ...]
@@ -60,8 +60,8 @@ class BaseSet:
 def base_set(chain: SerialChain, rng: np.random.Generator) -> BaseSet:
     """Return the base parameter set of `chain`.
 
-    The states fill the whole circle, whatever the joints' limits: torque is analytic in the state,
-    so what depends within limits depends everywhere, and a wide range shows it best.
+    The states fill the whole circle, also beyond the joints' limits: torque is analytic in the
+    state, so what depends within limits depends everywhere, and a wide range shows it best.
     """
     n = chain.n_joints
     samples = _SPARE * 10
@@ -145,7 +145,7 @@ def _combination(leading: int, row: Array) -> str:
 class BaseArm:
     """Any serial arm in its base parameters: the general counterpart of the closed form.
 
-    `chain` stands in for that of the description, for an arm that is not as described.
+    `chain` replaces that of the description, for an arm that is not as described.
     """
 
     def __init__(self, robot: RobotDescription, chain: SerialChain | None = None) -> None:

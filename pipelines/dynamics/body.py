@@ -1,4 +1,4 @@
-"""What every rigid body offers, whatever computes it."""
+"""The motion of an arm, and the interface of every rigid body."""
 
 from __future__ import annotations
 

@@ -209,7 +209,7 @@ def inverse_dynamics(chain: SerialChain, q: Array, dq: Array, ddq: Array, phi: A
 
     By the recursive Newton-Euler algorithm.
 
-    Luh, Walker & Paul 1980. `gravity` stands in for the chain's own, so that it can be left out.
+    Luh, Walker & Paul 1980. `gravity` replaces the chain's own, so that it can be zero.
     """
     g = chain.gravity if gravity is None else gravity
     tau = np.empty(np.shape(q))

@@ -1,4 +1,4 @@
-"""What mass that is nowhere negative demands of the RRR arm's base parameters.
+"""Necessary conditions on the RRR arm's base parameters for mass that is nowhere negative.
 
 With X = x + a_i the coordinate from the joint's axis, `verified.md` section 3 writes (A4) as
 moments of mass:

@@ -243,7 +243,7 @@ class LinkMotion:
 
 @dataclass(frozen=True, eq=False)
 class WalkingMemory:
-    """What `link_motions` works in.
+    """The working memory of `link_motions`.
 
     Taking it anew for every block would cost more than the arithmetic.
     """

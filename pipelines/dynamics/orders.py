@@ -1,4 +1,4 @@
-"""Orders of waves along a joint's angle that its travel tells apart.
+"""Orders of waves along a joint's angle that its travel resolves.
 
     orders_along(travel, revolute)      waves in a turn; of a slide, in 2π metres
 """

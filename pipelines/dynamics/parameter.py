@@ -19,7 +19,7 @@ class Parameter:
     """A named number with its uncertainty and its identifiability.
 
     Args:
-        std: one standard deviation, or None where nobody knows it (an assumed or a known value).
+        std: one standard deviation, or None where it is unknown (an assumed or a known value).
         bounds: what the value may be; infinite where nothing bounds it.
         origin: "fitted" (from logs), "known" (from the description) or "assumed".
         visible: False where the logs behind it hardly tell it, so that it stands for its prior or

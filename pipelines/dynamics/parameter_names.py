@@ -1,4 +1,4 @@
-"""What results call the parameters of effects, taken apart.
+"""Split the names of effects' parameters in results into their parts.
 
 Before them the stage, then the cause, its joint and the quantity.
 

@@ -1,4 +1,4 @@
-"""What torque becomes when one joint is elsewhere, and how far a soft joint gives way.
+"""Compute the torque of a motion with one joint displaced, and the deflection of a soft joint.
 
     P_j(d) = K_j d + C_j ḋ + M_j d̈,    K, C, M = ∂τ/∂(q, q̇, q̈)
 
@@ -104,7 +104,7 @@ def rigid_slopes(body: RigidBody, p: Array, motion: Motion, index: int) -> Array
 
 def deflection(torque: Torque, slopes: Array, motion: Motion, index: int, stiffness: float,
                damping: float, inertia: float) -> tuple[Array, Array, Array]:
-    """x, ẋ, ẍ (samples,) by which a joint on a spring gives way: exactly, with what it then needs.
+    """x, ẋ, ẍ (samples,) of the deflection of a joint on a spring, exactly.
 
         k x + d ẋ + I (q̈ + ẍ) + τ_j(q + x) = 0          for I < 0: a motor that was counted with
         its link k x + d ẋ + I ẍ + τ_j(q + x) = 0                 for I > 0: a base below the joint

@@ -223,7 +223,8 @@ class RRR:
         links = [joint.link for joint in self.robot.joints if joint.link is not None]
         if len(links) < self.robot.n_joints:
             return None
-        return combined(self.robot) @ standard_parameters(links)
+        terms = combined(self.robot) * standard_parameters(links)
+        return np.array([math.fsum(row) for row in terms])  # to the last bit on any processor
 
     def _trigonometry(self, q: Array) -> tuple[Array, ...]:
         """cos and sin of q2, q3 and S.

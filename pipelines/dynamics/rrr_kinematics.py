@@ -36,7 +36,7 @@ _MERGED = 1e-12  # numerics: [m] within this of the border two branches are one 
 
 @dataclass(frozen=True)
 class Geometry:
-    """What the kinematics of the arm need; d = d2 + d3 is all that counts of the two."""
+    """The lengths in the kinematics; of d2 and d3 only their sum d counts."""
 
     d1: float  # [m]
     a2: float  # [m]
@@ -46,7 +46,7 @@ class Geometry:
 
 
 class Reach(IntEnum):
-    """Whether a tip can be reached, and how. Up to SHOULDER_AND_ELBOW it can."""
+    """How a tip can be reached; from INSIDE_CYLINDER on it cannot."""
 
     REACHABLE = 0
     SHOULDER = 1

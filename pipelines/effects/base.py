@@ -65,7 +65,7 @@ __all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Hooks", "Ow
            "adds", "everywhere", "friction_at", "joints_of", "predicted", "waves"]
 
 E = TypeVar("E", bound="Effect")
-# numerics: of the range in which it was seen: behind that nobody knows how it goes on
+# numerics: of the range in which it was seen: beyond it is not known
 _BEYOND = 0.1  # numerics: see above
 
 
@@ -102,7 +102,7 @@ class Effect(ABC):
                                "none"]] = "residual"  # what a diagnosis may name it by; "none": a
     # law that a nominal model has, and no cause
 
-    # its columns follow from the motion alone, whatever the arm
+    # its columns follow from the motion alone, on any arm
     from_motion: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
@@ -218,7 +218,7 @@ class Effect(ABC):
         return np.asarray(signal[..., self._index])
 
     def goes_round(self, motion: Motion, but: float = 0.02) -> bool:
-        """Whether its own joint travels all of a circle but for a fiftieth, or such a part of it.
+        """Return whether its own joint travels all of a circle but for a fiftieth, or for `but`.
 
         What it does there comes back to where it began.
         """
@@ -295,7 +295,7 @@ class Effect(ABC):
 
 
 def adds(effect: Effect) -> bool:
-    """Return whether it only adds its columns to the torque, whatever else acts."""
+    """Return whether it only adds its columns to the torque of the other effects."""
     return type(effect).apply is Effect.apply and type(effect).torque is Effect.torque
 
 

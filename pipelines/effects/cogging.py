@@ -86,7 +86,7 @@ class Cogging(Effect):
         return table
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Return the orders that the travel tells apart.
+        """Return the orders that the travel resolves.
 
         Where the joint closes its circle, or nearly, whole orders are held: as long as waves of
         other orders are missing from the model, they would pull a free one off its place.

@@ -19,7 +19,7 @@ class EffectsConfig:
     # cogging
     fewest_waves: float = 1.25  # in the travel: a fit moves one and a half; half a wave is a spring
     leads: float = 0.1  # of the largest harmonic, that the first wave has at least
-    apart: float = 0.25  # of what the range tells apart, from a whole order: 45 degrees
+    apart: float = 0.25  # of the resolution of the range, from a whole order: 45 degrees
     # concave_friction
     carreau: float = 2.0  # Carreau's knee, from which a refit starts
     bluntest: float = 0.3  # knee: with less it is another law

@@ -1,4 +1,4 @@
-"""What effects of one kind have beyond the contract, and no other effect does.
+"""Define what friction laws and events have beyond the contract of an effect.
 
     FrictionLaw    every column takes power out of its joint
     Event          happens once, in one log

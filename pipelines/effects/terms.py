@@ -1,11 +1,11 @@
-"""What effects speak in.
+"""Define the terms of effects.
 
 The arm they act on, the quantities they have, and how they enter a simulation.
 
     ArmModel      what an effect may ask of the arm
     Quantity      one parameter: unit, range, meaning
     Parameters    those of an effect
-    Words         what a report says of an effect
+    Words         the text about an effect in a report
     SpeedCurve    a torque that follows from speed alone, which a simulation takes by itself
     OwnLoad       one that follows from angle and speed of its joint, in numbers or arrays
     Hooks         how an effect enters the forward simulation
@@ -46,7 +46,7 @@ _MANY = 256  # numerics: samples
 
 
 class ArmModel(Protocol):
-    """What an effect may ask of the arm it acts on: the arm as modelled without this effect."""
+    """The arm that an effect acts on, as modelled without this effect."""
 
     @property
     def robot(self) -> RobotDescription: ...
@@ -152,7 +152,7 @@ class Quantity:
     period: float | None = None
 
     def among(self, own: int | None, n_joints: int) -> tuple[int, ...] | None:
-        """Which joints or links of an arm of `n_joints` joints it may be.
+        """Return the joints or links of an arm of `n_joints` joints that it may be.
 
         Of an effect at joint `own`; None: it is neither.
         """
@@ -230,13 +230,13 @@ class Parameters(tuple[Quantity, ...]):
 
     @property
     def reads_torque(self) -> bool:
-        """Whether columns hold the logged torque itself."""
+        """Return whether columns hold the logged torque itself."""
         return any(q.reads_torque for q in self)
 
 
 @dataclass(frozen=True)
 class Words:
-    """What a report says of an effect: sentences, but for the title."""
+    """The text about an effect in a report: sentences, but for the title."""
 
     title: str
     signature: str  # how it shows
@@ -276,7 +276,7 @@ class SpeedCurve:
 
 @dataclass(frozen=True)
 class Hooks:
-    """How an effect enters the forward simulation. What is left out changes nothing.
+    """How an effect enters the forward simulation. Hooks left out change nothing.
 
     The first axis of every array holds replicas, so that many simulations run at once. `states`
     numbers of memory each replica keeps, zero or `start` at the start; `rate` moves them in

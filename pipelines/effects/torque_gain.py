@@ -1,4 +1,4 @@
-"""A drive that gives more or less torque than it is told."""
+"""A drive that gives more or less torque than its command."""
 
 from __future__ import annotations
 

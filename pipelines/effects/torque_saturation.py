@@ -1,4 +1,4 @@
-"""A drive that cannot give all the torque it is told."""
+"""A drive that cannot give all the torque of its command."""
 
 from __future__ import annotations
 

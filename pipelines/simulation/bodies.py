@@ -73,7 +73,7 @@ class ManyChains:
         try:
             out[:] = np.linalg.solve(mass.transpose(2, 0, 1), rest)[..., 0].T
         except np.linalg.LinAlgError:
-            out[:] = np.nan  # whoever simulates refuses it as a runaway
+            out[:] = np.nan  # refused as a runaway
 
     def hold(self, q: Array, dq: Array) -> None:
         """Keep D and c + h as they are at q and dq, for `held_acceleration`."""

@@ -43,7 +43,7 @@ class Noise:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What the replicas did. Each array (replicas, samples, joints)."""
+    """The simulated signals. Each array (replicas, samples, joints)."""
 
     t: Array  # [s] (samples,)
     q: Array  # [rad] as the encoders counted it

@@ -37,7 +37,7 @@ Positions = tuple[Array, Array, float]
 
 @dataclass(frozen=True)
 class SimulatedSpan:
-    """How much of a log was simulated: in closed loop from where it begins on, or in windows."""
+    """The part of a log that was simulated: in closed loop from its start, or in windows."""
 
     log: str  # its name
     seconds: float  # [s] over which the simulated arm was compared with the measured one
@@ -88,20 +88,26 @@ def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]
     logs = motions[:SIMULATION.logs]
     hooks = [hook for arm in arms for hook in Plant.of(arm).hooks]
     soft = any(hook.rate or hook.remembering for hook in hooks)
+    slow = soft or any(hook.actuator and hook.states for hook in hooks)
     if all(in_loop(arms[0], log) for log, _ in logs):
-        slow = soft or any(hook.actuator and hook.states for hook in hooks)
-        longest = SIMULATION.longest_soft if slow else SIMULATION.longest
-        found = _told(arms, logs, in_loops(arms, logs, longest), closed=True)
-        more = any(log.n_samples * log.sample_time > longest for log, _ in logs)
-        if more and _open(found[0], found[-1]):
-            positions = in_loops(arms, logs, SIMULATION.longer * longest)
-            longer = _told(arms, logs, positions, closed=True)
-            found = found if longer[0].how == "none" else longer
+        found = _in_closed_loop(arms, logs, slow)
         if found[0].how != "none":
             return found
     exact = SIMULATION.exact_soft if soft else SIMULATION.exact
     found = _told(arms, logs, [_in_windows(arm, logs, exact) for arm in arms], closed=False)
     return none if found[0].how == "none" else found
+
+
+def _in_closed_loop(arms: Sequence[Arm], logs: Motions, slow: bool) -> list[Simulation]:
+    """Return the errors over the first seconds of the logs, or over longer ones."""
+    longest = SIMULATION.longest_soft if slow else SIMULATION.longest
+    found = _told(arms, logs, in_loops(arms, logs, longest), closed=True)
+    more = any(log.n_samples * log.sample_time > longest for log, _ in logs)
+    if more and _open(found[0], found[-1]):
+        positions = in_loops(arms, logs, SIMULATION.longer * longest)
+        longer = _told(arms, logs, positions, closed=True)
+        found = found if longer[0].how == "none" else longer
+    return found
 
 
 def _open(first: Simulation, last: Simulation) -> bool:
@@ -208,7 +214,7 @@ def _in_windows(arm: Arm, motions: Motions, exact: float) -> list[Positions] | N
 
 def _windowed(arm: Arm, log: ExperimentLog, found: Reconstructed, exact: float,
               steps: int | None) -> tuple[Windows, Motion, float]:
-    """Return the windows, the motion beside them, and the time between its samples [s]."""
+    """Return the windows, the measured motion, and the time between its samples [s]."""
     usable = np.zeros(log.n_samples, dtype=bool)
     usable[found.good.kept] = found.good.fit
     motion, tau, usable, every = _coarser(found.motion, held_torque(log), usable, log.sample_time)

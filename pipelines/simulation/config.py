@@ -38,7 +38,7 @@ class SimulationConfig:
     longer: float = 6.0  # times as long, where the last arm comes no nearer: noise averages out
     window: float = 0.1  # [s] of a window
     fine: float = 1e-3  # [s] between torques of a window: a faster log's are averaged
-    exact: float = 1e-3  # of the position error, to which it is worked out
+    exact: float = 1e-3  # of the position error, to which it is computed
     exact_soft: float = 1e-2  # the same, where something moves beside the joints
     still: float = 1e-4  # [rad or m] standard deviation of a joint that does not move
     blocks: int = 20  # of the time over which errors are added up
@@ -64,7 +64,7 @@ class ExampleConfig:
 
 @dataclass(frozen=True)
 class CommandConfig:
-    """How a logged torque is told to be the command of the log's own controller."""
+    """When a logged torque counts as the command of the log's own controller."""
 
     longest: int = 6000  # samples that are followed, from the first on: an observer starts there
     fewest: int = 200

@@ -1,4 +1,4 @@
-"""What the figures of a simulated log show: envelopes, spectra, how windows drift."""
+"""Series for the figures of a simulated log: envelopes, spectra, drift of windows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an experiment asks of the arm: references, controller, encoders, where it starts."""
+"""An experiment to simulate: references, controller, encoders, start."""
 
 from __future__ import annotations
 

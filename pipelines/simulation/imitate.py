@@ -73,7 +73,7 @@ class How:
 
 @dataclass(frozen=True)
 class Imitation:
-    """What was simulated of one log, beside what it recorded.
+    """The simulation of one log and its differences from the recording.
 
     Every array is per joint; none where nothing can be compared.
     """
@@ -120,7 +120,7 @@ def imitate(log: ExperimentLog, arm: Arm, how: How, file: str, settings: object 
 
     Args:
         file: where the simulated log will lie, without ending.
-        settings: what the simulated logs shall say of how they were made, as JSON can hold it.
+        settings: stored in the simulated logs, as JSON can hold them.
         draw: keep series for figures.
 
     Raises:

@@ -31,7 +31,7 @@ __all__ = ["MovingPlant", "Plant"]
 
 @dataclass(frozen=True, eq=False)
 class Plant:
-    """What moves, in parts."""
+    """An arm in parts, for simulation."""
 
     body: RigidBody
     p: Array  # (parameters,)

@@ -28,7 +28,7 @@ Indices = npt.NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """Simulated motion over the windows, one behind the other; NaN in samples beside them."""
+    """Simulated motion over consecutive windows; NaN in samples outside them."""
 
     q: Array  # [rad] (samples, joints) as the encoders would see it
     dq: Array  # [rad/s]
@@ -39,7 +39,7 @@ class Windows:
 
 @dataclass(frozen=True, eq=False)
 class _Followed:
-    """What windows start from and follow."""
+    """A plant, the motion whose states windows start from, and the torque that they follow."""
 
     plant: Plant
     motion: Motion
