@@ -62,7 +62,6 @@ class ExcitationConfig:
     shapes: int = 4  # of a cause with non-linear numbers
     hidden: float = 0.1  # a cause of which less shows has to show more first
     rank: float = 1e-8  # relative eigenvalue of columns that are one
-    noted: float = 0.97  # of the score of the motion noted last: a better one is noted
     # the other experiments
     levels: int = 9  # speeds over two decades
     speed_share: float = 0.8  # of the speed limit

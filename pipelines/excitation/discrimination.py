@@ -158,9 +158,8 @@ def told_apart(task: Task, designed: Design, pair: Pair, effort: Effort,
                seed: int) -> tuple[Design, Apart]:
     """Change `designed` step by step for the better, its ceiling on the condition number kept.
 
-    The search looks between a few samples; the finished motion, which keeps its limits between all
-    of them, is judged as it is. Where it lost the gain, motions on the way are tried, and at last
-    it is the plain design.
+    The finished motion, which keeps its limits between all samples, is judged as it is. Where it
+    gained nothing, the plain design is returned.
     """
     assert task.arm is not None  # `refuse_hidden`
     problem = landscape(task)
@@ -170,7 +169,7 @@ def told_apart(task: Task, designed: Design, pair: Pair, effort: Effort,
     ceiling = max(ROOM * (task.problem.goal.ceiling or np.inf), before.condition_number)
     rng, size, done = np.random.default_rng([seed, 9]), FIRST, 0
     until = time.process_time() + effort.seconds
-    stopped, passed = designed.stopped, [(x, now)]
+    stopped = designed.stopped
     try:
         while (time.process_time() < until if effort.evaluations is None
                else done < effort.evaluations):
@@ -181,26 +180,18 @@ def told_apart(task: Task, designed: Design, pair: Pair, effort: Effort,
             size = min(size * GROWS, 1.0) if better else max(size * SHRINKS, LEAST)
             if better:
                 x, now = other, seen
-                if now.score < CONFIG.noted * passed[-1][1].score:
-                    passed.append((x, now))
             if done % TELL_EVERY == 0:
                 effort.tell(f"evaluation {done}: similarity {now.similarity:.3f}")
     except Interrupted as signal:  # the best so far is kept
         stopped = signal.exit_code
     count = designed.evaluations + done
-    for each in (x, *(point for point, _ in reversed(passed[1:]))):
-        after = finished(task, each, count, count, stopped)
-        apart = Apart(pair.names, before, _seen(task, after, pair), done)
-        if apart.gained(task):
-            return after, apart
+    after = finished(task, x, count, count, stopped)
+    motion = after.trajectory.series.samples(problem.samples)
+    apart = Apart(pair.names, before, alike(task, task.arm, motion, pair), done)
+    if apart.gained(task):
+        return after, apart
     plain = replace(designed, evaluations=count, stopped=stopped)
-    return plain, Apart(pair.names, before, before, done, changed=False)
-
-
-def _seen(task: Task, found: Design, pair: Pair) -> Alike:
-    assert task.arm is not None
-    motion = found.trajectory.series.samples(landscape(task).samples)
-    return alike(task, task.arm, motion, pair)
+    return plain, replace(apart, after=before, changed=False)
 
 
 def alike(task: Task, arm: Arm, motion: Array, pair: Pair) -> Alike:

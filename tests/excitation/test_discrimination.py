@@ -46,24 +46,6 @@ def test_causes_are_less_alike_within_the_ceiling(task: Task, plain: Design) -> 
     assert found.design.trajectory.series.cosine.tobytes() != plain.trajectory.series.cosine.tobytes()
 
 
-def test_a_motion_that_its_limits_spoil_gives_way_to_one_on_the_way(task: Task, plain: Design,
-                                                                    monkeypatch: pytest.MonkeyPatch) -> None:
-    """The end of the search cannot be used: a motion that it passed is, which still tells more than the plain design."""
-    calls: list[int] = []
-
-    def first_halved(task: Task, *given: object) -> Design:
-        calls.append(1)
-        made = finished(task, *given)  # type: ignore[arg-type]
-        return halved(task, made) if len(calls) == 1 else made
-
-    monkeypatch.setattr(telling, "finished", first_halved)
-    after, apart = telling.told_apart(task, plain, PAIR, EFFORT, 1)
-    assert len(calls) == 2
-    assert apart.changed
-    assert apart.after.score < apart.before.score
-    assert after.reached
-
-
 def test_where_nothing_is_better_it_is_the_plain_design(task: Task, plain: Design, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(telling, "finished", lambda task, *given: halved(task, plain))
     after, apart = telling.told_apart(task, plain, PAIR, EFFORT, 1)
