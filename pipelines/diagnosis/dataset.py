@@ -7,7 +7,7 @@ dataset.reference                             the rows of role "reference"
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -97,6 +97,12 @@ class Rows:
         return self.data.rows
 
     @cached_property
+    def coarse(self) -> Rows:
+        """The same rows from fewer samples: exact enough for the direction of a step."""
+        data = self.data.coarse
+        return self if data is self.data else replace(self, data=data)
+
+    @cached_property
     def y(self) -> tuple[Array, ...]:
         return self.signal(self.data.y)
 
@@ -129,14 +135,14 @@ class Rows:
         slopes = nominal_slopes(model)
         return None if slopes is None else self.table(self.data.lay_each(slopes))
 
-    def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
+    def slopes(
+        self, model: Exact, joints: Container[int | None]
+    ) -> tuple[Table, list[tuple[int, int, str]]]:
         """Return the slopes of the torque by the numbers of the effects, and their names.
 
-        At the joint of an effect the shape of the friction law is one of them, and of an effect on
-        the whole arm that of every law: fitted without the effect, it has taken some of it.
+        Args:
+            joints: of whose friction laws the shapes are among them.
         """
-        own = {one.effect.joint for one in model.effects if one.log is None}
-        joints = range(1, 1 + self.n_joints) if None in own else own
         every, names = further_slopes(model, self.data, joints)
         return self.table(every), names
 

@@ -115,7 +115,8 @@ def _usual(
     parts = Parts.of(dataset, dictionary, prior)
     every = range(len(parts.counts))  # without reference logs they are the later rows
     sums = parts.sums(every) if dataset.reference is None else None
-    return prior, baseline(parts, dataset, dictionary, config), sums
+    usual = baseline(parts, dataset, dictionary, config)
+    return replace(prior, grams=(), moments=()), usual, sums  # these take memory, and are done
 
 
 def _torques(rough: Dataset, every: Dictionary, look: Look) -> tuple[Array, Array]:

@@ -32,7 +32,7 @@ from pipelines.effects import find_effect
 from pipelines.effects.kinds import FrictionLaw
 from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
 
-__all__ = ["RIDGE", "Belief", "Prior", "prior_of", "rubs"]
+__all__ = ["RIDGE", "Belief", "Prior", "of_any_size", "prior_of", "rubs"]
 
 RIDGE = 1e-9  # numerics: of unit columns of an effect, which may be dependent
 _FREE = 1e-6  # numerics: of the information along a direction that is freed, or not held
@@ -225,16 +225,23 @@ def _typical(
 def _most(group: Group, square: float, torque: Array, config: DiagnosisConfig) -> float:
     """Return the largest variance that a standing number of a healthy machine has, of a row.
 
-    Of the form of friction any, of what effects state a tolerance for that, else a part of the
-    torque (joints,) of its joint, or of the joint that has most.
+    Of what effects state a tolerance for that, else a part of the torque (joints,) of its joint, or
+    of the joint that has most.
     """
+    if of_any_size(group):
+        return np.inf
     unnamed = group.kind == "unnamed"
     healthy = None if unnamed else find_effect(group.key[0]).parameters.healthy
-    if group.key[0] == FORM or healthy == np.inf:
-        return np.inf
     own = float(torque.max() if group.key[1] is None else torque[group.key[1] - 1])
     small = config.misfit**2 * own
     return min(small, healthy**2 * square) if healthy else small
+
+
+def of_any_size(group: Group) -> bool:
+    """Return whether healthy machines have a standing number of any size: the form of friction."""
+    if group.kind == "unnamed":
+        return group.key[0] == FORM
+    return find_effect(group.key[0]).parameters.healthy == np.inf
 
 
 def _lower_median(values: Iterable[float]) -> float:

@@ -19,10 +19,10 @@ from pipelines.diagnosis.baseline import Sums
 from pipelines.diagnosis.candidates import Dictionary, Group, laid
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
-from pipelines.diagnosis.prior import RIDGE, Belief, Prior, rubs
+from pipelines.diagnosis.prior import RIDGE, Belief, Prior, of_any_size, rubs
 from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.state import State
-from pipelines.diagnosis.unnamed import Key
+from pipelines.diagnosis.unnamed import FORM, Key
 from pipelines.dynamics.config import ORDERS
 from pipelines.effects.base import Effect
 from pipelines.effects.kinds import FrictionLaw
@@ -113,14 +113,20 @@ class Later:
         return belief
 
     def fit(self, model: Exact, theta: Array, belief: Belief, steps: int = _STEPS) -> State:
-        """Return the model with all its numbers fitted; those of effects have no prior."""
-        here, known = self._at(model, theta, belief), belief
+        """Return the model with all its numbers fitted; those of effects have no prior.
+
+        Slopes from fewer samples lead near the fit, those from all of them end it.
+        """
+        here, known, damping = self._at(model, theta, belief), belief, _DAMPING[0]
+        rows = self.rows.coarse
         for k in range(1 + steps):
             known = self._exact(belief, here.model) if k < _FRESH else known
-            there = self._better(here, known, linear=not k)  # linear numbers first
+            there, damping = self._better(here, known, damping, rows, linear=not k)
             gained, here = here.cost - there.cost, there
             if k and gained < 2.0 + _SETTLED * here.cost:
-                break
+                if rows is self.rows:
+                    break
+                rows = self.rows
         slopes, names = self.slopes(here.model)
         effects = slopes.scaled(1.0 / slopes.lengths)
         logs = [one.log for one in here.model.effects]
@@ -136,28 +142,42 @@ class Later:
             self._read_off(here.model),
         )
 
+    def begun(self, model: Exact, theta: Array, belief: Belief) -> _Point:
+        """Return the model with the numbers of its nominal model and standing ones fitted."""
+        here = self._at(model, theta, belief)
+        return self._better(here, belief, _DAMPING[0], self.rows.coarse, linear=True)[0]
+
     def _at(self, model: Exact, theta: Array, belief: Belief) -> _Point:
         with np.errstate(all="ignore"):  # a step too far may overflow: it is not taken then
             residual = self._residual(model, theta)
             cost = belief.cost(theta, residual) + self._read_off(model)
         return _Point(model, theta, residual, cost)
 
-    def _better(self, here: _Point, known: Belief, linear: bool) -> _Point:
-        """Return where a step of Levenberg and Marquardt leads; `here` where none leads lower."""
-        slopes, names = self.slopes(replace(here.model, effects=()) if linear else here.model)
+    def _better(
+        self, here: _Point, known: Belief, damping: float, rows: Rows, linear: bool
+    ) -> tuple[_Point, float]:
+        """Return where a step of Levenberg and Marquardt leads, and the damping of the next one.
+
+        It leads to `here` where no damping leads lower.
+
+        Args:
+            linear: move the numbers of the nominal model alone.
+        """
+        slopes, names = self.slopes(replace(here.model, effects=()) if linear else here.model, rows)
         size = slopes.lengths
         unit = slopes.scaled(1.0 / size)
         gradient = np.r_[known.slope(here.theta, here.residual), unit.moments(here.residual)]
-        for damping in _DAMPING if names else _DAMPING[:1]:
-            step = known.beside(unit, damping).solve(gradient)
+        first = _DAMPING.index(damping)
+        for place in range(first, len(_DAMPING)) if names else (0,):
+            step = known.beside(unit, _DAMPING[place]).solve(gradient)
             way, more = step[: len(here.theta)], step[len(here.theta) :] / size
             own = way[: self.prior.n_nominal] / self.prior.scale
             there = self._at(here.model.moved(np.r_[own, more], names), here.theta + way, known)
             if np.isfinite(there.cost) and there.cost <= here.cost:
-                return there
-            if damping == RIDGE and gradient @ step < 2.0 + _SETTLED * here.cost:  # if linear
+                return there, _DAMPING[max(place - 1, 0)]
+            if not place and gradient @ step < 2.0 + _SETTLED * here.cost:  # if linear
                 break
-        return here
+        return here, _DAMPING[0]
 
     def composed(self, model: Exact) -> Later:
         """Return the same with the columns of drives and records beside the effects of a model.
@@ -424,8 +444,12 @@ class Later:
         )
 
     def unchanged(self, state: State, key: Key | None = None) -> State:
-        """Return the state refitted with standing numbers, of a cause or all, at their mean."""
-        own = [key in (None, group.key) for group in self.prior.groups]
+        """Return the state refitted with standing numbers at their mean.
+
+        They are those of a cause, or all that healthy machines have in small.
+        """
+        groups = self.prior.groups
+        own = [g.key == key if key else not of_any_size(g) for g in groups]
         at = self.prior.n_nominal + np.flatnonzero(own)
         if not len(at):
             return state
@@ -438,8 +462,7 @@ class Later:
         the form of friction at its joint, which is free: that and the other laws are held at their
         mean.
         """
-        law = isinstance(effect, FrictionLaw) or effect.clock == "session"
-        if law and self.dataset.reference is None:
+        if self._as_friction(effect):
             own = [rubs(g) and g.key[1] == effect.joint for g in self.prior.groups]
             belief = belief.held(self.prior.n_nominal + np.flatnonzero(own))
         return self.freed(belief, effect)
@@ -462,11 +485,35 @@ class Later:
             return belief
         return belief.exactly(nominal.scaled(1.0 / self.prior.scale))
 
-    def slopes(self, model: Exact) -> tuple[Table, list[tuple[int, int, str]]]:
-        """Return the slopes by the numbers of the effects in their own units, and their names."""
+    def slopes(
+        self, model: Exact, rows: Rows | None = None
+    ) -> tuple[Table, list[tuple[int, int, str]]]:
+        """Return the slopes by the numbers of the effects in their own units, and their names.
+
+        At the joint of an effect the shape of the friction law is one of them, and of an effect on
+        the whole arm that of every law: fitted without the effect, it has taken some of it. Where
+        the form of friction is free, the shape says nothing that this does not.
+
+        Args:
+            rows: of which; None: of all samples.
+        """
         if not model.effects:
             return self.base.take(np.zeros(0, dtype=np.intp)), []
-        return self.rows.slopes(model)
+        own = {one.effect.joint for one in model.effects if one.log is None}
+        joints = set(range(1, 1 + self.rows.n_joints)) if None in own else own
+        held = {one.effect.joint for one in model.effects if self._as_friction(one.effect)}
+        return (rows or self.rows).slopes(model, joints - (self._formed - held))
+
+    @cached_property
+    def _formed(self) -> set[int | None]:
+        """The joints whose form of friction is free."""
+        free = self.dataset.reference is None
+        return {g.key[1] for g in self.prior.groups if free and g.key[0] == FORM}
+
+    def _as_friction(self, effect: Effect) -> bool:
+        """Return whether an effect cannot be distinguished from the form of friction."""
+        law = isinstance(effect, FrictionLaw) or effect.clock == "session"
+        return law and self.dataset.reference is None
 
     def _residual(self, model: Exact, theta: Array) -> tuple[Array, ...]:
         standing = theta.copy()

@@ -459,8 +459,9 @@ def _candidate(
     model = state.model.with_effect(effect, start, log=log)
     try:
         others = _plainer(model) if later.dataset.reference is None else ()
-        fits = [later.fit(one, state.theta, belief) for one in (model, *others)]
-        fitted = min(fits, key=lambda one: one.cost)
+        begun = [later.begun(one, state.theta, belief) for one in (model, *others)]
+        best = min(begun, key=lambda one: one.cost)
+        fitted = later.fit(best.model, best.theta, belief)
         explained = state.cost - fitted.cost
         possible = later.possible(fitted, explained) and bool(np.isfinite(fitted.losses).all())
         noisy = possible and later.follows_noise(fitted, explained)

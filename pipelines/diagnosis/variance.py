@@ -20,14 +20,17 @@ from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Dataset, Rows
 from pipelines.diagnosis.events import windows_of
-from pipelines.diagnosis.screening import best_of, screen
+from pipelines.diagnosis.screening import Screened, best_of, screen
 from pipelines.dynamics.arm import Arm
 from pipelines.fit.joint_table import Array, Arrow, Indices, Structure, Table
 
 __all__ = ["Components", "components", "settle"]
 
+Through = Callable[[Table], Table]
+
 _FLAT = 1e-10  # numerics: of a column's information
 _START = 1e-2  # numerics: variance at which the expectation maximisation begins
+_AT_ONCE = 100  # numerics: groups of columns that are whitened together
 _EM_ROUNDS = 8  # numerics: rounds of it; more change the variances by less than a tenth
 
 
@@ -123,23 +126,24 @@ def settle(
     alone = dataset.reference is None
     first = tuple(group for group in dictionary.groups if group.shape == 0)
 
-    def noise_of(rows: Rows, table: Table, white: Rows, columns: Table) -> list[Array]:
-        groups = _best_shapes(white, columns, dictionary.groups) if alone else first
-        numbers = _imitated(white, columns, groups, config)
-        torque = Table.stacked([rows.nominal, table]).times(numbers)
+    def noise_of(rows: Rows, table: Table, white: Rows, through: Through) -> list[Array]:
+        every = dictionary.groups
+        groups = _best_shapes(white, table, through, every) if alone else first
+        own = table.take(np.concatenate([g.columns for g in groups]))
+        numbers = _imitated(white, through(own), groups, config)
+        torque = Table.stacked([rows.nominal, own]).times(numbers)
         noise = [y - t for y, t in zip(rows.y, torque, strict=True)]
         return _less_events(rows, dictionary, dataset.arm, noise) if alone else noise
 
     rows, table, bins = dataset.later.less(fit), dictionary.later, config.noise_bins
-    noise = noise_of(rows, table, rows, table)
+    noise = noise_of(rows, table, rows, _as_they_are)
     if alone:  # what fits best depends on the noise
-        white, through = rows.whitened(noise, bins)
-        noise = noise_of(rows, table, white, through(table))
+        noise = noise_of(rows, table, *rows.whitened(noise, bins))
     cleared, to_later = dataset.later.less(cause).whitened(noise, bins)
     now = replace(dataset, later=cleared.less(None), cleared=cleared)
     before, own = dataset.reference, dictionary.reference
     if reference is None and before is not None and own is not None:
-        white, through = before.whitened(noise_of(before, own, before, own), bins)
+        white, through = before.whitened(noise_of(before, own, before, _as_they_are), bins)
         reference = white, through(own)
     if reference is not None:
         white, columns = reference
@@ -147,16 +151,32 @@ def settle(
     return now, lambda: replace(dictionary, later=to_later(table))
 
 
-def _best_shapes(rows: Rows, candidates: Table, groups: Sequence[Group]) -> tuple[Group, ...]:
-    """Return each cause's shape at each joint that explains most beside the nominal columns."""
+def _as_they_are(table: Table) -> Table:
+    return table
+
+
+def _best_shapes(
+    rows: Rows, table: Table, through: Through, groups: Sequence[Group]
+) -> tuple[Group, ...]:
+    """Return each cause's shape at each joint that explains most beside the nominal columns.
+
+    Args:
+        table: all candidates.
+        through: brings columns of it to the rows; it is asked for some at a time.
+    """
     nominal = rows.nominal.scaled(1.0 / rows.nominal.lengths)
     known = Arrow.of(nominal.gram(nominal) + _FLAT * np.eye(nominal.width), Structure.of(nominal))
-    cross = nominal.gram(candidates)
-    moments = candidates.moments(rows.y) - cross.T @ known.solve(nominal.moments(rows.y))
-    best = best_of(
-        screen(groups, known, cross, candidates.squares([g.span for g in groups]), moments)
-    )
-    return tuple(one.group for one in best.values())
+    left = known.solve(nominal.moments(rows.y))
+    found: list[Screened] = []
+    for first in range(0, len(groups), _AT_ONCE):
+        some, start = groups[first : first + _AT_ONCE], groups[first].first
+        own = through(table.take(np.arange(start, some[-1].span.stop)))
+        near = [replace(group, first=group.first - start) for group in some]
+        cross = nominal.gram(own)
+        moments = own.moments(rows.y) - cross.T @ left
+        each = screen(near, known, cross, own.squares([g.span for g in near]), moments)
+        found += [replace(one, group=group) for one, group in zip(each, some, strict=True)]
+    return tuple(one.group for one in best_of(found).values())
 
 
 def _less_events(rows: Rows, dictionary: Dictionary, arm: Arm, y: Sequence[Array]) -> list[Array]:
@@ -173,18 +193,14 @@ def _less_events(rows: Rows, dictionary: Dictionary, arm: Arm, y: Sequence[Array
 
 
 def _imitated(
-    rows: Rows, candidates: Table, groups: Sequence[Group], config: DiagnosisConfig
+    rows: Rows, columns: Table, groups: Sequence[Group], config: DiagnosisConfig
 ) -> Array:
-    """Return the numbers (nominal + candidates,) that fit the rows best; 0 of all but `groups`."""
+    """Return the numbers (nominal + columns,) that fit the rows best; the columns are of groups."""
     unit = 1.0 / rows.nominal.lengths
     nominal = rows.nominal.scaled(unit)
     of = [g for g in groups for _ in range(g.width)]
-    columns = np.concatenate([g.columns for g in groups])
-    table = Table.stacked([nominal, candidates.take(columns)])
+    table = Table.stacked([nominal, columns])
     power = sum(float(y @ y) for y in rows.y)
     gram, moment, structure = table.gram(table), table.moments(rows.y), Structure.of(table)
     found = components(gram, moment, structure, rows.count, of, config, power)
-    out = np.zeros(nominal.width + candidates.width)
-    out[: nominal.width] = found.mean[: nominal.width] * unit
-    out[nominal.width + columns] = found.mean[nominal.width :]
-    return out
+    return np.r_[found.mean[: nominal.width] * unit, found.mean[nominal.width :]]

@@ -86,11 +86,10 @@ class BaseResonance(Effect):
         inertia, w = values["inertia"], 2.0 * pi * values["frequency"]
         if not isfinite(inertia):
             return without
-        rigid, slopes = _rigid(arm), rigid_slopes(arm.body, arm.p, motion, _FIRST)
         damping = 2.0 * values["damping_ratio"] * w * inertia
-        x = deflection(rigid, slopes, motion, _FIRST, inertia * w * w, damping, inertia)
-        return np.asarray(without + (rigid(shifted(motion, _FIRST, *x))
-                                     - rigid_torque(arm.body, arm.p, motion)))
+        x = deflection(arm.body, arm.p, motion, _FIRST, inertia * w * w, damping, inertia)
+        swung = _rigid(arm)(shifted(motion, _FIRST, *x))
+        return np.asarray(without + (swung - rigid_torque(arm.body, arm.p, motion)))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """Return the hooks: the arm's first angle is against the ground, the base two states."""

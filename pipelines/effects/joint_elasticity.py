@@ -105,12 +105,10 @@ class JointElasticity(Effect):
         without = predict(motion, arm) if predict is not None else arm.torque(motion)
         if not isfinite(values["stiffness"]):
             return without
-        rigid, motor, spring = _rigid(arm), values["motor_inertia"], (values["stiffness"],
-                                                                      values["damping"])
-        slopes = rigid_slopes(arm.body, arm.p, motion, self._index)
-        x, rate, second = deflection(rigid, slopes, motion, self._index, *spring, -motor)
-        more = rigid(shifted(motion, self._index, x, rate, second)) - rigid_torque(
-            arm.body, arm.p, motion)
+        motor, spring = values["motor_inertia"], (values["stiffness"], values["damping"])
+        x, rate, second = deflection(arm.body, arm.p, motion, self._index, *spring, -motor)
+        bent = _rigid(arm)(shifted(motion, self._index, x, rate, second))
+        more = bent - rigid_torque(arm.body, arm.p, motion)
         more[:, self._index] -= motor * second
         return np.asarray(without + more)
 

@@ -15,7 +15,6 @@ from pipelines.dynamics.perturbation import (
     oscillation,
     perturbed_torque,
     shifted,
-    torque_slopes,
 )
 from tests.dynamics.rrr_arms import random_states
 from tests.simulation.arms import Case, rrr
@@ -88,8 +87,7 @@ def test_a_deflection_fulfils_its_equation(case: Case, inertia: float) -> None:
     phase = np.outer(t, [5.0, 8.0, 11.0])
     motion = Motion(t, 0.4 * np.sin(phase), 0.4 * np.cos(phase) * [5.0, 8.0, 11.0], -0.4 * np.sin(phase) * [25.0, 64.0, 121.0])
     index, k, d = (0, 2.5e5, 100.0) if inertia > 0.0 else (1, 14000.0, 4.0)
-    slopes = torque_slopes(case.arm.torque, motion, index)
-    x, rate, second = deflection(case.arm.torque, slopes, motion, index, k, d, inertia)
+    x, rate, second = deflection(case.arm.body, case.arm.p, motion, index, k, d, inertia)
     there = shifted(motion, index, x, rate, second)
     torque = partial(pin.rnea, case.model, case.model.createData())
     tau = np.array([torque(*row)[index] for row in zip(there.q, there.dq, there.ddq, strict=True)])

@@ -47,7 +47,7 @@ END = 2.0  # periods of the cut-off left out at either end of a stretch: so far 
 _AT_ONCE = 8  # numerics: channels, which stay near the processor
 _ORDER = 20  # rows: as far as the noise of the low-pass reaches, and a fifth of a second
 _RIDGE = 1e-4  # of the noise's power: what the low-pass keeps back is not brought back by more
-_ROOM = 192 << 20  # [bytes]
+_ROOM = 64 << 20  # [bytes]
 
 
 class Kept:
@@ -296,7 +296,9 @@ class Data:
     def coarse(self) -> Data:
         """The same rows with columns from fewer samples: exact enough for a search, and not for a fit."""
         kept = Kept()
-        return replace(self, logs=tuple(one.coarse(kept) for one in self.logs))
+        logs = tuple(one.coarse(kept) for one in self.logs)
+        same = all(a is b for a, b in zip(logs, self.logs, strict=True))
+        return self if same else replace(self, logs=logs)
 
     @cached_property
     def counts(self) -> Mask:
