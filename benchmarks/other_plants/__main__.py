@@ -1,12 +1,12 @@
 """Diagnose arms that the bench did not draw, one after the other, and print how it fared.
 
-python -m benchmarks.other_plants                          all python -m benchmarks.other_plants
-gantry-cogging six-tanh  these python -m benchmarks.other_plants --count 5 --keep FOLDER  the first
-five; logs stay in FOLDER, and are taken from there python -m benchmarks.other_plants --drawn 3
---count 40     forty drawn at random, the third time python -m benchmarks.other_plants --drawn 3
---pairs        with two faults each python -m benchmarks.other_plants --noise 10               ten
-times the noise of the drives python -m benchmarks.other_plants --part 1/2               every
-second
+    python -m benchmarks.other_plants                                all
+    python -m benchmarks.other_plants gantry-cogging six-tanh        these
+    python -m benchmarks.other_plants --count 5 --keep FOLDER        five; logs stay in FOLDER
+    python -m benchmarks.other_plants --drawn 3 --count 40           forty, drawn the third time
+    python -m benchmarks.other_plants --drawn 3 --pairs              with two faults each
+    python -m benchmarks.other_plants --noise 10                     ten times the drives' noise
+    python -m benchmarks.other_plants --part 1/2                     every second
 """
 
 from __future__ import annotations
