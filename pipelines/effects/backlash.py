@@ -22,7 +22,7 @@ from pipelines.effects.base import (
     friction_at,
 )
 from pipelines.effects.config import EFFECTS
-from pipelines.effects.drive_apart import DriveApart
+from pipelines.effects.drive_apart import DriveApart, rigid_torque_of
 
 __all__ = ["Backlash", "Gaps", "followed"]
 
@@ -78,7 +78,7 @@ class Backlash(Effect):
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
         """All gaps are followed at once; those of one motor share its forces."""
-        tau, felt = _rigid(arm, motion), _felt(arm, motion.q, self._index)
+        tau, felt = rigid_torque_of(arm)(motion), _felt(arm, motion.q, self._index)
         motors = list(dict.fromkeys(one.motor_inertia for one in shapes))
         motor = np.array(motors if len(motors) == 1 else [one.motor_inertia
                                                           for one in shapes])[:, None]
@@ -98,7 +98,7 @@ class Backlash(Effect):
             """τ_rigid(q + x) - τ_rigid(q)."""
             if slopes is not None:
                 return perturbed_by(slopes, x, rate, second)
-            return _rigid(arm, shifted(motion, self._index, x, rate, second)) - tau
+            return rigid_torque_of(arm)(shifted(motion, self._index, x, rate, second)) - tau
 
         return [one._torque(motion, x, ahead) for one, x in zip(shapes, link, strict=True)]
 
@@ -121,7 +121,7 @@ class Backlash(Effect):
         torque comes and goes by chance; a motor of a tenth of what the joint feels.
         """
         motor = 0.1 * float(np.mean(_felt(arm, motion.q, self._index)))
-        usual = float(np.median(np.abs(self.own(_rigid(arm, motion))))) or 1.0
+        usual = float(np.median(np.abs(self.own(rigid_torque_of(arm)(motion))))) or 1.0
         for gap in np.geomspace(3e-4, 6.6e-3, 10).tolist():
             for crossing in EFFECTS.crossings:
                 film = min(crossing * usual / gap, _THICKEST)
@@ -144,9 +144,7 @@ class Backlash(Effect):
 
         drive = DriveApart(self._index, motor, friction_at(arm, self._index + 1), passed,
                            lambda tau: half * np.clip(tau / _NOTHING, -1.0, 1.0) + tau / k)
-        return Hooks(actuator=drive.actuator, sensor=drive.sensor,
-                     inertia=drive.taken_out(arm.n_joints), states=2, settled=drive.settled,
-                     start=drive.start, rate=drive.rate)
+        return drive.hooks(arm.n_joints)
 
 
 def _flank(link: float, motor: float) -> tuple[float, float]:
@@ -155,11 +153,6 @@ def _flank(link: float, motor: float) -> tuple[float, float]:
     link, motor = max(link, 1e-12), max(motor, 1e-12)
     k = link * (2.0 * pi * EFFECTS.flank_hz) ** 2
     return k, 2.0 * sqrt(k * motor * link / (motor + link))
-
-
-def _rigid(arm: ArmModel, motion: Motion) -> Array:
-    """Torque of the rigid arm alone."""
-    return arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)
 
 
 def _felt(arm: ArmModel, q: Array, index: int) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite, pi
 from typing import Self
@@ -28,6 +28,7 @@ from pipelines.effects.base import (
     Values,
     friction_at,
 )
+from pipelines.effects.drive_apart import rigid_torque_of
 
 __all__ = ["BaseResonance"]
 
@@ -62,7 +63,7 @@ class BaseResonance(Effect):
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
         """All bases are swung by the same torque, which has the same slopes for all."""
-        force, one, found = -_rigid(arm)(motion)[:, _FIRST], np.ones(len(motion.t)), []
+        force, one, found = -rigid_torque_of(arm)(motion)[:, _FIRST], np.ones(len(motion.t)), []
         slopes = rigid_slopes(arm.body, arm.p, motion, _FIRST)
         for shape in shapes:
             w = 2.0 * pi * shape.frequency
@@ -88,7 +89,7 @@ class BaseResonance(Effect):
             return without
         damping = 2.0 * values["damping_ratio"] * w * inertia
         x = deflection(arm.body, arm.p, motion, _FIRST, inertia * w * w, damping, inertia)
-        swung = _rigid(arm)(shifted(motion, _FIRST, *x))
+        swung = rigid_torque_of(arm)(shifted(motion, _FIRST, *x))
         return np.asarray(without + (swung - rigid_torque(arm.body, arm.p, motion)))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
@@ -127,8 +128,3 @@ class BaseResonance(Effect):
 
         return Hooks(actuator=actuator, sensor=sensor, states=2, settled=settled, start=start,
                      rate=rate)
-
-
-def _rigid(arm: ArmModel) -> Callable[[Motion], Array]:
-    """Torque of the rigid arm alone."""
-    return lambda motion: arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)

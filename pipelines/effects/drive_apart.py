@@ -1,6 +1,4 @@
-"""A drive that turns apart from its link.
-
-What elastic and loose joints have in common in the forward simulation.
+"""A drive that turns apart from its link, in simulations of elastic and of loose joints.
 
     J_m θ̈ = τ - τ_friction(θ̇) - τ_passed(θ - q, θ̇ - q̇)
 
@@ -18,8 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.dynamics.body import Array, Motion
+from pipelines.effects.base import ArmModel, Hooks
 
-__all__ = ["DriveApart"]
+__all__ = ["DriveApart", "rigid_torque_of"]
 
 
 @dataclass(frozen=True)
@@ -39,6 +38,11 @@ class DriveApart:
         less = np.zeros((n_joints, n_joints))
         less[self.index, self.index] = -self.inertia
         return less
+
+    def hooks(self, n_joints: int) -> Hooks:
+        """Return how it enters the simulation of an arm of `n_joints` joints."""
+        return Hooks(actuator=self.actuator, sensor=self.sensor, inertia=self.taken_out(n_joints),
+                     states=2, settled=self.settled, start=self.start, rate=self.rate)
 
     def actuator(self, command: Array, motion: Motion, states: Array) -> Array:
         """Return what reaches the link.
@@ -75,3 +79,8 @@ class DriveApart:
         speed, acceleration = motion.dq[:, self.index], motion.ddq[:, self.index]
         return self.ahead(tau[:, self.index] - self.friction(motion, speed)
                           - self.inertia * acceleration)
+
+
+def rigid_torque_of(arm: ArmModel) -> Callable[[Motion], Array]:
+    """Return the torque (samples, joints) [N m] of the rigid arm alone, as a function of motion."""
+    return lambda motion: arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)

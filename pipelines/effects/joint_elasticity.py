@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf, isfinite, pi, sqrt
 from typing import Self
@@ -28,7 +28,7 @@ from pipelines.effects.base import (
     Values,
     friction_at,
 )
-from pipelines.effects.drive_apart import DriveApart
+from pipelines.effects.drive_apart import DriveApart, rigid_torque_of
 
 __all__ = ["JointElasticity"]
 
@@ -64,7 +64,7 @@ class JointElasticity(Effect):
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
         """All springs feel the same torque, which has the same slopes for all; d = x k [N m]."""
-        force, found = self.own(_rigid(arm)(motion)), []
+        force, found = self.own(rigid_torque_of(arm)(motion)), []
         slopes = rigid_slopes(arm.body, arm.p, motion, self._index)
         for shape in shapes:
             d = shape.motor_inertia * self.own(motion.ddq) - force
@@ -107,7 +107,7 @@ class JointElasticity(Effect):
             return without
         motor, spring = values["motor_inertia"], (values["stiffness"], values["damping"])
         x, rate, second = deflection(arm.body, arm.p, motion, self._index, *spring, -motor)
-        bent = _rigid(arm)(shifted(motion, self._index, x, rate, second))
+        bent = rigid_torque_of(arm)(shifted(motion, self._index, x, rate, second))
         more = bent - rigid_torque(arm.body, arm.p, motion)
         more[:, self._index] -= motor * second
         return np.asarray(without + more)
@@ -120,14 +120,7 @@ class JointElasticity(Effect):
         drive = DriveApart(self._index, max(values["motor_inertia"], light),
                            friction_at(arm, self._index + 1),
                            lambda angle, speed: k * angle + d * speed, lambda tau: tau / k)
-        return Hooks(actuator=drive.actuator, sensor=drive.sensor,
-                     inertia=drive.taken_out(arm.n_joints), states=2, settled=drive.settled,
-                     start=drive.start, rate=drive.rate)
-
-
-def _rigid(arm: ArmModel) -> Callable[[Motion], Array]:
-    """Torque of the rigid arm alone."""
-    return lambda motion: arm.body.torque(motion.q, motion.dq, motion.ddq, arm.p)
+        return drive.hooks(arm.n_joints)
 
 
 def _felt(arm: ArmModel, q: Array, index: int) -> float:

@@ -91,8 +91,10 @@ OwnDrive = Callable[[Any, Any, Functions], Any]
 
 def waves(parts: Sequence[tuple[float, float, float]]) -> Callable[[Any, Functions], Any]:
     """Return the sum of a sin(k q) + b cos(k q) over all (k, a, b), as a function of q."""
+    seen = [part for part in parts if part[1] or part[2]] or parts[:1]
+
     def sum_at(q: Any, m: Functions) -> Any:
-        return sum(a * m.sin(k * q) + b * m.cos(k * q) for k, a, b in parts)
+        return sum(a * m.sin(k * q) + b * m.cos(k * q) for k, a, b in seen)
 
     return sum_at
 

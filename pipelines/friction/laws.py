@@ -24,7 +24,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from pipelines.dynamics.body import Array, Motion, RigidBody
-from pipelines.dynamics.rrr import rigid_body
+from pipelines.dynamics.chain import regressor
+from pipelines.dynamics.kinematics import serial_chain
 from pipelines.effects import find_effect
 from pipelines.effects.base import ArmModel, Effect, Quantity, SpeedCurve
 from pipelines.io.robot import Joint, RobotDescription
@@ -114,7 +115,7 @@ def gravity_acts(robot: RobotDescription, joint: int, others: Sequence[float]) -
     """
     q = np.tile(np.asarray(others, dtype=np.float64), (POSITIONS, 1))
     q = np.insert(q, joint - 1, np.linspace(-3.0, 3.0, POSITIONS), axis=1)
-    row = rigid_body(robot).regressor(q, 0.0 * q, 0.0 * q)[:, joint - 1]
+    row = regressor(serial_chain(robot), q, 0.0 * q, 0.0 * q)[:, joint - 1]
     least = PARALLEL * float(np.linalg.norm(robot.gravity))
     return bool(np.abs(row).max(initial=0.0) > least)
 

@@ -56,11 +56,12 @@ class RungeKutta:
             if i:
                 np.multiply(slope, node * h, out=work)
                 here = np.add(state, work, out=point)
-                memory = states + (node * h) * rates
+                memory = states + (node * h) * rates if plant.n_states else states
             slope[:n] = here[n:]
             rates = plant.accelerations(t + node * h, here[:n], here[n:], memory, command,
                                         slope[n:], self._held)
-            moved = moved + weight * rates
+            if plant.n_states:
+                moved += weight * rates
             if i == 0:
                 total[:] = slope
             else:

@@ -154,6 +154,12 @@ class MovingPlant:
         self.n_states = ends[-1]
         pairs = zip(plant.hooks, ends, ends[1:], strict=False)
         self._hooked = [(hook, slice(a, b)) for hook, a, b in pairs]
+        self._driving = [(hook, own) for hook, own in reversed(self._hooked)
+                         if hook.drive or hook.actuator or hook.rate]
+        self._alone = [hook.alone for hook in plant.hooks if hook.alone]
+        self._remembering = [(hook.remembering, own.start) for hook, own in self._hooked
+                             if hook.remembering]
+        self._loads = [(hook.load, own) for hook, own in self._hooked if hook.load]
         self._zeros = np.zeros((replicas, plant.n_joints))
 
     def motion(self, t: Array, q: Array, dq: Array, ddq: Array | None = None) -> Motion:
@@ -185,22 +191,19 @@ class MovingPlant:
 
         Each effect acts around those before it: a command meets the last one first.
         """
-        motion, rates, torque = self.motion(t, q, dq), np.zeros_like(states), command.copy()
-        for hook, own in reversed(self._hooked):
+        rates, torque = np.zeros_like(states), command.copy()
+        motion = self.motion(t, q, dq)
+        for hook, own in self._driving:
             if hook.rate is not None:
                 rates[:, own] = hook.rate(motion, torque.T, states[:, own])
             torque = _driven(hook, own, motion, dq, states, torque)
-        for hook, own in self._hooked:
-            if hook.alone is not None:
-                joint, load = hook.alone
-                torque[joint] -= load(q[joint], dq[joint], ARRAYS)
-            elif hook.remembering is not None:
-                joint, memory = hook.remembering
-                bent = states[:, own.start]
-                rates[:, own.start] = rate = memory.rate(bent, dq[joint], ARRAYS)
-                torque[joint] -= memory.load(bent, rate)
-            elif hook.load is not None:
-                torque -= hook.load(motion, states[:, own]).T
+        for joint, load in self._alone:
+            torque[joint] -= load(q[joint], dq[joint], ARRAYS)
+        for (joint, memory), place in self._remembering:
+            rates[:, place] = rate = memory.rate(states[:, place], dq[joint], ARRAYS)
+            torque[joint] -= memory.load(states[:, place], rate)
+        for loaded, own in self._loads:
+            torque -= loaded(motion, states[:, own]).T
         return torque, rates
 
     def updated(self, t: Array, q: Array, dq: Array, states: Array, command: Array) -> Array:
