@@ -19,7 +19,6 @@ from pipelines.diagnosis.answer import answer
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import diagnose_prepared
 from pipelines.diagnosis.result import Diagnosis, Extended, Result
-from pipelines.diagnosis.words import summary_of
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.named_cause import refuse_unknown
 from pipelines.errors import Check, UsageError
@@ -30,6 +29,7 @@ from pipelines.model.estimation.allowed import refuse_strange, refuse_unfit
 from pipelines.model.rows.friction_terms import with_terms_told_apart
 from pipelines.model.rows.prepare import BLOCKS, Logs, prepare
 from pipelines.report.diagnosis_report import diagnosis_report
+from pipelines.report.finding_words import summary_of
 from pipelines.report.report import Report
 from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pipelines.diagnosis.result import Answer, Finding, Gain, ResidualRms, TipError
-from pipelines.diagnosis.words import of_any_size, taken_in, where
 from pipelines.dynamics.parameter_names import numbered
 from pipelines.effects import find_effect
 from pipelines.io.log import Array
@@ -25,6 +24,7 @@ from pipelines.report.figures import (
     legend_above,
     one_figure,
 )
+from pipelines.report.finding_words import of_any_size, taken_in, where
 from pipelines.report.frf_figures import posture_words
 from pipelines.report.report import Cell, Figure, Section, Table, columns_table
 from pipelines.report.sentences import paragraphs, sentence

@@ -20,7 +20,6 @@ from pipelines.diagnosis.result import (
     Trial,
     Value,
 )
-from pipelines.diagnosis.words import how_much, of_any_size, taken_in, where
 from pipelines.effects import find_effect
 from pipelines.io.log import Array
 from pipelines.model.words import within
@@ -33,6 +32,7 @@ from pipelines.report.diagnosis_finding import (
     torque_of,
 )
 from pipelines.report.diagnosis_picture import picture_sections
+from pipelines.report.finding_words import how_much, of_any_size, taken_in, where
 from pipelines.report.report import Report, Section, Table, Tone
 from pipelines.report.sections import boundary_card, data_quality
 from pipelines.report.sentences import as_sentence, paragraphs, sentence
