@@ -18,12 +18,13 @@ from pathlib import Path
 import numpy as np
 
 from pipelines.dynamics.arm import Arm, ArmTorque
+from pipelines.dynamics.body import Motion
 from pipelines.errors import Check, InputRejected, NothingMatched, UsageError
 from pipelines.friction.in_folder import fitted_in_folder
 from pipelines.importers.recipe import Recipe
 from pipelines.importers.units import controller_table, write_controller_table
 from pipelines.io.files import write_log
-from pipelines.io.log import ExperimentLog, derive, digest_of, recording
+from pipelines.io.log import Array, ExperimentLog, derive, digest_of, recording
 from pipelines.io.model_file import ModelFile, read_model
 from pipelines.io.option import option
 from pipelines.io.robot import RobotDescription
@@ -38,9 +39,10 @@ from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
 from pipelines.writing import validation
 from pipelines.writing.config import CONFIG
 from pipelines.writing.path import Page
-from pipelines.writing.task import designed, writing_task
+from pipelines.writing.task import designed, planned_log, writing_task
 from pipelines.writing.timing import Pace
 from pipelines.writing.validation import Gates, Result
+from pipelines.writing.via_points import via_points
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -52,7 +54,7 @@ class Settings:
     model: str | None = option(None, "model.json to judge. [the folder's, else fitted to its logs]")
     torque_gate: float = option(0.1, "Largest relative torque error of a joint.")
     draws: int = option(5, "Models that simulated control cases run on in turn.")
-    seed: int = option(1, "Seed of those models.")
+    seed: int = option(1, "Seed of those, and of via points.")
     simulate: bool = option(True, "Judge by what was recorded alone.", "--no-simulation")
     text: str | None = option(
         None, "Design this writing task instead: trajectory.h5 for the robot.")
@@ -67,9 +69,14 @@ class Settings:
     elbow: str | None = option(None, "up or down, of the RRR arm. [up]")
     posture: tuple[float, ...] | None = option(
         None, "Posture near the task [rad], of any other arm.")
+    via_points: int | None = option(None, "Design so many moves between random postures instead.")
     sample_time: float = 1e-3  # [s] of the designed task
     recipe: str | None = option(
         None, "Recipe of import: controller.csv in its order, units and rate.")
+
+    @property
+    def designs(self) -> bool:
+        return self.text is not None or self.via_points is not None
 
 
 @dataclass(frozen=True)
@@ -89,7 +96,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     Raises:
         UsageError: C02, neither logs nor a task; C04, no such file.
     """
-    if not (request.paths or request.roles or settings.text is not None):
+    if not (request.paths or request.roles or settings.designs):
         raise UsageError("C02", "no logs, and no text to write", where="validate-writing",
                          remedy="name logs to validate on, or design the task with --text RRR")
     read_any = request.paths or request.roles
@@ -103,7 +110,7 @@ def read(request: Request, settings: Settings) -> Inputs:
     if settings.model is not None:
         said = f"{Path(settings.model).name}, as given"
     robot = recipe = None
-    if settings.text is not None:
+    if settings.designs:
         robot, known = _robot(request, inputs)
         sources += known
         if settings.recipe is not None:
@@ -112,7 +119,7 @@ def read(request: Request, settings: Settings) -> Inputs:
             path = find_recipe(settings.recipe)
             recipe = parse_recipe(read_small_text(path, what="a recipe (TOML)"), path)
             sources.append(path)
-    label = inputs.label or f"writing-{slug(settings.text or '')}"
+    label = inputs.label or (f"writing-{slug(settings.text)}" if settings.text else "via-points")
     material = Material(model, said, settings.model is not None, robot, recipe)
     return replace(inputs, sources=(*inputs.sources, *sources), material=material, label=label,
                    robot_name=robot.name if robot is not None else inputs.robot_name)
@@ -151,7 +158,7 @@ def compute(inputs: Inputs, settings: Settings) -> Result:
             that shall judge it.
     """
     _refuse_strange(settings)
-    if settings.text is not None:
+    if settings.designs:
         return _designed(inputs, settings)
     logs = [opened.log for opened in inputs.logs if opened.log.origin != "planned"]
     judges = [log for log in logs if log.role == "validate"]
@@ -253,7 +260,9 @@ def _friction_held(arm: Arm) -> bool:
 
 def _refuse_strange(settings: Settings) -> None:
     """Raise C02 for a setting that makes no sense."""
-    longest, letters, gate = CONFIG.longest, len(settings.text or ""), settings.torque_gate
+    longest = CONFIG.longest
+    moves, letters = settings.via_points or 0, len(settings.text or "")
+    gate = settings.torque_gate
     for wrong, message, where, remedy in (
         (settings.elbow not in (None, "up", "down"), f"'{settings.elbow}' is no side of an elbow",
          "--elbow", "say up or down"),
@@ -261,8 +270,11 @@ def _refuse_strange(settings: Settings) -> None:
          "give a relative error above 0"),
         (not 1 <= settings.draws <= CONFIG.most_draws, f"{settings.draws} draws", "--draws",
          f"give 1 to {CONFIG.most_draws}"),
+        (moves > longest, f"{moves} via points", "--via-points", f"give {longest} at most"),
         (letters > longest, f"a text of {letters} letters", "--text", f"give {longest} at most"),
         (settings.seed < 0, f"the seed {settings.seed} is negative", "--seed", "give 0 or more"),
+        (settings.text is not None and settings.via_points is not None, "a text and via points",
+         "--text, --via-points", "give one of them"),
     ):
         if wrong:
             raise UsageError("C02", message, where=where, remedy=remedy)
@@ -285,15 +297,30 @@ def _designed(inputs: Inputs, settings: Settings) -> Result:
     robot = given.robot
     assert robot is not None  # `read` puts it there whenever a task is designed
     arm = _torque_of(given, robot, inputs)
-    page = Page(settings.plane_y, settings.x, settings.z, settings.size, lift=settings.lift)
-    acceleration = settings.acceleration
-    pace = Pace(settings.speed, min(settings.slow, settings.speed), acceleration,
-                Pace.jerk * acceleration / Pace.acceleration)
-    task = writing_task(robot, settings.text or "", page, pace, posture=settings.posture,
-                        elbow=settings.elbow)  # type: ignore[arg-type]
-    design, log = designed(task, settings.sample_time, arm)
-    table = controller_table(given.recipe, robot, lambda t: task.motion(
-        np.minimum(t, task.duration)).q, design.duration, settings.sample_time)
+    if settings.via_points is not None:
+        rng = np.random.default_rng([11, settings.seed])
+        points = via_points(robot, rng, settings.via_points, arm=arm)
+        at, motion = points.at, points.sampled(settings.sample_time)
+        name, experiment = f"{robot.name} via points {settings.seed}", "free"
+        drawn = (motion.dq != 0.0).any(axis=1)
+    else:
+        page = Page(settings.plane_y, settings.x, settings.z, settings.size, lift=settings.lift)
+        acceleration = settings.acceleration
+        pace = Pace(settings.speed, min(settings.slow, settings.speed), acceleration,
+                    Pace.jerk * acceleration / Pace.acceleration)
+        task = writing_task(robot, settings.text or "", page, pace, posture=settings.posture,
+                            elbow=settings.elbow)  # type: ignore[arg-type]
+        reference = task.sampled(settings.sample_time, arm)
+        motion, drawn = reference.motion, reference.drawn
+        name, experiment = f"{robot.name} writing {settings.text}", "writing"
+
+        def at(t: Array) -> Motion:
+            return task.motion(np.minimum(t, task.duration))
+
+    log = planned_log(name, robot, motion, experiment)
+    design = designed(robot, motion, drawn, arm, settings.text)
+    table = controller_table(given.recipe, robot, lambda t: at(t).q, float(motion.t[-1]),
+                             settings.sample_time)
     return Result(
         robot=robot.name, joints=tuple(joint.name for joint in robot.joints), model="",
         torque=None, gates=Gates(settings.torque_gate, None, None), draws=settings.draws,

@@ -12,9 +12,11 @@ class WritingConfig:
     """Of the task, of its inverse kinematics and of the validation."""
 
     # the task
-    longest: int = 200  # letters: minutes of writing, seconds of planning
+    longest: int = 200  # letters or moves: minutes of writing, seconds of planning
     longest_sample_time: float = 0.1  # [s] of a reference
     fewest_joints: int = 3  # the tip has three coordinates
+    authority: float = 0.95  # of each limit that a move uses; the rest is for the controller
+    move_points: int = 101  # of a move at which its torque is computed
     # inverse kinematics
     border: float = 0.005  # [m] from the border of the workspace, where joint speeds diverge
     flattest: float = 0.02  # smallest to largest singular value of the Jacobian that is used

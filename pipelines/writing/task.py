@@ -1,4 +1,4 @@
-"""Design the joint motion of a text written at a given pace.
+"""Design the joint motion of a text written at a given pace, or of random moves.
 
     task = writing_task(robot, "RRRID 2004")
     reference = task.sampled(1e-3)          q, dq, ddq, exact; tip, its speed, and the letter
@@ -19,7 +19,7 @@ import numpy.typing as npt
 from pipelines.dynamics import rrr
 from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.kinematics import serial_chain
+from pipelines.dynamics.kinematics import serial_chain, tip_position
 from pipelines.dynamics.rrr_kinematics import rrr_geometry
 from pipelines.errors import UsageError
 from pipelines.io import schema
@@ -31,7 +31,7 @@ from pipelines.writing.path import Page, TipPath, lay_out
 from pipelines.writing.timing import Pace, TimeLaw, time_law
 
 __all__ = ["Demand", "Designed", "TipMotion", "WritingReference", "WritingTask", "demands",
-           "designed", "planned_log", "writing_task"]
+           "designed", "planned_log", "refuse_sample_time", "writing_task"]
 
 ROUNDING = 1e-9  # numerics: share of a limit above it at which it still is met
 
@@ -117,9 +117,7 @@ class WritingTask:
             UsageError: C02, out of reach, through a singularity, or beyond a limit: names the
                 letter, the place and the limit.
         """
-        if not (math.isfinite(sample_time) and 0.0 < sample_time <= CONFIG.longest_sample_time):
-            raise UsageError("C02", f"a sample time of {sample_time:g} s", where="sample time",
-                             remedy=f"give one up to {CONFIG.longest_sample_time:g} s")
+        refuse_sample_time(sample_time)
         samples = math.ceil(self.duration / sample_time - ROUNDING) + 1
         t = np.arange(samples, dtype=np.float64) * sample_time
         tip = self.tip(t)
@@ -246,6 +244,13 @@ def _refuse_beyond_limits(robot: RobotDescription, motion: Motion, arm: Arm | No
             where=place(int(np.searchsorted(motion.t, worst.t))))
 
 
+def refuse_sample_time(sample_time: float) -> None:
+    """Raise C02 for a sample time [s] that makes no sense."""
+    if not (math.isfinite(sample_time) and 0.0 < sample_time <= CONFIG.longest_sample_time):
+        raise UsageError("C02", f"a sample time of {sample_time:g} s", where="sample time",
+                         remedy=f"give one up to {CONFIG.longest_sample_time:g} s")
+
+
 def planned_log(name: str, robot: RobotDescription, motion: Motion, experiment: str = "writing",
                 role: str = "validate") -> ExperimentLog:
     """Return the log that carries `motion` (two samples or more, even) as its reference."""
@@ -262,6 +267,7 @@ def planned_log(name: str, robot: RobotDescription, motion: Motion, experiment: 
 class Designed:
     """A task in figures; series are thinned."""
 
+    kind: str  # "text" | "via points"
     text: str
     duration: float  # [s]
     limits: tuple[Demand, ...]
@@ -276,19 +282,14 @@ class Designed:
     units: tuple[str, ...]  # of each joint's position
 
 
-def designed(task: WritingTask, sample_time: float,
-             arm: Arm | None) -> tuple[Designed, ExperimentLog]:
-    """Return a task in figures, and its log for the robot.
-
-    Raises:
-        UsageError: as `WritingTask.sampled`.
-    """
-    reference, robot = task.sampled(sample_time, arm), task.robot
-    motion, tip = reference.motion, reference.tip
+def designed(robot: RobotDescription, motion: Motion, drawn: npt.NDArray[np.bool_],
+             arm: Arm | None, text: str | None) -> Designed:
+    """Return the figures of a motion that writes `text`, or of moves without one."""
     rows = slice(None, None, max(1, -(-len(motion.t) // CONFIG.points)))
-    design = Designed(
-        task.path.text, float(motion.t[-1]), demands(robot, motion, arm), arm is not None,
-        motion.t[rows], motion.q[rows], motion.dq[rows], motion.ddq[rows], tip.position[rows],
-        reference.drawn[rows].astype(float), tip.speed[rows],
+    tip = tip_position(serial_chain(robot), motion.q)
+    speed = np.linalg.norm(np.gradient(tip, motion.t, axis=0), axis=1)
+    return Designed(
+        "via points" if text is None else "text", text or "", float(motion.t[-1]),
+        demands(robot, motion, arm), arm is not None, motion.t[rows], motion.q[rows],
+        motion.dq[rows], motion.ddq[rows], tip[rows], drawn[rows].astype(float), speed[rows],
         tuple("rad" if joint.revolute else "m" for joint in robot.joints))
-    return design, planned_log(f"{robot.name} writing {task.path.text}", robot, motion)

@@ -212,8 +212,8 @@ def test_a_model_left_in_the_folder_is_taken(writing: ExperimentLog, tmp_path: P
 @pytest.mark.parametrize(("settings", "code"), [
     (Settings("rrr", torque_gate=0.0), "C02"), (Settings("rrr", draws=0), "C02"), (Settings("rrr", seed=-1), "C02"),
     (Settings("nobody"), "C04"), (Settings(text="R", elbow="left"), "C02"), (Settings(text="R", sample_time=0.0), "C02"),
-    (Settings(text="#"), "C02"), (Settings(text="R", size=-1.0), "C02"),
-    (Settings(text="R" * 1000), "C02")])
+    (Settings(text="R", via_points=3), "C02"), (Settings(text="#"), "C02"), (Settings(text="R", size=-1.0), "C02"),
+    (Settings(via_points=100_000), "C02"), (Settings(text="R" * 1000), "C02")])
 def test_settings_that_make_no_sense_are_refused(settings: Settings, code: str, writing: ExperimentLog, tmp_path: Path) -> None:
     with pytest.raises(RrridError) as refused:
         validated(tmp_path, {"w": writing}, settings)
@@ -238,6 +238,15 @@ def test_the_designed_task_is_a_plan_that_writes_the_text(tmp_path: Path) -> Non
     assert speed.max() == pytest.approx(0.4, rel=1e-3)
     table = np.loadtxt(outcome.folder / "controller.csv", delimiter=",", skiprows=1)
     np.testing.assert_allclose(table[:log.n_samples, 1:], log["q_ref"], atol=1e-12)
+
+
+def test_via_points_use_the_drives(tmp_path: Path) -> None:
+    """A plan of free motion, held out; some joint is at 95 % of a limit."""
+    outcome = designed(tmp_path, Settings(via_points=4, seed=3))
+    log = open_log(outcome.folder / "trajectory.h5").log
+    assert (log.origin, log.experiment, log.role) == ("planned", "free", "validate")
+    assert outcome.result.design is not None
+    assert max(one.share for one in outcome.result.design.limits) == pytest.approx(0.95, abs=0.01)
 
 
 def test_a_task_beyond_a_limit_is_refused(tmp_path: Path) -> None:

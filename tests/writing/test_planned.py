@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Motion
@@ -11,6 +12,7 @@ from pipelines.io.files import open_log, write_log
 from pipelines.io.robot_files import load_robot
 from pipelines.quality.checks import check_log
 from pipelines.writing.task import planned_log, writing_task
+from pipelines.writing.via_points import via_points
 
 
 @pytest.fixture(scope="module")
@@ -32,4 +34,8 @@ def test_it_comes_back_sample_for_sample(motion: Motion, tmp_path: Path, ending:
 
 
 def test_the_log_doctor_has_nothing_to_say(motion: Motion) -> None:
-    assert [check.code for check in check_log(planned_log("writing", load_robot("rrr"), motion)) if check.level != "ok"] == []
+    """Neither of a writing reference nor of via points."""
+    robot = load_robot("rrr")
+    via = via_points(robot, np.random.default_rng(1)).sampled(1e-3)
+    for log in (planned_log("writing", robot, motion), planned_log("via", robot, via, experiment="free")):
+        assert [check.code for check in check_log(log) if check.level != "ok"] == []
