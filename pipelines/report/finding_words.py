@@ -18,6 +18,7 @@ from pipelines.diagnosis.result import Alternative, Diagnosis, Finding, Value
 from pipelines.effects import find_effect
 from pipelines.io.log import Array
 from pipelines.model.words import plain_number, within
+from pipelines.report.config import REPORT
 
 __all__ = ["how_much", "of_any_size", "other_joint", "summary_of", "taken_in", "where"]
 
@@ -25,7 +26,6 @@ __all__ = ["how_much", "of_any_size", "other_joint", "summary_of", "taken_in", "
 _USUAL = {"1": (100.0, "%"), "rad": (1e3, "mrad"), "m": (1e3, "mm"), "s": (1e3, "ms")}
 _DEGREE = np.pi / 180.0
 _TORQUES = ("N m", "N")
-_TOLD, _VAGUE = 2, 5.0  # further findings in a sentence; deviations, within which it shows them
 _OTHER = {"from_joint": "from", "with_joint": "with"}  # parameters that name another joint
 
 
@@ -79,7 +79,7 @@ def how_much(one: Finding) -> str:
     sign = "+" if signed and told.value > 0.0 else ""
     space = "" if unit == "°" else " "
     std = told.std if isinstance(told.std, float) and np.isfinite(told.std) else 0.0
-    off = f" ± {plain_number(std * times, 2)}" if abs(told.value) < _VAGUE * std else ""
+    off = f" ± {plain_number(std * times, 2)}" if abs(told.value) < REPORT.vague * std else ""
     return f" ({sign}{plain_number(told.value * times, 3)}{off}{space}{unit.replace('^2', '²')})"
 
 
@@ -94,9 +94,9 @@ def other_joint(parameters: Mapping[str, Value]) -> str:
 
 def _beside(others: Sequence[Finding]) -> str:
     """Return "; and torque logging delay (120 ms) at joint 1", and how many more there are."""
-    told = [f"{within(one.title)}{how_much(one)}{where(one)}" for one in others[:_TOLD]]
-    if len(others) > _TOLD:
-        told.append(f"{len(others) - _TOLD} more")
+    told = [f"{within(one.title)}{how_much(one)}{where(one)}" for one in others[:REPORT.told]]
+    if len(others) > REPORT.told:
+        told.append(f"{len(others) - REPORT.told} more")
     *first, last = told or [""]
     return f"; {', '.join(first)}{' ' if first else ''}and {last}" if last else ""
 
