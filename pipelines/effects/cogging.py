@@ -120,8 +120,7 @@ class Cogging(Effect):
     def own_load(self, values: Values) -> OwnLoad:
         shaped = self.at(values)
         parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
-        wave = waves([(k * shaped.order, in_phase, across)
-                      for k, (in_phase, across) in enumerate(parts, start=1)])
+        wave = waves(shaped.order, parts)
         return lambda q, v, m: wave(q, m)
 
     def amplitudes(self, values: Values) -> Array:

@@ -115,8 +115,7 @@ class PositionFriction(Effect):
         shaped, curve = self.at(values), sign_curve(1.0, values["sharpness"],
                                                     values.get("roundness", 1.0))
         parts = np.reshape(shaped.amplitudes(values), (-1, 2)).tolist()
-        wave = waves([(k * shaped.order, in_phase, across)
-                      for k, (in_phase, across) in enumerate(parts, start=1)])
+        wave = waves(shaped.order, parts)
         return lambda q, v, m: curve.of(v, m) * wave(q, m)
 
     def amplitudes(self, values: Values) -> Array:

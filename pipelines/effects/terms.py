@@ -89,12 +89,23 @@ OwnLoad = Callable[[Any, Any, Functions], Any]
 OwnDrive = Callable[[Any, Any, Functions], Any]
 
 
-def waves(parts: Sequence[tuple[float, float, float]]) -> Callable[[Any, Functions], Any]:
-    """Return the sum of a sin(k q) + b cos(k q) over all (k, a, b), as a function of q."""
-    seen = [part for part in parts if part[1] or part[2]] or parts[:1]
+def waves(order: float,
+          pairs: Sequence[Sequence[float]]) -> Callable[[Any, Functions], Any]:
+    """Return Σ_m a_m sin(m k q) + b_m cos(m k q), m = 1, 2, …, of an order k, as a function of q.
+
+    A harmonic follows from the one before by the addition theorems, for a sine costs most.
+    """
+    (in_phase, across), *rest = pairs
+    while rest and not any(rest[-1]):
+        rest = rest[:-1]
 
     def sum_at(q: Any, m: Functions) -> Any:
-        return sum(a * m.sin(k * q) + b * m.cos(k * q) for k, a, b in seen)
+        sine, cosine = s, c = m.sin(order * q), m.cos(order * q)
+        total = in_phase * s + across * c
+        for a, b in rest:
+            s, c = s * cosine + c * sine, c * cosine - s * sine
+            total = total + a * s + b * c
+        return total
 
     return sum_at
 
