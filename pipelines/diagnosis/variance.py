@@ -203,4 +203,4 @@ def _imitated(
     power = sum(float(y @ y) for y in rows.y)
     gram, moment, structure = table.gram(table), table.moments(rows.y), Structure.of(table)
     found = components(gram, moment, structure, rows.count, of, config, power)
-    return np.r_[found.mean[: nominal.width] * unit, found.mean[nominal.width :]]
+    return np.asarray(np.r_[found.mean[: nominal.width] * unit, found.mean[nominal.width :]])
