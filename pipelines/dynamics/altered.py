@@ -1,6 +1,6 @@
 """The same arm with other gravity, another length, or a body at its tip.
 
-And what becomes of its base parameters.
+Its base parameters are carried over.
 
     tilted = with_gravity(body, gravity)
     p = carry_over(body, tilted) @ p            the same links, as far as torque tells them

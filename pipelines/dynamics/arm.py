@@ -195,7 +195,7 @@ class Arm:
     def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
         """Return the friction laws at a joint (1-based) as curves of its speed.
 
-        None where one of them is more than that.
+        Returns None where one of them is more than that.
         """
         curves = [
             law.effect.speed_curve(law.values) for law in self.friction

@@ -30,16 +30,15 @@ from pipelines.io.robot import RobotDescription
 __all__ = ["BaseArm", "BaseSet", "base_set"]
 
 _SEED = 20040509  # numerics: of the random states
-# numerics: rows of torque for each column: enough that chance cannot make columns look dependent
-_SPARE = 6  # numerics: see above
+# Enough that chance cannot make columns look dependent.
+_SPARE = 6  # numerics: rows of torque for each column
 # A column whose part outside the span of those before it is smaller than this share of it is
-# dependent. Rounding leaves
-# 1e-14; angles written with twelve digits ("1.57079632679") leave 5e-12; a link as short as 0.1 mm
-# leaves 1e-5.
-_DEPENDENT = 1e-8  # numerics: see above
+# dependent. Rounding leaves 1e-14; angles written with twelve digits ("1.57079632679") leave 5e-12;
+# a link as short as 0.1 mm leaves 1e-5.
+_DEPENDENT = 1e-8  # numerics: share of a column, far from either
 _NO_COEFFICIENT = 1e-9  # numerics: rounding
-# numerics: no square or product of round lengths, so that rounding cannot tip it
-_WORTH_WRITING = 3e-8  # numerics: see above
+# No square or product of round lengths, so that rounding cannot tip it.
+_WORTH_WRITING = 3e-8  # numerics: smallest coefficient that is written
 _UNITS = ("kg", "kg m", "kg m", "kg m") + 6 * ("kg m^2",)
 
 
@@ -104,9 +103,7 @@ def _preference(chain: SerialChain) -> list[int]:
 
 
 def _independent(y: Array, order: Sequence[int]) -> list[int]:
-    """Return the columns of y (rows, columns), taken in `order`.
-
-    That do not depend on those taken before.
+    """Return the columns of y (rows, columns) that do not depend on those before them in `order`.
     """
     basis = np.empty(y.shape)
     kept: list[int] = []
@@ -158,7 +155,7 @@ class BaseArm:
     def links_behind(self) -> Array:
         """(10 · joints, parameters): standard parameters that have the torques of p.
 
-        Zero outside the base set.
+        They are zero outside the base set.
         """
         return np.eye(10 * self.chain.n_joints)[:, list(self.base.chosen)]
 
@@ -206,9 +203,9 @@ class BaseArm:
             refuse_other_length(len(self.parameters), p)
 
     def known_parameters(self) -> Array | None:
-        """p (parameters,) of the links the description knows.
+        """Return p (parameters,) of the links that the description knows.
 
-        None where it does not know them all.
+        Returns None where it does not know them all.
         """
         links = [joint.link for joint in self.robot.joints if joint.link is not None]
         if len(links) < self.robot.n_joints:

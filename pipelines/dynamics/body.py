@@ -18,8 +18,7 @@ __all__ = [
 
 Array = npt.NDArray[np.float64]
 
-# numerics: torques of a motion: slopes of seven joints, of the arm and of the body, and two more
-_KEPT = 16  # numerics: see above
+_KEPT = 16  # numerics: torques of a motion: slopes of seven joints, arm and body, and two more
 
 
 @dataclass(frozen=True)
@@ -110,9 +109,9 @@ def refuse_other_shapes(columns: int, **states: Array) -> None:
 
 
 def refuse_other_length(parameters: int, p: Array, samples: int | None = None) -> None:
-    """Refuse p that is not (parameters,), nor (samples.
+    """Refuse p that is not (parameters,).
 
-    Parameters) where every sample may have its own arm.
+    Where every sample may have its own arm, (samples, parameters) is allowed too.
 
     Raises:
         ValueError: says the shape it has and the shape it must have.
@@ -156,8 +155,8 @@ class RigidBody(Protocol):
         ...
 
     def known_parameters(self) -> Array | None:
-        """p of the links the description knows, (parameters,).
+        """Return p (parameters,) of the links that the description knows.
 
-        Or None where it does not know them all.
+        Returns None where it does not know them all.
         """
         ...

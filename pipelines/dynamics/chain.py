@@ -33,8 +33,8 @@ __all__ = ["STANDARD", "inverse_dynamics", "mass_matrix", "regressor", "spatial_
            "standard_parameters"]
 
 STANDARD = ("m", "mx", "my", "mz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
-# numerics: samples worked on at once at most: fewer cost more in calls, more no longer gain
-_AT_ONCE = 8192  # numerics: see above
+# Fewer samples at once cost more in calls, more no longer gain.
+_AT_ONCE = 8192  # numerics: samples worked on at once at most
 
 
 def standard_parameters(links: Sequence[LinkParameters]) -> Array:
@@ -139,10 +139,9 @@ class _Filler:
 
 
 def _project(twists: Array, wrench: Array, own: int | None, out: Array) -> None:
-    """out (joints, columns, samples) = twists (6, joints, samples) on wrench (3 or 6, columns.
+    """Write to `out` the power of every twist on every wrench.
 
-    Samples).
-
+    out (joints, columns, samples), twists (6, joints, samples), wrench (3 or 6, columns, samples).
     Where the last joint's twist is a unit vector its row of the wrench is the answer; `own` says
     which row.
     """
@@ -207,9 +206,8 @@ def inverse_dynamics(chain: SerialChain, q: Array, dq: Array, ddq: Array, phi: A
                      gravity: Array | None = None) -> Array:
     """τ (samples, joints) [N m] of standard parameters `phi` (joints * 10,).
 
-    By the recursive Newton-Euler algorithm.
-
-    Luh, Walker & Paul 1980. `gravity` replaces the chain's own, so that it can be zero.
+    The recursive Newton-Euler algorithm, Luh, Walker & Paul 1980. `gravity` replaces the
+    chain's own, so that it can be zero.
     """
     g = chain.gravity if gravity is None else gravity
     tau = np.empty(np.shape(q))

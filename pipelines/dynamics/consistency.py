@@ -26,7 +26,7 @@ _P1, _P5, _P6, _P12, _P13 = 0, 4, 5, 11, 12  # numerics: places in p
 def rrr_inequalities(p: Array, covariance: Array) -> tuple[Inequality, ...]:
     """Return the inequalities on p (15,).
 
-    Each with a standard deviation to first order from its covariance (15, 15).
+    Each has a standard deviation to first order from its covariance (15, 15).
     """
     p1, p5, p6, p12, p13 = p[[_P1, _P5, _P6, _P12, _P13]]
     across = float(np.hypot(p5, p6))

@@ -1,6 +1,6 @@
 """Energy, linear in the same parameters as torque.
 
-And the balance of power that checks a fit without acceleration.
+The balance of power that follows checks a fit without acceleration.
 
     E = e(q, dq) p,    dq · τ_rigid = d/dt E
 
@@ -47,9 +47,9 @@ def potential_energy(body: RigidBody, q: Array) -> Array:
 
 
 def _of_rrr(body: RRR, q: Array) -> Array:
-    """g (p3 sS + p4 cS + p14 s2 + p15 c2): its slopes are h2 and h3. Kostić et al.
+    """g (p3 sS + p4 cS + p14 s2 + p15 c2): its slopes are h2 and h3.
 
-    2004, (A5), ddq = dq = 0.
+    Kostić et al. 2004, eq. (A5), ddq = dq = 0.
     """
     g = -body.robot.gravity[2]
     _, second, third = np.moveaxis(q + np.array(body.geometry.offset), -1, 0)

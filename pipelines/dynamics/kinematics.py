@@ -285,8 +285,7 @@ def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, g
                  memory: WalkingMemory) -> Iterator[LinkMotion]:
     """Walk out along the chain; dq, ddq (joints, samples).
 
-        V_i = X V + s q̇,   A_i = X A + s q̈ + V_i × s q̇        Featherstone 2008, ch. 5 (recursive
-        Newton-Euler)
+        V_i = X V + s q̇,   A_i = X A + s q̈ + V_i × s q̇        Featherstone 2008, ch. 5
 
     with X the change of frame and s the joint's twist. Acceleration, velocity and the twists of all
     joints so far are the columns of one array, so that every change of frame is one small matrix on
@@ -309,9 +308,9 @@ def link_motions(chain: SerialChain, moves: list[Turn], dq: Array, ddq: Array, g
 
 
 def _through(place: Placement, state: Array, other: Array, used: int) -> tuple[Array, Array]:
-    """Return the first `used` columns carried through a fixed placement.
+    """Carry the first `used` columns through a fixed placement.
 
-    (where they are now, memory that is free).
+    Returns where they are now, and the memory that is free.
     """
     if not place.moves:
         return state, other
@@ -324,7 +323,7 @@ def _through(place: Placement, state: Array, other: Array, used: int) -> tuple[A
 def _drive(acceleration: Array, velocity: Array, revolute: bool, dq: Array, ddq: Array) -> None:
     """Add the joint's own speed and acceleration to A and V (6, samples), in place.
 
-    S q̇, s q̈ and V × s q̇.
+    These are s q̇, s q̈ and V × s q̇.
     """
     axis, first = (2, 0) if revolute else (5, 3)
     acceleration[first] += velocity[1] * dq  # ω × z q̇

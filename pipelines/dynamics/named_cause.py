@@ -30,9 +30,8 @@ def acting_cause(text: str, revolute: Sequence[bool], where: str = "--fault",
                  command: str = "simulate") -> Acting:
     """Return the cause that `text` names, with its numbers.
 
-    On an arm whose joints are turning (`revolute`) or not.
-
     Args:
+        revolute: of each joint of the arm, whether it turns.
         command: whose help lists the causes that there are.
 
     Raises:
@@ -53,7 +52,7 @@ def wanted_cause(text: str, revolute: Sequence[bool],
                  where: str = "--with") -> tuple[Effect, dict[str, float]]:
     """Return the cause that `text` names, to be fitted, and where its non-linear numbers start.
 
-    "cogging:2", "cogging:2:order=18".
+    As in "cogging:2" or "cogging:2:order=18".
 
     Raises:
         UsageError: C01, no such cause or number; C02, a joint or number that does not fit, or one
@@ -80,10 +79,10 @@ def wanted_cause(text: str, revolute: Sequence[bool],
 
 
 def refuse_unknown(text: str, where: str, command: str = "extend") -> None:
-    """Return whether `text` begins with the name of a cause.
+    """Refuse a text that does not begin with the name of a cause.
 
     Raises:
-        UsageError: C01, it does not; with the nearest names, and where all of them stand.
+        UsageError: C01; with the nearest names, and where all of them stand.
     """
     name = text.split(":")[0]
     if name not in effect_names():

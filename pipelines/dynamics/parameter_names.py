@@ -1,11 +1,13 @@
 """Split the names of effects' parameters in results into their parts.
 
-Before them the stage, then the cause, its joint and the quantity.
+The stage comes first, then the cause, its joint and the quantity.
 
-    named_in("extend model cogging joint 2 amplitude 2")    "extend model", cogging at joint 2,
-    "amplitude_2" named_in("coulomb:3:level")                             Coulomb friction at joint
-    3, "level" quantity_of("cogging joint 1 phase 5")                  of the second wave there its
-    second phase: the quantity "phase_2"
+    named_in("extend model cogging joint 2 amplitude 2")
+        "extend model", cogging at joint 2, "amplitude_2"
+    named_in("coulomb:3:level")
+        Coulomb friction at joint 3, "level"
+    quantity_of("cogging joint 1 phase 5")
+        of the second wave there its second phase: the quantity "phase_2"
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ _WORD = re.compile(r"\S+")
 _CAUSES = (
     re.compile(r"([a-z_]+)(?::(\d+))?:([a-z_0-9]+)"),  # "coulomb:3:level", "payload:mass"
     re.compile(r"([a-z_]+)(?: joint (\d+))?(?: (.+))?"))  # "coulomb joint 3 level", "payload mass"
+# how friction was fitted; "output-error" stands in results of earlier versions alone
 _METHOD = re.compile(r"(?:varpro|output-error|ekf) ")
 _NUMBERED = re.compile(r"(.+)_([2-9]|[1-9][0-9]+)$")  # harmonics, and waves of further orders
 _HARMONIC = re.compile(r" ([2-9]|[1-9][0-9]+)(?= \(\d+\)$|$)")
@@ -42,7 +45,7 @@ class Named:
 def named_in(name: str) -> Named | None:
     """Return the effect and the parameter that `name` is of, which `log.result_figures` gave.
 
-    None where it is of none.
+    Returns None where it is of no effect.
     """
     for start in (word.start() for word in _WORD.finditer(name)):
         for pattern in _CAUSES:
@@ -57,7 +60,7 @@ def named_in(name: str) -> Named | None:
 def quantity_of(name: str) -> Quantity | None:
     """Return the quantity that a figure of this name is a value of.
 
-    None where it is of no effect, as a base parameter is.
+    Returns None where it is of no effect, as a base parameter is.
     """
     found = named_in(name)
     if found is None:

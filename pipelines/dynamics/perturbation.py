@@ -31,8 +31,8 @@ class Moving(Protocol):
     def torque(self, motion: Motion) -> Array: ...
 
 
-# [rad], [rad/s], thousandfold [rad/s^2]: far below what friction resolves, above rounding
-_STEP = 1e-6  # numerics: see above
+# Far below what friction resolves, above rounding.
+_STEP = 1e-6  # numerics: [rad], [rad/s], thousandfold [rad/s^2]
 _ROUNDS = 3  # numerics: each leaves what is of higher order in the deflection
 _SETTLED = 1e-6  # numerics: of the deflection: less is no correction
 _LEAST = 0.1  # numerics: of the inertia that a joint feels: what stays beyond its spring at least

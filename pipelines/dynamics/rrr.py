@@ -34,7 +34,7 @@ _STATES, _SEED = 40, 7  # numerics: random states at which the general arm is co
 
 # The columns that act on each joint. Row three has four columns of row two: the one's end is the
 # other's beginning.
-_SHARED = [4, 5, 7, 8]  # numerics: see above
+_SHARED = [4, 5, 7, 8]  # numerics: columns that rows two and three share
 ACTING = (tuple(range(11)), (0, 1, 2, 3, 9, 10, 11, 12, 13, 14, *_SHARED), (*_SHARED, 2, 3, 12))
 
 _Rows = Array | dict[int, Array]
@@ -90,7 +90,7 @@ class RRR:
     def links_behind(self) -> Array:
         """(30, 15): standard parameters that have the torques of p.
 
-        Zero outside the base set of the general arm.
+        They are zero outside the base set of the general arm.
         """
         general = BaseArm(self.robot)
         rng = np.random.default_rng(_SEED)
@@ -107,9 +107,9 @@ class RRR:
         return rrr_kinematics.tip(self.geometry, q)
 
     def regressor(self, q: Array, dq: Array, ddq: Array) -> Array:
-        """R (samples, 3, 15), stored with samples fastest. Kostić et al. 2004, eq.
+        """R (samples, 3, 15), stored with samples fastest.
 
-        (A5), with r34 as in erratum E1.
+        Kostić et al. 2004, eq. (A5), with r34 as in erratum E1.
         """
         refuse_other_shapes(3, q=q, dq=dq, ddq=ddq)
         shape = np.shape(q)[:-1]
@@ -229,7 +229,7 @@ class RRR:
     def _trigonometry(self, q: Array) -> tuple[Array, ...]:
         """cos and sin of q2, q3 and S.
 
-        Of S by the addition theorem, which costs a third of two more calls.
+        Those of S follow by the addition theorem, which costs a third of two more calls.
         """
         return self._trigonometry_of(q[..., 1], q[..., 2])
 
@@ -274,7 +274,7 @@ class RRR:
     def _gravity(self, trigonometry: tuple[Array, ...], p: Array) -> Array:
         """h(q): h3 = g (p3 cS - p4 sS);  h2 = h3 + g (p14 c2 - p15 s2).
 
-        H1 = 0, for the first axis is vertical.
+        And h1 = 0, for the first axis is vertical.
         """
         c2, s2, _, _, cS, sS = trigonometry
         p3, p4, p14, p15 = np.moveaxis(np.asarray(p)[..., [2, 3, 13, 14]], -1, 0)

@@ -26,11 +26,10 @@ __all__ = ["BRANCHES", "Geometry", "InverseKinematics", "Reach", "inverse", "joi
 
 # (shoulder, elbow) of each branch. Shoulder +1 faces the tip, elbow -1 is then up; over the back
 # (-1) elbow +1 is up.
-# numerics: signs
-BRANCHES = ((1, -1), (1, 1), (-1, -1), (-1, 1))  # numerics: see above
+BRANCHES = ((1, -1), (1, 1), (-1, -1), (-1, 1))  # numerics: signs
 
-# numerics: [m] a tip this far outside the workspace is rounding: it counts as on its border
-_CLIP = 1e-13  # numerics: see above
+# A tip this far outside the workspace is rounding: it counts as on its border.
+_CLIP = 1e-13  # numerics: [m] of rounding
 _MERGED = 1e-12  # numerics: [m] within this of the border two branches are one to rounding
 
 
@@ -119,14 +118,15 @@ def tip(geometry: Geometry, q: Array) -> Array:
 
 
 def inverse(geometry: Geometry, tips: Array) -> InverseKinematics:
-    """All branches of the inverse kinematics. Kostić et al. 2004, eq.
+    """Return all branches of the inverse kinematics.
 
-    (A3), corrected by errata E2-E5.
+    Kostić et al. 2004, eq. (A3), corrected by errata E2-E5.
 
         rho = sqrt(x^2 + y^2);  W = sh sqrt((rho - d)(rho + d));  V = z - d1
         q1 = atan2(d x + W y, W x - d y)
-        c3 = (W^2 + V^2 - a2^2 - a3^2)/(2 a2 a3);  s3 = el sqrt((1 - c3)(1 + c3));  q3 = atan2(s3,
-        c3) q2 = atan2((a2 + a3 c3) V - a3 s3 W, (a2 + a3 c3) W + a3 s3 V)
+        c3 = (W^2 + V^2 - a2^2 - a3^2)/(2 a2 a3);  s3 = el sqrt((1 - c3)(1 + c3))
+        q3 = atan2(s3, c3)
+        q2 = atan2((a2 + a3 c3) V - a3 s3 W, (a2 + a3 c3) W + a3 s3 V)
 
     Args:
         tips: (samples, 3) [m] in the base frame.
@@ -171,17 +171,16 @@ def _wrapped(q: Array) -> Array:
 
 def joint_rates(geometry: Geometry, q: Array, velocity: Array,
                 acceleration: Array) -> tuple[Array, Array]:
-    """dq [rad/s] and ddq [rad/s^2], each (samples, 3).
+    """Return dq [rad/s] and ddq [rad/s^2], each (samples, 3), of a moving tip.
 
-    For velocity [m/s] and acceleration [m/s^2] of the tip at q.
+    The tip at q has this velocity [m/s] and acceleration [m/s^2].
 
         ẋ·e_t = R q̇1                               ẋ·e_r = Ṙ + d q̇1
         ẍ·e_t = R q̈1 + 2 Ṙ q̇1 + d q̇1²              ẍ·e_r = R̈ + d q̈1 - R q̇1²
-        -a2 s2 q̇2 - a3 sS Ṡ = Ṙ                    a2 c2 q̇2 + a3 cS Ṡ = ż,      determinant a2 a3
-        sin q3
+        -a2 s2 q̇2 - a3 sS Ṡ = Ṙ                    a2 c2 q̇2 + a3 cS Ṡ = ż
 
-    Meaningless at singular postures (R = 0 or sin q3 = 0): look at `InverseKinematics.singular`
-    first.
+    The determinant of the last two is a2 a3 sin q3. Meaningless at singular postures (R = 0 or
+    sin q3 = 0): look at `InverseKinematics.singular` first.
     """
     refuse_other_shapes(3, q=q, velocity=velocity, acceleration=acceleration)
     q1, q2, q3 = np.moveaxis(q + np.asarray(geometry.offset), -1, 0)

@@ -27,7 +27,7 @@ __all__ = ["AsymmetricFriction"]
 class AsymmetricFriction(Effect):
     """τ = ½ s (ΔFc tanh(w v) + ΔFv v).
 
-    With Δ the positive direction's minus the negative one's and s the direction.
+    Δ is the positive direction's minus the negative one's, and s the direction.
 
     Beside Fc tanh(w v) + Fv v these are Fc ± ½ ΔFc and Fv ± ½ ΔFv in the two directions: s = sign
     v, each to the last; or they go over into each other as gradually as friction changes its sign,

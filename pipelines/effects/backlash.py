@@ -29,29 +29,25 @@ __all__ = ["Backlash", "Gaps", "followed"]
 _NOTHING = 1e-6  # numerics: [N m] that leave the link in the middle of the gap at first
 _THICKEST = 1e6  # numerics: [N m s/rad], or [N s/m]
 # More shapes than these share the slopes of the rigid torque, which cost less then and miss a
-# thousandth of a gap of 6.6 mrad.
-# Those of one shape moved a little, whose difference is a slope, are few: they are worked out
-# exactly.
-_SLOPES = 6  # numerics: see above
+# thousandth of a gap of 6.6 mrad. Those of one shape moved a little, whose difference is a slope,
+# are few: they are worked out exactly.
+_SLOPES = 6  # numerics: shapes worked out exactly at most
 _LENGTH, _EARLY = 600, 400  # numerics: samples of a stretch, and before it
 _FEW, _SHORT = 4, 300  # numerics: gaps whose arrays cost hardly more than a call; samples then
-# of the gap, by which two stretches may differ; [s] in which a speed counts as a way
-_SEAM, _TICK = 1e-12, 1e-3  # numerics: see above
+# Two stretches may differ by this share of the gap; a speed counts as a way in this time [s].
+_SEAM, _TICK = 1e-12, 1e-3  # numerics: rounding; [s]
 
 
 @dataclass(frozen=True)
 class Backlash(Effect):
-    """With x = q_link - q, the link's angle against the motor's.
+    """Torque passes only where |x| > gap/2, with x = q_link - q, the link against the motor.
 
-    Torque passes only where |x| > gap/2.
+        (D - J_m) ẍ = -(τ_j - J_m q̈_j) - c ẋ - flank,    flank = k (|x| - gap/2) sign x + d ẋ
 
-        (D - J_m) ẍ = -(τ_j - J_m q̈_j) - c ẋ - flank,    flank = k (|x| - gap/2) sign x + d ẋ,
-        never pulling
-
-    Torque, friction and encoder sit on the motor's side. x follows from the measured motion and the
-    rigid torque, and with it τ = τ_rigid(q + x) - τ_rigid(q), J_m ẍ less on its own row. Where the
-    gap is crossed in no time, x = -gap/2 sign(τ_j). The flank is 80 Hz stiff and critically damped:
-    what rings on a stiffer one depends on the tooth and not on the gap.
+    The flank never pulls. Torque, friction and encoder sit on the motor's side. x follows from the
+    measured motion and the rigid torque, and with it τ = τ_rigid(q + x) - τ_rigid(q), J_m ẍ less on
+    its own row. Where the gap is crossed in no time, x = -gap/2 sign(τ_j). The flank is 80 Hz stiff
+    and critically damped: what rings on a stiffer one depends on the tooth and not on the gap.
     """
 
     gap: float = 1e-3  # [rad]
@@ -104,9 +100,9 @@ class Backlash(Effect):
 
     def _torque(self, motion: Motion, x: Array, ahead: Callable[[Array, Array, Array],
                                                                 Array]) -> Array:
-        """Column of a link that is x (samples,) ahead of its motor.
+        """Return the column of a link that is x (samples,) ahead of its motor.
 
-        Where the rigid arm needs as much more torque.
+        It is the torque that the rigid arm then needs besides.
         """
         rate = rate_of(x, motion.t)
         second = rate_of(rate, motion.t)
@@ -173,10 +169,8 @@ class Gaps:
 def followed(t: Array, mass: Array, force: Array, gaps: Gaps) -> Array:
     """x (gaps, samples) [rad] of the link against its motor.
 
-    T (samples,), mass [kg m^2] and force [N m] (gaps, samples), or (1, samples) where they are
-    those of all gaps.
-
-    Over a sample, trapezoids; flank and film implicit.
+    Of t (samples,), mass [kg m^2] and force [N m] (gaps, samples), or (1, samples) where they are
+    those of all gaps. Over a sample, trapezoids; flank and film implicit.
     """
     length = _SHORT if len(gaps.half) <= _FEW else _LENGTH
     samples, count = len(t), max(1, -(-(len(t) - 1) // length))
@@ -217,7 +211,7 @@ def _start(force: Array, gaps: Gaps) -> Array:
 def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, Array, Array]:
     """x (steps + 1, gaps, stretches), v (gaps, stretches) at the end, and where a stretch begins.
 
-    H (steps, stretches), m and f (steps, gaps, stretches), or one for all gaps.
+    Of h (steps, stretches), m and f (steps, gaps, stretches), or one for all gaps.
     """
     k, d, half = gaps.stiffness[:, None], gaps.damping[:, None], gaps.half[:, None]
     h = h[:, None]

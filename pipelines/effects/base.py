@@ -3,10 +3,10 @@
 An effect is written by giving its words, its parameters and `columns`; the rest has a default.
 
     Coulomb friction     columns = tanh(w v) on its own row; nothing else
-    Cogging              columns = sin kq, cos kq; `shapes` runs over k; `values` gives amplitude,
-    phase A clipped drive      columns to screen with; `apply` = clip(predict(motion, arm)) An
-    encoder fault     columns to screen with; `apply` = predict(corrected motion, arm) Tilted
-    gravity       columns to screen with; `apply` = predict(motion, arm.with_body(tilted body, p))
+    Cogging              columns = sin kq, cos kq; `shapes` runs over k; `values`: amplitude, phase
+    A clipped drive      columns to screen with; `apply` = clip(predict(motion, arm))
+    An encoder fault     columns to screen with; `apply` = predict(corrected motion, arm)
+    Tilted gravity       columns to screen with; `apply` = predict(motion, arm.with_body(tilted, p))
 
 An object is the effect in one place and one shape: `joint` and the *non-linear* parameters (speeds,
 orders, delays) are its fields. The *linear* parameters, its amplitudes, are not: a fit solves for
@@ -65,8 +65,7 @@ __all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Hooks", "Ow
            "adds", "everywhere", "friction_at", "joints_of", "predicted", "waves"]
 
 E = TypeVar("E", bound="Effect")
-# numerics: of the range in which it was seen: beyond it is not known
-_BEYOND = 0.1  # numerics: see above
+_BEYOND = 0.1  # numerics: share of the range in which it was seen; farther out it is not known
 
 
 class WordsOfCause:
@@ -117,13 +116,13 @@ class Effect(ABC):
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         """Return the torque per unit of each amplitude, to first order.
 
-        (samples, joints, amplitudes).
+        The array is (samples, joints, amplitudes).
         """
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Return the effect in every shape worth trying on this motion.
 
-        On the grids of its parameters.
+        The shapes are all combinations of the grids of its parameters.
         """
         places = {q.name: q.grid or q.among(self.joint, arm.n_joints) for q in self.parameters}
         grids = {name: values for name, values in places.items() if values is not None}
@@ -138,7 +137,7 @@ class Effect(ABC):
     def nuisance(self, arm: ArmModel) -> Array | None:
         """Return directions (base parameters, k) in which it moves them beyond its columns.
 
-        Unknown how far.
+        How far it moves them along these is unknown.
         """
         return None
 
@@ -233,7 +232,7 @@ class Effect(ABC):
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """Return its torque (samples,) [N m] on its own joint against speed alone.
 
-        At rest otherwise.
+        The other joints are at rest.
         """
         still = np.zeros((len(dq), arm.n_joints))
         motion = Motion(np.zeros(len(dq)), still, self.on_own_row(arm, dq)[..., 0], still)
@@ -268,7 +267,7 @@ class Effect(ABC):
     def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
         """Return slopes of its torque on its own joint by the logarithm of each non-linear number.
 
-        (samples, numbers) [N m].
+        They are (samples, numbers) [N m].
         """
         return None
 
@@ -282,14 +281,14 @@ class Effect(ABC):
     def own_load(self, values: Values) -> OwnLoad | None:
         """Return the load of `simulate` as a function of angle and speed of its own joint.
 
-        Where it follows from these alone.
+        None where it does not follow from these alone.
         """
         return None
 
     def own_memory(self, values: Values) -> OwnMemory | None:
         """Return the load of `simulate` where it has one state.
 
-        Whose rate follows from it and the speed of its own joint.
+        The rate of that state follows from it and the speed of its own joint; else None.
         """
         return None
 

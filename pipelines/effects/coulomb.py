@@ -25,7 +25,7 @@ __all__ = ["Coulomb"]
 class Coulomb(FrictionLaw):
     """τ = Fc ((2 - r) tanh(x) + (r - 1) x/√(1 + x²)), x = w v.
 
-    From r = 2 on Fc ((3 - r) x/√(1 + x²) + (r - 2) (2/π) arctan x).
+    From r = 2 on it is Fc ((3 - r) x/√(1 + x²) + (r - 2) (2/π) arctan x).
 
     tanh(w v) stands for sign(v) in fits and in simulation alike. In a fit, a reconstructed speed
     passes zero a little early or late, and a jump there leaves spikes that look like presliding. In

@@ -29,10 +29,8 @@ __all__ = ["DriveLag"]
 class DriveLag(Effect):
     """T dτ/dt = u - τ, so that the log, which holds the command, shows u = τ + T dτ/dt.
 
-    Earlier than the arm feels it.
-
-    A filter that is computed once a sample h acts at once, half a sample earlier: τ_k = a τ_{k-1} +
-    (1 - a) u_k, a = exp(-h/T).
+    The log shows it earlier than the arm feels it. A filter that is computed once a sample h acts
+    at once, half a sample earlier: τ_k = a τ_{k-1} + (1 - a) u_k, a = exp(-h/T).
     """
 
     sample_time: float = 0.0  # h [s]; 0: not computed once a sample

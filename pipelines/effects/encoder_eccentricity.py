@@ -48,9 +48,9 @@ class EncoderEccentricity(Effect):
 
     def apply(self, motion: Motion, arm: ArmModel, values: Values,
               predict: Predict | None = None) -> Array:
-        """With e = A sin(q + φ), e' = A cos(q + φ).
+        """Return the torque of the corrected motion.
 
-        Q̇ = q̇_m/(1 + e'),  q̈ = (q̈_m + e q̇²)/(1 + e').
+            q̇ = q̇_m/(1 + e'),  q̈ = (q̈_m + e q̇²)/(1 + e'),  e = A sin(q + φ), e' = A cos(q + φ)
         """
         true = self._corrected(motion, values) if values["amplitude"] else motion
         return predict(true, arm) if predict is not None else arm.torque(true)

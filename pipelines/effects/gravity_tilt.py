@@ -28,10 +28,9 @@ _UPRIGHT = 1e-6  # numerics: sine of the angle between gravity and the first axi
 class GravityTilt(Effect):
     """g = |g| (cos θ down + sin θ (cos δ e_x + sin δ e_y)).
 
-    E_x and e_y the base axes across nominal gravity.
-
-    A joint 1 that stands upright then feels the weight of what it carries. Where its centre of mass
-    lies no level arm tells: two more amplitudes, S sin q1 + C cos q1 on joint 1.
+    With e_x and e_y the base axes across nominal gravity. A joint 1 that stands upright then feels
+    the weight of what it carries. Where its centre of mass lies no level arm tells: two more
+    amplitudes, S sin q1 + C cos q1 on joint 1.
     """
 
     name = "gravity_tilt"

@@ -37,12 +37,14 @@ __all__ = ["JointElasticity"]
 class JointElasticity(Effect):
     """k x + d ẋ + τ_link(q + x) = 0, x = q_link - q.
 
-    Torque, friction and encoder sit on the motor's side.
+    Torque, friction and encoder sit on the motor's side. τ_link is the rigid torque of the joint
+    without its motor, τ_j - J_m q̈_j. To first order
 
-    τ_link is the rigid torque of the joint without its motor, τ_j - J_m q̈_j. To first order, x =
-    -(τ_j - J_m q̈_j)/k: τ = 1/k (P_j(-τ_j) + J_m P_j(q̈_j) - J_m ẍ k) with P_j of the rigid arm,
-    for friction does not feel the link. Exactly: x is solved from sample to sample. `frequency` =
-    √(k/J)/2π, the motor locked, J the link's inertia averaged over the motion.
+        x = -(τ_j - J_m q̈_j)/k,    τ = 1/k (P_j(-τ_j) + J_m P_j(q̈_j) - J_m ẍ k)
+
+    with P_j of the rigid arm, for friction does not feel the link. Exactly: x is solved from sample
+    to sample. The frequency is √(k/J)/2π, the motor locked, J the link's inertia averaged over the
+    motion.
     """
 
     damping: float = 0.0  # d [N m s/rad]

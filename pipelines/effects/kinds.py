@@ -18,11 +18,11 @@ from pipelines.effects.base import ArmModel, Effect, SpeedCurve
 __all__ = ["Event", "FrictionLaw", "plainer", "sign_curve"]
 
 # x/√(1 + x²) and (2/π) arctan x as sigmoids, within 0.0012 of them at every x: sharpnesses, as
-# parts of w, and heights.
-_TANH = ((1.0, 1.0),)  # numerics: see above
-_ROOT = ((1.307, 0.608), (0.563, 0.344), (0.1505, 0.048))  # numerics: see above
-_ARCTAN = ((1.1537, 0.3622), (0.4719, 0.4021), (0.1463, 0.1731), (0.0335, 0.052),  # numerics: see
-           (0.004, 0.0106))
+# parts of w, and heights. tanh is a sigmoid itself.
+_TANH = ((1.0, 1.0),)  # numerics: exact
+_ROOT = ((1.307, 0.608), (0.563, 0.344), (0.1505, 0.048))  # numerics: within 0.0012
+_ARCTAN = (  # numerics: within 0.0012
+    (1.1537, 0.3622), (0.4719, 0.4021), (0.1463, 0.1731), (0.0335, 0.052), (0.004, 0.0106))
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Event(Effect):
     def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
         """Return windows that may explain `residual` (samples, joints) [N m].
 
-        At most a few tens.
+        They are a few tens at most.
         """
 
     @abstractmethod

@@ -43,7 +43,7 @@ class LinkLength(Effect):
     def nuisance(self, arm: ArmModel) -> Array:
         """Masses beyond the link turn on a longer lever.
 
-        And how heavy each is base parameters do not say.
+        How heavy each of them is base parameters do not say.
         """
         return masses_beyond(arm.body, int(self.link))
 

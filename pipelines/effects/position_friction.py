@@ -101,9 +101,9 @@ class PositionFriction(Effect):
         return tuple(name for name in super().free if not (self.whole and name == "order"))
 
     def forms(self) -> tuple[Self, ...]:
-        """With more harmonics than half waves were travelled, as held-out motion bears them out.
+        """Return it with more harmonics than half waves were travelled, and behind a gear.
 
-        Behind a gear.
+        Held-out motion decides how many harmonics it has.
         """
         full = replace(self, harmonics=self.most)
         finer = tuple(

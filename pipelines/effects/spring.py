@@ -15,8 +15,8 @@ from pipelines.effects.base import ArmModel, Effect, OwnLoad, Parameters, Quanti
 
 __all__ = ["Spring"]
 
-# of the law that is tried first; of another, for what hardens or gives way far out
-_DEGREE, _MORE = 5, 7  # numerics: see above
+# The first is tried first; the other is for what hardens or gives way far out.
+_DEGREE, _MORE = 5, 7  # numerics: degrees of the polynomial
 _FAR = 1e3  # numerics: [rad] where nobody says how far it was seen
 # of x, x², …
 _TERMS = ("stiffness", "curvature", "hardening", "fourth", "fifth", "sixth", "seventh")
@@ -81,7 +81,7 @@ class Spring(Effect):
                       seen_from=float(q.min()), seen_to=float(q.max()))
 
     def forms(self) -> tuple[Self, ...]:
-        """Of fewer terms where these are enough.
+        """Return laws of fewer terms, where these are enough.
 
         Beside gravity many powers of an angle are no powers of their own.
         """
@@ -132,7 +132,7 @@ def _about(polynomial: Sequence[float], point: float) -> list[float]:
 def _zero(polynomial: Sequence[float]) -> float:
     """Return the zero nearest to that of the linear part.
 
-    The point nearest to zero where there is none.
+    Where there is none, the point nearest to zero.
     """
     linear = -polynomial[0] / polynomial[1] if polynomial[1] else 0.0
     if not any(polynomial[2:]):

@@ -36,12 +36,11 @@ __all__ = [
 
 Values = Mapping[str, float]
 
-# Of torques, forces and inertias: more than any machine has. How much of them a cause makes no
-# table says before the logs do, for
-# the slide of a gantry rubs with more newtons than a small arm's motor can give.
-LARGE = 1e5  # numerics: see above
-# [s/rad] at which friction may change its sign
-SHARPNESSES = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # numerics: see above
+# How much torque, force or inertia a cause makes no table says before the logs do, for the slide of
+# a gantry rubs with more newtons than a small arm's motor can give.
+LARGE = 1e5  # numerics: more than any machine has, of torques, forces and inertias
+# How sharply friction may change its sign, over which a search goes.
+SHARPNESSES = (10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # numerics: [s/rad], a grid
 _MANY = 256  # numerics: samples
 
 
@@ -73,7 +72,7 @@ class ArmModel(Protocol):
     def friction_curves(self, joint: int) -> tuple[SpeedCurve, ...] | None:
         """Return the friction laws at a joint (1-based) as curves of its speed.
 
-        None where one of them is more than that.
+        Returns None where one of them is more than that.
         """
         ...
 
@@ -114,7 +113,7 @@ def waves(order: float,
 class OwnMemory:
     """A load of one joint that remembers one number.
 
-    Where an `OwnLoad` knows angle and speed alone.
+    An `OwnLoad` knows angle and speed alone.
     """
 
     rate: Callable[[Any, Any, Functions], Any]  # memory, speed [rad/s] -> d(memory)/dt
@@ -167,7 +166,7 @@ class Quantity:
     def among(self, own: int | None, n_joints: int) -> tuple[int, ...] | None:
         """Return the joints or links of an arm of `n_joints` joints that it may be.
 
-        Of an effect at joint `own`; None: it is neither.
+        The effect is at joint `own`. None: it is neither a joint nor a link.
         """
         if self.joint:
             return tuple(k for k in range(1, n_joints + 1) if k != own)
@@ -176,7 +175,7 @@ class Quantity:
     def found_at(self, own: int | None, n_joints: int) -> bool:
         """Return whether an effect at joint `own` of `n_joints` has a joint or link for it.
 
-        If it is one.
+        True where the parameter is neither a joint nor a link.
         """
         among = self.among(own, n_joints)
         return among is None or any(not self.earlier or own is None or k < own for k in among)
@@ -184,7 +183,7 @@ class Quantity:
     def unfit(self, value: float, own: int | None, n_joints: int) -> str:
         """Why no arm of `n_joints` joints can have this value of an effect at joint `own`.
 
-        Empty where it can.
+        The text is empty where it can.
         """
         among = self.among(own, n_joints)
         if among is None or value in among:
@@ -234,7 +233,7 @@ class Parameters(tuple[Quantity, ...]):
     def slight(self, sample_time: float = 0.0) -> float:
         """Size of an amplitude that surely is no cause.
 
-        Of a time it is at least a tenth of a sample [s].
+        That of a time is at least a tenth of a sample [s].
         """
         known, first = self.healthy, next((q.unit for q in self if not q.shape and not q.derived),
                                           "")
@@ -265,7 +264,7 @@ class Words:
 class SpeedCurve:
     """A torque that depends on the speed of its own joint alone.
 
-    Τ = constant + viscous v + Σ height tanh(sharpness v).
+    τ = constant + viscous v + Σ height tanh(sharpness v).
 
     What has this form the simulation computes for all joints at once, and for one robot without any
     array.
@@ -329,9 +328,8 @@ class Hooks:
 def friction_at(arm: ArmModel, joint: int) -> Callable[[Motion, Array], Array]:
     """Friction [N m] (samples,) of a joint (1-based) whose drive turns at a speed of its own.
 
-    Friction(motion, speed).
-
-    Made once for a simulation, which asks it at every step.
+    It is called as friction(motion, speed), and made once for a simulation, which asks it at every
+    step.
     """
     curves = arm.friction_curves(joint)
 

@@ -15,10 +15,10 @@ __all__ = ["TimeDelay"]
 
 Indices = npt.NDArray[np.intp]
 
-# kept positions; they lie at least a 32nd of the delay apart, so that they reach back far enough at
-# any rate
-_ROWS = 36  # numerics: see above
-_CLOSEST = 1.0 / 32.0  # numerics: see above
+# Kept positions lie at least a 32nd of the delay apart, so that they reach back far enough at any
+# rate.
+_ROWS = 36  # numerics: positions kept, a few more than 32
+_CLOSEST = 1.0 / 32.0  # numerics: of the delay
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ class TimeDelay(Effect):
 def _cubic(t: Array, x: Array, slope: Array, k: Indices, at: Array) -> Array:
     """x at the times `at`, in the intervals k.
 
-    By the cubic through values and slopes at both ends.
+    The cubic goes through values and slopes at both ends.
     """
     if len(t) < 2:  # noqa: PLR2004
         return x

@@ -23,7 +23,7 @@ __all__ = ["TorqueCrosstalk"]
 class TorqueCrosstalk(Effect):
     """Applied torque of joint j = u_j - c u_i, so that the log shows u_j = τ_j + c τ_i.
 
-    From the joint before, if none is given.
+    Joint i is the joint before, if none is given.
     """
 
     from_joint: float = 0.0  # i, 1-based

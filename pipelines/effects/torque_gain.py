@@ -28,9 +28,7 @@ _LEAST = 1e-6  # numerics: of the torque that arrives
 class TorqueGain(Effect):
     """Applied torque = (1 + ε) logged torque, so that the log shows τ/(1 + ε).
 
-    Τ the model's torque.
-
-    The column is τ, its amplitude c = 1/(1 + ε) - 1.
+    The column is τ, the model's torque, its amplitude c = 1/(1 + ε) - 1.
     """
 
     name = "torque_gain"

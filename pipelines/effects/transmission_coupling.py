@@ -18,10 +18,9 @@ __all__ = ["TransmissionCoupling"]
 class TransmissionCoupling(Effect):
     """τ_s = J ds/dt + B s + C tanh(w s), s = v_j + ρ v_i.
 
-    A load of τ_s on joint j and of ρ τ_s on joint i.
-
-    ρ is what the robot's transmission matrix N says of the motor that both share: N_ki/N_kj, k one
-    of the two; 1 without one. Of the two joints j is the later, for s does not tell them apart.
+    It is a load of τ_s on joint j and of ρ τ_s on joint i. ρ is what the robot's transmission
+    matrix N says of the motor that both share: N_ki/N_kj, k one of the two; 1 without one. Of the
+    two joints j is the later, for s does not tell them apart.
     """
 
     with_joint: float = 0.0  # i, 1-based; the joint before, if none is given
@@ -48,7 +47,7 @@ class TransmissionCoupling(Effect):
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Return the joints that share a motor by the transmission matrix.
 
-        The one before, where there is none.
+        Where there is none, it is the joint before.
         """
         matrix = arm.robot.drive.transmission if arm.robot.drive is not None else None
         own, earlier = self._index, range(self._index)

@@ -163,7 +163,7 @@ class DesignProblem:
     def sized(self, x: Array, reach: float, largest: float) -> Array:
         """Return x up to `largest` times as large, with its limits approached to below `reach`.
 
-        Where not even a standstill keeps them, the standstill.
+        Where not even a standstill keeps them, it is the standstill.
         """
         good, bad, factor = 0.0, largest, 1.0
         for _ in range(BISECTIONS):

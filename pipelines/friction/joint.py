@@ -205,7 +205,7 @@ def _refined(stretches: Stretches, fitted: int, arm: OneJoint,
 def _followed(stretches: Stretches, fit: LawFit, slides: Mask) -> bool:
     """Return whether one curve fits the other rows as well as those that slide.
 
-    Or these make most of its residual.
+    True also where those that slide make most of its residual.
     """
     square = np.square(LawEquations.of(stretches, fit.joint).residual(fit))
     doubt, sure = square[~slides], square[slides]

@@ -121,7 +121,7 @@ def _follows(columns: Array, rigid: int, y: Array, more: Mask, noise: float) -> 
 def _late_friction(columns: Array, y: Array, speed: Array, rows: Mask) -> Array:
     """Return Coulomb and viscous friction after the step that explains most of `rows`.
 
-    Zero before it (all rows, 2).
+    The columns (all rows, 2) are zero before it.
     """
     row = _step_row(np.sign(speed[rows]), _Fit(columns[rows], y[rows]))
     first = np.flatnonzero(rows)[row]

@@ -45,7 +45,7 @@ class Likeness:
 def commanded(log: ExperimentLog) -> Array | None:
     """Return the command (samples, joints) [N m] from the first sample on.
 
-    None where the log does not say how it was controlled, or has gaps.
+    Returns None where the log does not say how it was controlled, or has gaps.
     """
     if log.controller is None or log.controller.law == "open-loop" or "tau" not in log:
         return None

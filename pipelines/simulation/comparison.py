@@ -78,9 +78,10 @@ def nearer(before: Simulation, after: Simulation) -> bool:
 def simulation_errors(arms: Sequence[Arm], motions: Motions) -> list[Simulation]:
     """Return the position error of each arm over the same stretches of logs.
 
-    In closed loop where the first arm allows it, over short windows else; nothing without logs. In
-    a loop the stretches are short, and longer ones where they leave it open whether the last arm
-    comes nearer than the first: what the amplifiers' noise moves, no simulated arm follows.
+    The arms run in closed loop where the first allows it, over short windows else; nothing without
+    logs. In a loop the stretches are short, and longer ones where they leave it open whether the
+    last arm comes nearer than the first: what the amplifiers' noise moves, no simulated arm
+    follows.
     """
     none = [Simulation.none(arm.n_joints) for arm in arms]
     if not motions:

@@ -132,7 +132,7 @@ def _driven(log: ExperimentLog,
             controller: Controller) -> tuple[npt.NDArray[np.bool_] | None, Array | None]:
     """Return which joints the logged torque drives, and that torque.
 
-    Of an open-loop log its moving joint, or all where no joint is named.
+    In an open-loop log that is its moving joint, or all where no joint is named.
     """
     if controller.law != "open-loop":
         return None, None

@@ -91,8 +91,8 @@ def choose_step(plant: Plant, experiment: Experiment, noise: Noise | None = None
 def _stretches(experiment: Experiment) -> list[Experiment]:
     """Return parts of it that are the hardest to follow.
 
-    Where the arm starts, where joints reverse most often and friction turns over, and where they
-    are fastest, accelerate hardest, or are driven hardest.
+    They lie where the arm starts, where joints reverse most often and friction turns over, and
+    where they are fastest, accelerate hardest, or are driven hardest.
     """
     length = max(2, round(SIMULATION.stretch / experiment.sample_time))
     length = min(experiment.n_samples, length)
