@@ -57,7 +57,7 @@ def digest_of_json(value: Any) -> str:
 
 
 def read_sources() -> Sources:
-    """Return every module of this package, by its name."""
+    """Return every module of this package, by its name; tables are part of their package."""
     root, found = Path(pipelines.__file__).parent, {}
     for path in root.rglob("*.py"):
         text = path.read_text(encoding="utf-8")
@@ -66,8 +66,11 @@ def read_sources() -> Sources:
         imports = {name.rpartition(".")[0]}
         for package, words, whole in _IMPORT.findall(text):
             imports |= {package, whole, *(f"{package}.{w}" for w in re.findall(r"\w+", words))}
-        if path.name == "__init__.py" and "import_module(" in text:  # it finds its members by name
-            imports |= {f"{name}.{other.stem}" for other in path.parent.glob("*.py")}
+        if path.name == "__init__.py":
+            if "import_module(" in text:  # it finds its members by name
+                imports |= {f"{name}.{other.stem}" for other in path.parent.glob("*.py")}
+            data = (other.read_text(encoding="utf-8") for other in path.parent.glob("*.toml"))
+            text = "".join((text, *sorted(data)))  # what its members read
         found[name] = hashlib.sha256(text.encode()).hexdigest()[:12], imports
     return found
 

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import numpy.typing as npt
 
 from pipelines.diagnosis.candidates import Dictionary, Group
 from pipelines.diagnosis.config import DiagnosisConfig
@@ -87,7 +86,7 @@ def _unlike(
         np.sum(parts.prior.grams, axis=0)[:n, :n] + _RIDGE * np.eye(n),
         Structure.all_shared(n, len(parts.prior.structure.own)),
     )
-    half = nominal.half(parts.cross[:, :n, columns].sum(axis=0, dtype=np.float64))
+    half = nominal.half(parts.cross[:, :n, columns].sum(axis=0))
     gram = table.gram(table) - half.T @ half
     ends = np.cumsum([one.group.width for one in best.values()])
     place = {f: slice(e - o.group.width, e) for (f, o), e in zip(best.items(), ends, strict=True)}
@@ -114,7 +113,7 @@ class Parts:
 
     prior: Prior
     groups: tuple[Group, ...]
-    cross: npt.NDArray[np.float32]  # (parts, k, columns) B Cᵀ: most of the memory
+    cross: Array  # (parts, k, columns) B Cᵀ
     moments: Array  # (parts, columns) C y
     squares: list[tuple[Array, ...]]  # of each part, C Cᵀ of each group
     powers: Array  # (parts,) yᵀy
@@ -128,7 +127,7 @@ class Parts:
         return cls(
             prior,
             dictionary.groups,
-            np.array([base.gram(candidates, part).astype(np.float32) for part in parts]),
+            np.array([base.gram(candidates, part) for part in parts]),
             np.array([candidates.moments(y, part) for part in parts]),
             [candidates.squares(spans, part) for part in parts],
             np.array(
@@ -140,8 +139,7 @@ class Parts:
     def sums(self, parts: Sequence[int]) -> Sums:
         """Return B Cᵀ (k, columns), and C Cᵀ of each group, over some parts together."""
         each = zip(*(self.squares[k] for k in parts), strict=True)
-        cross = np.asarray(self.cross[list(parts)].sum(axis=0, dtype=np.float64))
-        return cross, tuple(np.sum(own, axis=0) for own in each)
+        return self.cross[list(parts)].sum(axis=0), tuple(np.sum(own, axis=0) for own in each)
 
     def compared(
         self, before: tuple[int, ...], after: list[int]

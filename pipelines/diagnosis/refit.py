@@ -120,6 +120,7 @@ class Later:
         here, known, damping = self._at(model, theta, belief), belief, _DAMPING[0]
         rows = self.rows.coarse
         for k in range(1 + steps):
+            rows = rows if k <= steps // 2 else self.rows
             known = self._exact(belief, here.model) if k < _FRESH else known
             there, damping = self._better(here, known, damping, rows, linear=not k)
             gained, here = here.cost - there.cost, there

@@ -71,8 +71,10 @@ def plan_harmonics(frequency: Sequence[float], count: Sequence[int],
     for low, high in stop_band:
         used[:, (hertz >= low) & (hertz <= high)] = False
     if not (used.sum(axis=1) >= CONFIG.fewest_harmonics).all():
-        raise UsageError("C02", "the bands to stay out of leave a joint fewer than two harmonics",
-                         where="--stop-band", remedy="narrow the bands, or give more harmonics")
+        what, where = ("the bands to stay out of leave", "--stop-band") if stop_band else (
+            "the number of harmonics leaves", "--harmonics")
+        raise UsageError("C02", f"{what} a joint fewer than two harmonics", where=where,
+                         remedy="give more harmonics, and narrow bands to stay out of")
     return Harmonics(1.0 / float(base), used)
 
 

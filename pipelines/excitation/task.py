@@ -154,6 +154,9 @@ def _box(numbers: tuple[float, ...]) -> Array:
 
 def _harmonics(wishes: Wishes, joints: int, direct: bool) -> Harmonics:
     frequency = _each(wishes.frequency, joints, "--frequency")
+    if not all(np.isfinite(f) and f > 0.0 for f in frequency):
+        raise UsageError("C02", "a fundamental is not a positive number", where="--frequency",
+                         remedy="give for example --frequency 0.1 [Hz]")
     top, fewest = CONFIG.top_hz if direct else CONFIG.geared_top_hz, CONFIG.fewest_harmonics
     most = [int(min(top, wishes.top_hz or top) / f + 1e-9) for f in frequency]
     if wishes.harmonics is not None:

@@ -67,3 +67,18 @@ def test_no_import_is_overlooked() -> None:
     repo = Path(__file__).resolve().parents[2]
     done = subprocess.run([sys.executable, "-c", program], cwd=repo, capture_output=True, text=True, check=True)
     assert set(json.loads(done.stdout)) <= set(code_of("pipelines.diagnose", read_sources()))
+
+
+def test_a_table_is_part_of_its_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The words of causes stand in a table: with other words a stored diagnosis is another."""
+    package = tmp_path / "pipelines" / "effects"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / "cogging.py").write_text("")
+    monkeypatch.setattr("pipelines.__file__", str(package.parent / "__init__.py"))
+    codes = []
+    for words in ("title = 'Cogging'", "title = 'Ripple'"):
+        (package / "causes.toml").write_text(words)
+        codes.append(code_of("pipelines.effects.cogging", read_sources()))
+    assert codes[0].keys() == codes[1].keys() == {"pipelines.effects", "pipelines.effects.cogging"}
+    assert codes[0] != codes[1]

@@ -137,6 +137,9 @@ def test_an_interruption_keeps_the_best() -> None:
     ({}, {"cond_max": 1.2}, "below 1.22474"),
     ({}, {"stop_band": ((0.0, 99.0),)}, "fewer than two harmonics"),
     ({}, {"criterion": "best"}, "no criterion"),
+    ({}, {"frequency": (0.0,), "harmonics": (5,)}, "fundamental is not a positive number"),
+    ({}, {"frequency": (np.nan,)}, "fundamental is not a positive number"),
+    ({}, {"harmonics": (1,)}, "number of harmonics leaves a joint fewer than two"),
 ])
 def test_what_is_impossible_is_named(changes: dict[str, float], wishes: dict[str, object], named: str) -> None:
     """Limits that no motion keeps end in an error that says which one it is."""
