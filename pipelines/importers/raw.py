@@ -302,10 +302,10 @@ def unstacked(table: RawTable) -> RawTable:
         # but their clock starts from zero or goes on.
         falls = np.flatnonzero(np.diff(stamps) < 0) + 1
         if (
-            read_name(name).quantity == "time"
-            and falls.size
+            falls.size
             and (stamps[falls] == stamps[0]).all()
             and stamps[0] > np.ptp(stamps)
+            and read_name(name).quantity == "time"
         ):
             message = f"the same times come {falls.size + 1} times: series below each other"
             where = f"{table.source}, column '{name}', {table.place(int(falls[0]))}"
