@@ -24,10 +24,10 @@ import numpy as np
 
 from benchmarks.frf_plants import KINDS, PLANTS, Session, recorded
 from benchmarks.hidden_effects.table import wilson
+from pipelines.frequency.findings import Findings, frf_findings, grouped
+from pipelines.frequency.grouping import GroupingConfig
 from pipelines.io.files import open_log, write_log
 from pipelines.io.log import ExperimentLog
-from pipelines.model.frf.findings import Findings, frf_findings, grouped
-from pipelines.model.frf.grouping import GroupingConfig
 
 RATES = (100, 250, 500, 1000, 2000, 5000)  # [Hz]
 _RUNAWAY = 1.0  # [rad] from the reference: a controller too fast for its rate and a light motor

@@ -27,13 +27,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy import signal
 
-from pipelines.fit.rational import Mode
-from pipelines.fit.rational_search import fit_rational
-from pipelines.signal.cross_spectra import cross_spectra, welch_responses
-from pipelines.signal.frequency_response import closed_loop
-from pipelines.signal.local_polynomial import local_polynomial
-from pipelines.signal.multisine_response import multisine_responses
-from tests.signal.loops import Plant, T, closed_loop_record
+from pipelines.frequency.frequency_response import closed_loop
+from pipelines.frequency.local_polynomial import local_polynomial
+from pipelines.frequency.multisine import multisine_responses
+from pipelines.frequency.rational import Mode
+from pipelines.frequency.rational_search import fit_rational
+from pipelines.frequency.spectra import cross_spectra, welch_responses
+from tests.frequency.loops import Plant, T, closed_loop_record
 
 RATE, SEGMENT = 1000, 4000
 

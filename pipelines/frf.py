@@ -19,14 +19,11 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import Check, NothingMatched, UsageError
-from pipelines.io.log import ExperimentLog, recording
-from pipelines.io.model_file import read_model
-from pipelines.io.option import option
-from pipelines.model.frf.findings import Findings, frf_findings
-from pipelines.model.frf.grouping import GroupingConfig, advance
-from pipelines.model.frf.modes import BAND
-from pipelines.model.frf.responses import How, Measured
-from pipelines.model.frf.result import (
+from pipelines.frequency.findings import Findings, frf_findings
+from pipelines.frequency.grouping import GroupingConfig, advance
+from pipelines.frequency.modes import BAND
+from pipelines.frequency.responses import How, Measured
+from pipelines.frequency.result import (
     COHERENCE,
     Classified,
     Method,
@@ -37,6 +34,9 @@ from pipelines.model.frf.result import (
     posture_of,
     undecided,
 )
+from pipelines.io.log import ExperimentLog, recording
+from pipelines.io.model_file import read_model
+from pipelines.io.option import option
 from pipelines.quality.checks import Subject, accepted
 from pipelines.report.frf_report import frf_report
 from pipelines.report.report import Report

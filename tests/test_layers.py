@@ -25,7 +25,7 @@ LAYERS = {
     "pipelines.simulation": 6.8, "pipelines.simulation.comparison": 7.5,
     "pipelines.model": 7,
     "pipelines.model.rows": 8,
-    "pipelines.friction": 8.5, "pipelines.writing": 9, "pipelines.excitation": 10,
+    "pipelines.friction": 8.5, "pipelines.frequency": 8.5, "pipelines.writing": 9, "pipelines.excitation": 10,
     "pipelines.estimation": 9,  # what is checked before any model is fitted
     "pipelines.model.estimation.result": 10, "pipelines.diagnosis": 11,
     "pipelines.report": 12,

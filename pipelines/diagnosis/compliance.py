@@ -16,9 +16,9 @@ from pipelines.diagnosis.result import Answer, NotIdentifiable
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.effects import all_effects, find_effect
 from pipelines.errors import InputRejected
+from pipelines.frequency import findings as frf
+from pipelines.frequency.modes import relative_acceleration
 from pipelines.io.log import ExperimentLog
-from pipelines.model.frf import findings as frf
-from pipelines.model.frf.modes import relative_acceleration
 
 __all__ = ["Compliance", "compliance", "new_causes", "untold"]
 

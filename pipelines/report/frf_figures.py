@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pipelines.model.frf.controller import Complex
-from pipelines.model.frf.responses import double_integrator
-from pipelines.model.frf.result import (
+from pipelines.frequency.controller import Complex
+from pipelines.frequency.excited_band import ExcitedBand
+from pipelines.frequency.responses import double_integrator
+from pipelines.frequency.result import (
     COHERENCE,
     Band,
     Curve,
@@ -22,7 +23,6 @@ from pipelines.report import style
 from pipelines.report.figures import Array, Look, joint_colour, one_figure
 from pipelines.report.report import Figure
 from pipelines.report.sentences import sentence
-from pipelines.signal.excited_band import ExcitedBand
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

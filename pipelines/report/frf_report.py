@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 
 from pipelines.errors import Check
-from pipelines.fit.rational import Known
-from pipelines.model.frf.result import Classified, Method, Posture, Undecided
+from pipelines.frequency.rational import Known
+from pipelines.frequency.result import Classified, Method, Posture, Undecided
 from pipelines.report.frf_figures import (
     bode_figure,
     compliance_figure,

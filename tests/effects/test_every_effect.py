@@ -26,7 +26,7 @@ REPO = Path(__file__).resolve().parents[2]
 # Where names of effects stand all the same: the laws among which friction is fitted and their report, the nominal model, and what
 # a frequency response tells apart without any motion.
 MAY_NAME = ("pipelines/model/friction/", "pipelines/report/friction_report.py", "pipelines/model/estimation/nominal.py",
-            "pipelines/model/frf/")
+            "pipelines/frequency/")
 NOMINAL = {"coulomb", "viscous", "two_sigmoid", "three_sigmoid"}  # laws that a nominal model has
 FOLDER = REPO / "pipelines" / "effects"
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.model.frf.findings import frf_findings
-from pipelines.model.frf.modes import fitted_modes
-from pipelines.model.frf.responses import measured_responses
+from pipelines.frequency.findings import frf_findings
+from pipelines.frequency.modes import fitted_modes
+from pipelines.frequency.responses import measured_responses
 from tests.frf.cases import accuracy_case, recorded, sealed_case, truth_of
 
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipelines.frequency.findings import frf_findings
+from pipelines.frequency.frequency_response import FrequencyResponse
+from pipelines.frequency.modes import fitted_modes
+from pipelines.frequency.responses import How, Measured, measured_responses
 from pipelines.io.log import Array, Signal
-from pipelines.model.frf.findings import frf_findings
-from pipelines.model.frf.modes import fitted_modes
-from pipelines.model.frf.responses import How, Measured, measured_responses
-from pipelines.signal.frequency_response import FrequencyResponse
 from tests.frf.loops import Loop, T, elastic, rigid
 from tests.seeds import rarely
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pipelines.frequency.findings import Findings, frf_findings
+from pipelines.frequency.responses import measured_responses
+from pipelines.frequency.result import posture_of
 from pipelines.io.files import open_log
-from pipelines.model.frf.findings import Findings, frf_findings
-from pipelines.model.frf.responses import measured_responses
-from pipelines.model.frf.result import posture_of
 from tests.cli.commands import rrrid
 
 

@@ -16,10 +16,10 @@ from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.parameter import Parameter
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.errors import InputRejected, NothingMatched, UsageError
+from pipelines.frequency.result import Posture
 from pipelines.frf import Settings
 from pipelines.io.files import Opened, open_log, write_log
 from pipelines.io.log import ExperimentLog, Signal
-from pipelines.model.frf.result import Posture
 from pipelines.report.frf_figures import draw_bode
 from pipelines.stage import Inputs, Outcome, Request, run_stage
 from sample_logs.bench_session import controllers_model, machine

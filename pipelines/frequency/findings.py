@@ -20,12 +20,12 @@ import numpy as np
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import InputRejected
-from pipelines.fit.rational import Known
+from pipelines.frequency.grouping import Finding, GroupingConfig, Open, group_joint, seen_elsewhere
+from pipelines.frequency.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
+from pipelines.frequency.rational import Known
+from pipelines.frequency.responses import How, Measured, measured_responses
+from pipelines.frequency.rigid import Expected, expected_rigid
 from pipelines.io.log import ExperimentLog
-from pipelines.model.frf.grouping import Finding, GroupingConfig, Open, group_joint, seen_elsewhere
-from pipelines.model.frf.modes import BAND, Modes, fitted_modes, relative_acceleration, tells
-from pipelines.model.frf.responses import How, Measured, measured_responses
-from pipelines.model.frf.rigid import Expected, expected_rigid
 
 __all__ = ["Finding", "Findings", "Known", "Open", "Seen", "findings_of", "frf_findings", "grouped"]
 

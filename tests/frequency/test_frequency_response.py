@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipelines.signal.cross_spectra import welch_responses
-from pipelines.signal.frequency_response import (
+from pipelines.frequency.frequency_response import (
     FrequencyResponse,
     bands_below,
     closed_loop,
     indirect,
 )
-from tests.signal.loops import Plant, T, closed_loop_record, controller
+from pipelines.frequency.spectra import welch_responses
+from tests.frequency.loops import Plant, T, closed_loop_record, controller
 
 KP, KD = 400.0, 28.0
 PLANT = Plant(((28.0, 0.07, 0.15), (85.0, 0.05, 0.8)))

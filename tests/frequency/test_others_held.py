@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipelines.model.frf.others_held import others_held
-from pipelines.signal.frequency_response import Responses
+from pipelines.frequency.frequency_response import Responses
+from pipelines.frequency.others_held import others_held
 
 _J, _COUPLING = 2.0, 0.5  # [kg m^2]
 

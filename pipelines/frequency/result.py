@@ -8,11 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.fit.rational import Known, Mode
+from pipelines.frequency.findings import Findings, Seen
+from pipelines.frequency.frequency_response import FrequencyResponse, bands_below
+from pipelines.frequency.modes import relative_acceleration
+from pipelines.frequency.rational import Known, Mode
 from pipelines.io.log import Array
-from pipelines.model.frf.findings import Findings, Seen
-from pipelines.model.frf.modes import relative_acceleration
-from pipelines.signal.frequency_response import FrequencyResponse, bands_below
 
 __all__ = ["Band", "Classified", "Curve", "Method", "ModeFound", "Posture", "Undecided", "classified", "methods_of", "posture_of",
            "same_bins", "undecided"]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipelines.frequency.controller import Complex
+from pipelines.frequency.responses import Measured
+from pipelines.frequency.signals import INPUT, POSITION
 from pipelines.io.log import Array
-from pipelines.model.frf.controller import Complex
-from pipelines.model.frf.experiment import INPUT, POSITION
-from pipelines.model.frf.responses import Measured
 
 __all__ = ["AlongTurn", "along_turn"]
 

@@ -20,9 +20,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.fit.bounded import least_squares
-from pipelines.fit.rational import Known
+from pipelines.frequency.modes import Pair
+from pipelines.frequency.rational import Known
 from pipelines.io.log import Array
-from pipelines.model.frf.modes import Pair
 
 __all__ = ["Explained", "explain", "predicted"]
 

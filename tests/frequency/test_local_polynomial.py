@@ -7,10 +7,10 @@ import pytest
 from scipy import signal
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.cross_spectra import welch_responses
-from pipelines.signal.frequency_response import closed_loop
-from pipelines.signal.local_polynomial import local_polynomial
-from tests.signal.loops import Plant, T, closed_loop_record
+from pipelines.frequency.frequency_response import closed_loop
+from pipelines.frequency.local_polynomial import local_polynomial
+from pipelines.frequency.spectra import welch_responses
+from tests.frequency.loops import Plant, T, closed_loop_record
 
 RATE = 1.0 / T
 LIGHT = Plant(((28.0, 0.01, 0.3),))

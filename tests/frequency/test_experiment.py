@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from pipelines.errors import InputRejected
+from pipelines.frequency.responses import How, measured_responses
+from pipelines.frequency.signals import POSITION, excitation_period, turned_joint
 from pipelines.io.log import ExperimentLog, Signal
-from pipelines.model.frf.experiment import POSITION, excitation_period, turned_joint
-from pipelines.model.frf.responses import How, measured_responses
 from tests.frf.loops import Loop, rigid
 
 LOOP = Loop(rigid(1.0), seconds=20.0)

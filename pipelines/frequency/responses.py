@@ -21,19 +21,24 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.io.log import Array, ExperimentLog
-from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
-from pipelines.model.frf.experiment import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
-from pipelines.model.frf.others_held import Held, others_held
-from pipelines.signal.cross_spectra import cross_spectra
-from pipelines.signal.excited_band import ExcitedBand, excited_band, powered
-from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop, indirect
-from pipelines.signal.local_polynomial import local_polynomial
-from pipelines.signal.multisine_response import (
+from pipelines.frequency.controller import continuous_controller, loop_delay, sampled_controller
+from pipelines.frequency.excited_band import ExcitedBand, excited_band, powered
+from pipelines.frequency.frequency_response import (
+    FrequencyResponse,
+    Responses,
+    closed_loop,
+    indirect,
+)
+from pipelines.frequency.local_polynomial import local_polynomial
+from pipelines.frequency.multisine import (
     DetectionLines,
     MultisineResponses,
     multisine_responses,
 )
+from pipelines.frequency.others_held import Held, others_held
+from pipelines.frequency.signals import INPUT, POSITION, TORQUE, Stretch, Turned, V, turned_joint
+from pipelines.frequency.spectra import cross_spectra
+from pipelines.io.log import Array, ExperimentLog
 
 __all__ = ["ESTIMATORS", "How", "Measured", "double_integrator", "measured_responses"]
 

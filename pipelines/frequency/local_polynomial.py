@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.frequency_response import Array, Complex, Responses
+from pipelines.frequency.frequency_response import Array, Complex, Responses
 
 __all__ = ["local_polynomial"]
 

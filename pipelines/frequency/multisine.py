@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.frequency_response import Array, Complex, Responses
+from pipelines.frequency.frequency_response import Array, Complex, Responses
 
 __all__ = ["DetectionLines", "MultisineResponses", "multisine_responses"]
 

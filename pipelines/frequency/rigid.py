@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 from pipelines.dynamics.arm import Arm
 from pipelines.errors import RrridError
+from pipelines.frequency.responses import Measured
+from pipelines.frequency.signals import Turned
 from pipelines.io.model_file import parse_model
-from pipelines.model.frf.experiment import Turned
-from pipelines.model.frf.responses import Measured
 
 __all__ = ["Expected", "expected_rigid"]
 

@@ -7,12 +7,12 @@ import pytest
 from scipy import signal
 
 from pipelines.errors import InputRejected
-from pipelines.fit.rational import Rational
-from pipelines.fit.rational_search import fit_rational
-from pipelines.signal.frequency_response import closed_loop
-from pipelines.signal.local_polynomial import local_polynomial
-from pipelines.signal.multisine_response import multisine_responses
-from tests.signal.loops import Plant, T, closed_loop_record
+from pipelines.frequency.frequency_response import closed_loop
+from pipelines.frequency.local_polynomial import local_polynomial
+from pipelines.frequency.multisine import multisine_responses
+from pipelines.frequency.rational import Rational
+from pipelines.frequency.rational_search import fit_rational
+from tests.frequency.loops import Plant, T, closed_loop_record
 
 FREQUENCY = np.arange(3.0, 180.0, 0.5)
 DELAY = 2.1e-3

@@ -18,9 +18,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.fit.bounded import least_squares
+from pipelines.frequency.controller import Complex
+from pipelines.frequency.frequency_response import FrequencyResponse, Responses, closed_loop
 from pipelines.io.log import Array
-from pipelines.model.frf.controller import Complex
-from pipelines.signal.frequency_response import FrequencyResponse, Responses, closed_loop
 
 __all__ = ["Held", "HeldConfig", "others_held"]
 

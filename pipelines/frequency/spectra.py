@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.frequency_response import Array, Complex, Responses
+from pipelines.frequency.frequency_response import Array, Complex, Responses
 
 __all__ = ["CrossSpectra", "cross_spectra", "welch_responses"]
 

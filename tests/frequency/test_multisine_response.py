@@ -7,9 +7,9 @@ import pytest
 from scipy import signal
 
 from pipelines.errors import InputRejected, UsageError
-from pipelines.signal.frequency_response import closed_loop
-from pipelines.signal.multisine_response import MultisineResponses, multisine_responses
-from tests.signal.loops import Plant, T, closed_loop_record
+from pipelines.frequency.frequency_response import closed_loop
+from pipelines.frequency.multisine import MultisineResponses, multisine_responses
+from tests.frequency.loops import Plant, T, closed_loop_record
 
 PERIOD = 2000  # samples
 PLANT = Plant(((28.0, 0.05, 0.3),))

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.fit.rational import Known
-from pipelines.model.frf.compliant import Explained, explain
-from pipelines.model.frf.modes import Modes, Pair
+from pipelines.frequency.modes import Modes, Pair
+from pipelines.frequency.rational import Known
+from pipelines.frequency.springs import Explained, explain
 
 __all__ = ["Finding", "GroupingConfig", "Open", "advance", "group_joint", "seen_elsewhere"]
 

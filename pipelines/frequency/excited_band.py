@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from pipelines.signal.frequency_response import Array, Responses
+from pipelines.frequency.frequency_response import Array, Responses
 
 __all__ = ["BandConfig", "ExcitedBand", "excited_band", "powered"]
 

@@ -14,13 +14,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipelines.fit.rational import Known, Mode, Rational
-from pipelines.fit.rational_search import FEWEST, fit_rational, scattered
+from pipelines.frequency.along import along_turn
+from pipelines.frequency.controller import Complex, loop_delay
+from pipelines.frequency.frequency_response import FrequencyResponse
+from pipelines.frequency.rational import Known, Mode, Rational
+from pipelines.frequency.rational_search import FEWEST, fit_rational, scattered
+from pipelines.frequency.responses import Measured, double_integrator
 from pipelines.io.log import Array
-from pipelines.model.frf.along import along_turn
-from pipelines.model.frf.controller import Complex, loop_delay
-from pipelines.model.frf.responses import Measured, double_integrator
-from pipelines.signal.frequency_response import FrequencyResponse
 
 __all__ = ["BAND", "Modes", "Pair", "fitted_modes", "relative_acceleration", "tells"]
 

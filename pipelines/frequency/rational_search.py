@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pipelines.errors import InputRejected
-from pipelines.fit.rational import Array, Complex, Rational, known_part, product
+from pipelines.frequency.rational import Array, Complex, Rational, known_part, product
 
 __all__ = ["FEWEST", "fit_rational", "scattered"]
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from pipelines.fit.rational import Known, Mode, Rational
+from pipelines.frequency.grouping import Finding, Open, group_joint, seen_elsewhere
+from pipelines.frequency.modes import Modes, Pair
+from pipelines.frequency.rational import Known, Mode, Rational
+from pipelines.frequency.springs import explain, predicted
 from pipelines.io.log import Array
-from pipelines.model.frf.compliant import explain, predicted
-from pipelines.model.frf.grouping import Finding, Open, group_joint, seen_elsewhere
-from pipelines.model.frf.modes import Modes, Pair
 
 _NONE = Rational(np.zeros(2), np.zeros((2, 2)), 0, 0, 0, 0.0, 1.0, (4.0, 250.0), 1.0, 0.0)
 

@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import freqz
 
 from bench.control import Observer, observer_gain
+from pipelines.frequency.controller import continuous_controller, loop_delay, sampled_controller
+from pipelines.frequency.responses import double_integrator
 from pipelines.io.log import Controller
-from pipelines.model.frf.controller import continuous_controller, loop_delay, sampled_controller
-from pipelines.model.frf.responses import double_integrator
 
 T = 1e-3
 FREQUENCY = np.array([1.0, 5.0, 28.0, 80.0, 200.0])
