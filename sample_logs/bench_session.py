@@ -24,7 +24,7 @@ from bench.plan import Solid
 from bench.plant import record
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
-from pipelines.effects.three_sigmoid import ThreeSigmoid
+from pipelines.effects.friction import ThreeSigmoid
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.io.model_file import model_text
 from pipelines.io.robot import RobotDescription

@@ -11,7 +11,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.effects.three_sigmoid import ThreeSigmoid
+from pipelines.effects.friction import ThreeSigmoid
 from pipelines.io.model_file import Validity, model_text
 from pipelines.io.robot_files import load_robot
 

@@ -40,7 +40,7 @@ LAYERS = {
 }
 CALL_STAGES = {"pipelines.run"}
 # Of the effects, all that one of them may import.
-CONTRACT = {f"pipelines.effects{end}" for end in ("", ".base", ".config", ".drive_apart", ".kinds", ".terms")}
+CONTRACT = {f"pipelines.effects{end}" for end in ("", ".base", ".config", ".hooks", ".parameters")}
 FILES = ("pipelines.io", "pipelines.importers")
 DOORS: dict[str, str | tuple[str, ...]] = {
     "typer": "rrrid_cli", "matplotlib": "pipelines.report", "jinja2": "pipelines.report", "h5py": FILES,
@@ -130,7 +130,7 @@ def test_a_line_imports_only_lines_below() -> None:
 def test_the_rule_can_be_broken() -> None:
     """Each kind of breach is seen: upwards, sideways between stages, between effects, out of the bench."""
     for module, imported in (("pipelines.io.files", "pipelines.dynamics.body"), ("pipelines.convert", "pipelines.inspect"),
-                             ("pipelines.effects.coulomb", "pipelines.effects.viscous"),
+                             ("pipelines.effects.friction", "pipelines.effects.drives"),
                              ("pipelines.signal", "pipelines.fit"), ("bench.plant", "pipelines.dynamics.arm"),
                              ("bench.faults.load", "bench.faults.drive"),
                              ("pipelines.run", "bench"),

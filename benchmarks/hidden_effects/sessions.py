@@ -32,8 +32,7 @@ from bench.plant import peak_torque
 from benchmarks.hidden_effects.cases import Hidden, SealedCase
 from benchmarks.hidden_effects.robots import ROBOTS
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.viscous import Viscous
+from pipelines.effects.friction import Coulomb, Viscous
 from pipelines.errors import UsageError
 from pipelines.io.log import Array, ExperimentLog
 from sample_logs.bench_session import ControllerModel, controller_model, recorded

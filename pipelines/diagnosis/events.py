@@ -14,8 +14,7 @@ from pipelines.diagnosis.candidates import Dictionary
 from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.dataset import Rows
 from pipelines.dynamics.arm import Arm
-from pipelines.effects.base import Effect
-from pipelines.effects.kinds import Event
+from pipelines.effects.base import Effect, Event
 from pipelines.fit.bootstrap import chi2_bound, upper_point
 from pipelines.fit.joint_table import Array, Indices, by_joint
 

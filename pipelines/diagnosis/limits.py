@@ -34,8 +34,7 @@ from pipelines.diagnosis.result import (
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import Key
 from pipelines.effects import all_effects
-from pipelines.effects.base import Effect, Quantity
-from pipelines.effects.kinds import FrictionLaw
+from pipelines.effects.base import Effect, FrictionLaw, Quantity
 from pipelines.fit.joint_table import Array
 from pipelines.friction.laws import LADDER
 

@@ -24,8 +24,7 @@ from pipelines.diagnosis.screening import Screened, price, screen
 from pipelines.diagnosis.state import State
 from pipelines.diagnosis.unnamed import FORM, Key
 from pipelines.dynamics.config import ORDERS
-from pipelines.effects.base import Effect
-from pipelines.effects.kinds import FrictionLaw
+from pipelines.effects.base import Effect, FrictionLaw
 from pipelines.fit.bootstrap import chi2_bound
 from pipelines.fit.joint_table import Array, Arrow, Indices, Table, by_joint, gains, in_rows
 from pipelines.model.rows.data import END

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import pi, sqrt
 from typing import Self
@@ -11,23 +11,20 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.dynamics.perturbation import perturbed_by, rate_of, rigid_slopes, shifted
-from pipelines.effects.base import (
-    ArmModel,
-    Effect,
-    Hooks,
-    Parameters,
-    Quantity,
-    Values,
-    friction_at,
+from pipelines.dynamics.perturbation import (
+    perturbed_by,
+    rate_of,
+    rigid_slopes,
+    rigid_torque,
+    shifted,
 )
+from pipelines.effects.base import ArmModel, Effect, Hooks, Values, friction_at
 from pipelines.effects.config import EFFECTS
-from pipelines.effects.drive_apart import DriveApart, rigid_torque_of
+from pipelines.effects.hooks import DriveApart
 
 __all__ = ["Backlash", "Gaps", "followed"]
 
 _NOTHING = 1e-6  # numerics: [N m] that leave the link in the middle of the gap at first
-_THICKEST = 1e6  # numerics: [N m s/rad], or [N s/m]
 # More shapes than these share the slopes of the rigid torque, which cost less then and miss a
 # thousandth of a gap of 6.6 mrad. Those of one shape moved a little, whose difference is a slope,
 # are few: they are worked out exactly.
@@ -55,14 +52,6 @@ class Backlash(Effect):
     motor_inertia: float = 1e-3  # J_m [kg m^2]
 
     name = "backlash"
-    parameters = Parameters(
-        Quantity("gap", "rad", 0.0, 0.1, "free play, from flank to flank", shape=True),
-        Quantity("film", "N m s/rad", 0.0, _THICKEST, "drag of the lubricant in the open gap",
-                 shape=True),
-        Quantity("motor_inertia", "kg m^2", 0.0, 10.0, "of what turns with the motor", shape=True),
-        Quantity("coefficient", "1", 0.0, 2.0,
-                 "share of its torque: 1 where the model of the gap is right", fixed=1.0),
-    )
     evidence = "reversals"
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -74,41 +63,36 @@ class Backlash(Effect):
 
     def several(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> list[Array]:
         """All gaps are followed at once; those of one motor share its forces."""
-        tau, felt = rigid_torque_of(arm)(motion), _felt(arm, motion.q, self._index)
+        tau, felt = rigid_torque(arm.body, arm.p, motion), _felt(arm, motion.q, self.index)
         motors = list(dict.fromkeys(one.motor_inertia for one in shapes))
-        motor = np.array(motors if len(motors) == 1 else [one.motor_inertia
-                                                          for one in shapes])[:, None]
+        if len(motors) > 1:
+            motors = [one.motor_inertia for one in shapes]
+        motor = np.array(motors)[:, None]
         mass = np.maximum(felt - motor, EFFECTS.link_share * felt)
-        force = motor * self.own(motion.ddq) - tau[:, self._index]
+        force = motor * self.own(motion.ddq) - self.own(tau)
         flanks = {
-            one: _flank(float(np.mean(np.maximum(felt - one, EFFECTS.link_share * felt))), one)
-            for one in motors
+            one: _flank(float(np.mean(link)), one) for one, link in zip(motors, mass, strict=True)
         }
-        half, film, k, d = np.array([[0.5 * one.gap, one.film, *flanks[one.motor_inertia]]
-                                     for one in shapes]).T
-        link = followed(motion.t, mass, force, Gaps(half, film, k, d))
-        slopes = rigid_slopes(arm.body, arm.p, motion,
-                              self._index) if len(shapes) > _SLOPES else None
-
-        def ahead(x: Array, rate: Array, second: Array) -> Array:
-            """τ_rigid(q + x) - τ_rigid(q)."""
+        half, film, k, d = np.array(
+            [[0.5 * one.gap, one.film, *flanks[one.motor_inertia]] for one in shapes]
+        ).T
+        slopes = None
+        if len(shapes) > _SLOPES:
+            slopes = rigid_slopes(arm.body, arm.p, motion, self.index)
+        found = []
+        for one, x in zip(
+            shapes, followed(motion.t, mass, force, Gaps(half, film, k, d)), strict=True
+        ):
+            rate = rate_of(x, motion.t)
+            second = rate_of(rate, motion.t)
             if slopes is not None:
-                return perturbed_by(slopes, x, rate, second)
-            return rigid_torque_of(arm)(shifted(motion, self._index, x, rate, second)) - tau
-
-        return [one._torque(motion, x, ahead) for one, x in zip(shapes, link, strict=True)]
-
-    def _torque(self, motion: Motion, x: Array, ahead: Callable[[Array, Array, Array],
-                                                                Array]) -> Array:
-        """Return the column of a link that is x (samples,) ahead of its motor.
-
-        It is the torque that the rigid arm then needs besides.
-        """
-        rate = rate_of(x, motion.t)
-        second = rate_of(rate, motion.t)
-        more = ahead(x, rate, second)
-        more[:, self._index] -= self.motor_inertia * second
-        return np.asarray(more[..., None])
+                more = perturbed_by(slopes, x, rate, second)
+            else:
+                there = shifted(motion, self.index, x, rate, second)
+                more = rigid_torque(arm.body, arm.p, there) - tau
+            more[:, self.index] -= one.motor_inertia * second
+            found.append(more[..., None])
+        return found
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
         """Gaps a good third apart, for too small a gap explains nothing.
@@ -116,17 +100,22 @@ class Backlash(Effect):
         Lubricants a factor of three apart, for where one far too thin is looked for, the gap's
         torque comes and goes by chance; a motor of a tenth of what the joint feels.
         """
-        motor = 0.1 * float(np.mean(_felt(arm, motion.q, self._index)))
-        usual = float(np.median(np.abs(self.own(rigid_torque_of(arm)(motion))))) or 1.0
+        motor = 0.1 * float(np.mean(_felt(arm, motion.q, self.index)))
+        tau = self.own(rigid_torque(arm.body, arm.p, motion))
+        usual = float(np.median(np.abs(tau))) or 1.0
         for gap in np.geomspace(3e-4, 6.6e-3, 10).tolist():
             for crossing in EFFECTS.crossings:
-                film = min(crossing * usual / gap, _THICKEST)
-                yield replace(self, gap=gap, film=film, motor_inertia=min(motor, 10.0))
+                yield replace(
+                    self,
+                    gap=gap,
+                    film=self.within("film", crossing * usual / gap),
+                    motor_inertia=min(motor, 10.0),
+                )
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """Return the hooks of an arm that is the links; the motor is two states, with friction."""
         still = np.zeros((1, arm.n_joints))
-        felt = float(_felt(arm, still, self._index)[0])
+        felt = float(_felt(arm, still, self.index)[0])
         # of a motor without inertia nothing can be integrated
         motor = max(values["motor_inertia"], 0.01 * felt)
         half, film = 0.5 * values["gap"], values["film"]
@@ -134,12 +123,20 @@ class Backlash(Effect):
 
         def passed(angle: Array, speed: Array) -> Array:
             over = angle - np.clip(angle, -half, half)
-            push = np.where(over > 0.0, np.maximum(k * over + d * speed, 0.0),
-                            np.minimum(k * over + d * speed, 0.0))
+            push = np.where(
+                over > 0.0,
+                np.maximum(k * over + d * speed, 0.0),
+                np.minimum(k * over + d * speed, 0.0),
+            )
             return np.asarray(film * speed + np.where(over == 0.0, 0.0, push))
 
-        drive = DriveApart(self._index, motor, friction_at(arm, self._index + 1), passed,
-                           lambda tau: half * np.clip(tau / _NOTHING, -1.0, 1.0) + tau / k)
+        drive = DriveApart(
+            self.index,
+            motor,
+            friction_at(arm, self.index + 1),
+            passed,
+            lambda tau: half * np.clip(tau / _NOTHING, -1.0, 1.0) + tau / k,
+        )
         return drive.hooks(arm.n_joints)
 
 
@@ -175,27 +172,28 @@ def followed(t: Array, mass: Array, force: Array, gaps: Gaps) -> Array:
     length = _SHORT if len(gaps.half) <= _FEW else _LENGTH
     samples, count = len(t), max(1, -(-(len(t) - 1) // length))
     h = np.append(np.diff(t), 0.0)
-    m, f = (np.append(0.5 * (x[:, 1:] + x[:, :-1]), np.zeros((len(x), 1)), axis=1)
-            for x in (mass, force))
+    m, f = (
+        np.append(0.5 * (x[:, 1:] + x[:, :-1]), np.zeros((len(x), 1)), axis=1)
+        for x in (mass, force)
+    )
     early = np.arange(count) * length - _EARLY
     steps = early + np.arange(length + _EARLY)[:, None]  # (steps, stretches)
     within = np.where((steps >= 0) & (steps < samples - 1), steps, samples - 1)
     inertia = np.where(m > 0.0, m, 1.0)  # outside the log no time goes by
     start = _start(force[:, np.maximum(early, 0)], gaps)
     x, v, seams = _moved(h[within], _stretched(inertia, within), _stretched(f, within), start, gaps)
-    for gap in range(len(gaps.half)):
+    for gap, half in enumerate(gaps.half):
         place, speed = x[-1, gap, 0], v[gap, 0]
         for k in range(1, count):
-            if abs(place - x[_EARLY, gap,
-                             k]) + _TICK * abs(speed - seams[gap, k]) > _SEAM * gaps.half[gap]:
+            off = abs(place - x[_EARLY, gap, k]) + _TICK * abs(speed - seams[gap, k])
+            if off > _SEAM * half:
                 own, before = within[_EARLY:, k], (float(place), float(speed))
                 inert, pull = m[gap % len(m), own], f[gap % len(f), own]
-                x[_EARLY:, gap, k], v[gap, k] = _step_by_step(h[own], inert, pull, before, gaps,
-                                                              gap)
+                again = _step_by_step(h[own], inert, pull, before, gaps, gap)
+                x[_EARLY:, gap, k], v[gap, k] = again
             place, speed = x[-1, gap, k], v[gap, k]
-    return np.concatenate([
-        x[_EARLY, :, :1], x[_EARLY + 1:].transpose(1, 2, 0).reshape(len(gaps.half), -1)
-    ], axis=1)[:, :samples]
+    along = x[_EARLY + 1 :].transpose(1, 2, 0).reshape(len(gaps.half), -1)
+    return np.concatenate([x[_EARLY, :, :1], along], axis=1)[:, :samples]
 
 
 def _stretched(x: Array, within: npt.NDArray[np.intp]) -> Array:
@@ -232,20 +230,20 @@ def _moved(h: Array, m: Array, f: Array, x: Array, gaps: Gaps) -> tuple[Array, A
     return out, v, seams
 
 
-def _step_by_step(h: Array, m: Array, f: Array, start: tuple[float, float], gaps: Gaps,
-                  gap: int) -> tuple[Array, float]:
+def _step_by_step(
+    h: Array, m: Array, f: Array, start: tuple[float, float], gaps: Gaps, gap: int
+) -> tuple[Array, float]:
     """x (samples,) of one gap from where the stretch before ended, and the speed at the end."""
     k, d, half, film = (float(x[gap]) for x in (gaps.stiffness, gaps.damping, gaps.half, gaps.film))
     x, v = start
     found = [x]
     for step, inertia, pull in zip(h.tolist(), m.tolist(), f.tolist(), strict=True):
         if step:
-            over = x - half if x > half else x + half if x < -half else 0.0
-            closed = (k * over + d * v) * over > 0.0
-            c, spring = (0.5 * step *
-                         (film + d), 0.25 * step * step * k) if closed else (0.5 * step * film, 0.0)
-            after = (v * (inertia - c - spring) + step *
-                     (pull - (k * over if closed else 0.0))) / (inertia + c + spring)
+            over = x - min(max(x, -half), half)
+            slowing = 0.5 * step * film
+            if (k * over + d * v) * over > 0.0:
+                slowing, pull = slowing + 0.5 * step * d + 0.25 * step * step * k, pull - k * over
+            after = (v * (inertia - slowing) + step * pull) / (inertia + slowing)
             x += 0.5 * step * (v + after)
             v = after
         found.append(x)

@@ -1,12 +1,12 @@
 """The contract of an effect: a physical cause is data plus one function.
 
-An effect is written by giving its words, its parameters and `columns`; the rest has a default.
+An effect is written by its entry in causes.toml and `columns`; the rest has a default. Where the
+torque is more than columns times amplitudes, one of these says how, exactly:
 
-    Coulomb friction     columns = tanh(w v) on its own row; nothing else
-    Cogging              columns = sin kq, cos kq; `shapes` runs over k; `values`: amplitude, phase
-    A clipped drive      columns to screen with; `apply` = clip(predict(motion, arm))
-    An encoder fault     columns to screen with; `apply` = predict(corrected motion, arm)
-    Tilted gravity       columns to screen with; `apply` = predict(motion, arm.with_body(tilted, p))
+    torque(motion, arm, values)            a load that is not linear in its amplitudes
+    corrected(motion, values)              an encoder: the motion as it truly is
+    altered(arm, values)                   gravity, geometry, load: the arm as it truly is
+    passed(tau, motion, arm, values)       a drive or a recorder: what the log shows of all torque
 
 An object is the effect in one place and one shape: `joint` and the *non-linear* parameters (speeds,
 orders, delays) are its fields. The *linear* parameters, its amplitudes, are not: a fit solves for
@@ -20,9 +20,6 @@ bias them. One exception: the torque that a drive keeps back above its limit fol
 commanded torque alone, which is `Motion.tau`. Columns need not be independent, nor all visible, on
 every arm: solve with a rank threshold. Each motion is one log from its first sample (time in a log
 counts from motion.t[0]).
-
-    terms.py     Quantity: what a parameter may be; the hooks of a simulation
-    kinds.py     what friction laws and events have besides
 """
 
 from __future__ import annotations
@@ -31,54 +28,62 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from pathlib import Path
+from operator import mul
 from typing import Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 
-from pipelines.dynamics.body import Motion
-from pipelines.effects.terms import (
-    LARGE,
-    SAMPLED,
-    SHARPNESSES,
+from pipelines.dynamics.body import Array, Motion
+from pipelines.dynamics.functions import ARRAYS, Functions
+from pipelines.effects.hooks import (
     ArmModel,
     Hooks,
-    OwnDrive,
     OwnLoad,
     OwnMemory,
-    Parameters,
     Predict,
-    Quantity,
     SpeedCurve,
-    Values,
-    Words,
     friction_at,
     predicted,
     summed,
-    waves,
 )
-from pipelines.io.log import Array
-from pipelines.io.sandbox import parse_toml, read_small_text
+from pipelines.effects.parameters import Parameters, Quantity, Values, Words, causes
 
-__all__ = ["LARGE", "SAMPLED", "SHARPNESSES", "ArmModel", "Effect", "Hooks", "OwnDrive", "OwnLoad",
-           "OwnMemory", "Parameters", "Predict", "Quantity", "SpeedCurve", "Values", "Words",
-           "adds", "everywhere", "friction_at", "joints_of", "predicted", "waves"]
+__all__ = [
+    "ArmModel",
+    "Effect",
+    "Event",
+    "FrictionLaw",
+    "Hooks",
+    "OwnLoad",
+    "OwnMemory",
+    "Parameters",
+    "Pointwise",
+    "Predict",
+    "Quantity",
+    "SpeedCurve",
+    "Values",
+    "Words",
+    "adds",
+    "everywhere",
+    "friction_at",
+    "joints_of",
+    "plainer",
+    "predicted",
+    "summed",
+]
 
 E = TypeVar("E", bound="Effect")
 _BEYOND = 0.1  # numerics: share of the range in which it was seen; farther out it is not known
 
 
-class WordsOfCause:
-    """The words of an effect out of causes.toml, read when some are first asked for."""
+class _FromTable:
+    """What the table of causes has of an effect by its name."""
 
-    def __init__(self) -> None:
-        self.every: dict[str, Any] = {}
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.field = name
 
-    def __get__(self, effect: Effect | None, kind: type[Effect]) -> Words:
-        """Return those of an effect by its name."""
-        if not self.every:
-            self.every = parse_toml(read_small_text(Path(__file__).with_name("causes.toml")))
-        return Words(**self.every[kind.name])
+    def __get__(self, effect: Effect | None, kind: type[Effect]) -> Any:
+        return getattr(causes()[kind.name], self.field)
 
 
 @dataclass(frozen=True)
@@ -87,22 +92,20 @@ class Effect(ABC):
 
     joint: int | None = None  # 1-based; None where scope is "arm"
 
-    name: ClassVar[str]  # identifier of causes.md, and the file's name
-    words: ClassVar[Words] = WordsOfCause()  # type: ignore[assignment]
+    name: ClassVar[str]  # identifier of causes.md and causes.toml
+    words: ClassVar[Words] = _FromTable()  # type: ignore[assignment]
+    parameters: ClassVar[Parameters] = _FromTable()  # type: ignore[assignment]
     scope: ClassVar[Literal["joint", "arm"]] = "joint"
-    parameters: ClassVar[Parameters]
-    acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"  # the order in which
-    # effects compose; the record, outermost, is a first-order low-pass, its amplitude the time
-    # constant [s]
-    clock: ClassVar[Literal["none", "session",
-                            "log"]] = "none"  # "session": its field `since` [s] is
-    # when the session began; "log": it happens once, and its shapes belong to that log
-    evidence: ClassVar[Literal["residual", "frequency responses", "reversals", "base parameters",
-                               "none"]] = "residual"  # what a diagnosis may name it by; "none": a
-    # law that a nominal model has, and no cause
-
-    # its columns follow from the motion alone, on any arm
-    from_motion: ClassVar[bool] = False
+    # the order in which effects compose; the record, outermost, is a first-order low-pass, its
+    # amplitude the time constant [s]
+    acts_on: ClassVar[Literal["load", "encoder", "drive", "record"]] = "load"
+    # "session": its field `since` [s] is when the session began; "log": it happens once
+    clock: ClassVar[Literal["none", "session", "log"]] = "none"
+    # what a diagnosis may name it by; "none": a law that a nominal model has, and no cause
+    evidence: ClassVar[
+        Literal["residual", "frequency responses", "reversals", "base parameters", "none"]
+    ] = "residual"
+    from_motion: ClassVar[bool] = False  # its columns follow from the motion alone, on any arm
 
     def __post_init__(self) -> None:
         if (self.scope == "joint") != (self.joint is not None and self.joint >= 1):
@@ -120,10 +123,7 @@ class Effect(ABC):
         """
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
-        """Return the effect in every shape worth trying on this motion.
-
-        The shapes are all combinations of the grids of its parameters.
-        """
+        """Return the effect in every shape worth trying: all combinations of its grids."""
         places = {q.name: q.grid or q.among(self.joint, arm.n_joints) for q in self.parameters}
         grids = {name: values for name, values in places.items() if values is not None}
         for numbers in product(*grids.values()):
@@ -135,22 +135,35 @@ class Effect(ABC):
         return (self,)
 
     def nuisance(self, arm: ArmModel) -> Array | None:
-        """Return directions (base parameters, k) in which it moves them beyond its columns.
-
-        How far it moves them along these is unknown.
-        """
+        """Return directions (base parameters, k) in which it moves them, how far is unknown."""
         return None
 
-    def apply(self, motion: Motion, arm: ArmModel, values: Values,
-              predict: Predict | None = None) -> Array:
+    def apply(
+        self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None
+    ) -> Array:
         """Return the torque (samples, joints) that a log shows with this effect, exactly.
 
-        `predict` says what it would show without; effects are thus put one around the other. To
-        warp a signal, hand another motion to `predict`; to change geometry or gravity, another arm;
-        to clip, treat what it returns.
+        `predict` says what it would show without; effects are thus put one around the other.
         """
-        without = predict(motion, arm) if predict is not None else arm.torque(motion)
-        return np.asarray(without + self.torque(motion, arm, values))
+        true, other = self.corrected(motion, values), self.altered(arm, values)
+        tau = predict(true, other) if predict is not None else other.torque(true)
+        return self.passed(tau, motion, arm, values)
+
+    def corrected(self, motion: Motion, values: Values) -> Motion:
+        """Return the motion as it truly is."""
+        return motion
+
+    def altered(self, arm: ArmModel, values: Values) -> ArmModel:
+        """Return the arm as it truly is."""
+        return arm
+
+    def passed(self, tau: Array, motion: Motion, arm: ArmModel, values: Values) -> Array:
+        """Return what the log shows of the torque `tau` that is needed without; may write to it."""
+        return np.asarray(tau + self.torque(motion, arm, values))
+
+    def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
+        """Return the torque (samples, joints) [N m] that it adds."""
+        return summed(self.at(values).columns(motion, arm), self.amplitudes(values))
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         """Return how it enters the forward simulation; by default as a load."""
@@ -162,14 +175,25 @@ class Effect(ABC):
     @property
     def free(self) -> tuple[str, ...]:
         """Names of the shapes that a refit moves continuously."""
-        return tuple(q.name for q in self.parameters if q.shape and not q.discrete and not q.derived
-                     and (q.held is None or getattr(self, q.name) != q.held))
+        return tuple(
+            q.name
+            for q in self.parameters
+            if q.shape
+            and not q.discrete
+            and not q.derived
+            and (q.held is None or getattr(self, q.name) != q.held)
+        )
 
     def at_end(self, name: str, by: float) -> bool:
         """Return whether a shape is at the end of its range, and `by` points out of it."""
         quantity = next(q for q in self.parameters if q.name == name)
         here = float(getattr(self, name))
         return (here <= quantity.low and by < 0.0) or (here >= quantity.high and by > 0.0)
+
+    def within(self, name: str, value: float) -> float:
+        """Return a number, or the end of the range of parameter `name` that is nearest to it."""
+        quantity = next(q for q in self.parameters if q.name == name)
+        return float(np.clip(value, quantity.low, quantity.high))
 
     def at(self, values: Values) -> Self:
         """Return the effect with the shapes out of `values`."""
@@ -184,8 +208,10 @@ class Effect(ABC):
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         """Return every parameter by name; the inverse of `at` and `amplitudes`."""
         linear = iter(amplitudes)
-        return {q.name: float(getattr(self, q.name) if q.shape else next(linear))
-                for q in self.parameters}
+        return {
+            q.name: float(getattr(self, q.name) if q.shape else next(linear))
+            for q in self.parameters
+        }
 
     def possible(self, values: Values) -> bool:
         """Return whether every parameter lies in its range."""
@@ -193,28 +219,26 @@ class Effect(ABC):
 
     def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
         """Return the parameters of a finding, named as in causes.md; whole numbers are integers."""
-        return {q.name: int(values[q.name]) if q.discrete else values[q.name]
-                for q in self.parameters}
-
-    def torque(self, motion: Motion, arm: ArmModel, values: Values) -> Array:
-        """Return the torque (samples, joints) [N m] of first order."""
-        return summed(self.at(values).columns(motion, arm), self.amplitudes(values))
+        return {
+            q.name: int(values[q.name]) if q.discrete else values[q.name] for q in self.parameters
+        }
 
     # its own joint, and how that moves
 
-    def sharpnesses(self, motion: Motion, count: int) -> list[float]:
-        """[s/rad] largest first.
-
-        A geometric grid between the slowest and the fastest speeds that this motion holds.
-        """
-        speed = np.abs(self.own(motion.dq))
-        moving = speed[speed > 0]
-        fast, slow = (moving.max(), np.quantile(moving, 0.02)) if moving.size else (1.0, 0.01)
-        return [float(w) for w in np.geomspace(1 / fast, 2 / max(slow, 1e-3 * fast), count)[::-1]]
+    @property
+    def index(self) -> int:
+        """Its joint, from 0."""
+        if self.joint is None:
+            raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
+        return self.joint - 1
 
     def own(self, signal: Array) -> Array:
         """Column of its own joint, (samples,)."""
-        return np.asarray(signal[..., self._index])
+        return np.asarray(signal[..., self.index])
+
+    def fastest(self, motion: Motion) -> float:
+        """[rad/s] of its own joint; 1 where it rests."""
+        return float(np.abs(self.own(motion.dq)).max(initial=0.0)) or 1.0
 
     def goes_round(self, motion: Motion, but: float = 0.02) -> bool:
         """Return whether its own joint travels all of a circle but for a fiftieth, or for `but`.
@@ -225,34 +249,26 @@ class Effect(ABC):
 
     def goes_beyond(self, motions: Sequence[Motion], known: Sequence[Motion]) -> bool:
         """Return whether its joint leaves its range of angles in `known` by more than a tenth."""
-        now, then = (np.concatenate([self.own(motion.q) for motion in some])
-                     for some in (motions, known))
+        now, then = (
+            np.concatenate([self.own(motion.q) for motion in some]) for some in (motions, known)
+        )
         return bool(max(now.max() - then.max(), then.min() - now.min()) > _BEYOND * np.ptp(then))
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
-        """Return its torque (samples,) [N m] on its own joint against speed alone.
-
-        The other joints are at rest.
-        """
+        """Return its torque (samples,) [N m] on its own joint against speed alone, all at rest."""
         still = np.zeros((len(dq), arm.n_joints))
         motion = Motion(np.zeros(len(dq)), still, self.on_own_row(arm, dq)[..., 0], still)
         return self.own(self.torque(motion, arm, values))
 
     def on_own_row(self, arm: ArmModel, *columns: Array) -> Array:
-        """`columns`, each (samples,), as (samples, joints, columns).
+        """`columns`, each (samples,), as (samples, joints, columns) of its own joint only.
 
-        They act on its own joint only. Samples lie side by side.
+        Samples lie side by side.
         """
         rows = np.zeros((arm.n_joints, len(columns), len(columns[0])))
         for k, column in enumerate(columns):
-            rows[self._index, k] = column
+            rows[self.index, k] = column
         return rows.transpose(2, 0, 1)
-
-    @property
-    def _index(self) -> int:
-        if self.joint is None:
-            raise ValueError(f"{self.name} belongs to the whole arm and has no joint of its own")
-        return self.joint - 1
 
     # speed: without these every answer is the same, and takes longer
 
@@ -262,40 +278,79 @@ class Effect(ABC):
 
     def own_columns(self, shapes: Sequence[Self], motion: Motion, arm: ArmModel) -> Array:
         """Return those of shapes that act on this joint alone: (shapes, amplitudes, samples)."""
-        return np.stack([shape.columns(motion, arm)[:, self._index].T for shape in shapes])
+        return np.stack([shape.columns(motion, arm)[:, self.index].T for shape in shapes])
 
     def shape_slopes(self, motion: Motion, amplitudes: Array) -> Array | None:
-        """Return slopes of its torque on its own joint by the logarithm of each non-linear number.
-
-        They are (samples, numbers) [N m].
-        """
+        """Return the slopes (samples, shapes) of its torque by their logarithms, if known."""
         return None
 
     def speed_curve(self, values: Values) -> SpeedCurve | None:
-        """Return its torque as a `SpeedCurve`, where it is one and nothing else.
-
-        `simulate` then is not asked.
-        """
+        """Return its torque as a `SpeedCurve`, where it is one; `simulate` then is not asked."""
         return None
 
     def own_load(self, values: Values) -> OwnLoad | None:
-        """Return the load of `simulate` as a function of angle and speed of its own joint.
-
-        None where it does not follow from these alone.
-        """
+        """Return the load of `simulate` by angle and speed of its own joint, where these tell."""
         return None
 
     def own_memory(self, values: Values) -> OwnMemory | None:
-        """Return the load of `simulate` where it has one state.
-
-        The rate of that state follows from it and the speed of its own joint; else None.
-        """
+        """Return the load of `simulate` where it has one state, moved by its own joint's speed."""
         return None
+
+
+@dataclass(frozen=True)
+class Pointwise(Effect):
+    """An effect whose torque on its own joint follows from that joint's angle and speed."""
+
+    from_motion = True
+
+    @abstractmethod
+    def parts(self, q: Any, v: Any, m: Functions) -> Sequence[Any]:
+        """Return the torque per unit of each amplitude, in numbers or arrays."""
+
+    def columns(self, motion: Motion, arm: ArmModel) -> Array:
+        return self.on_own_row(arm, *self.parts(self.own(motion.q), self.own(motion.dq), ARRAYS))
+
+    def own_load(self, values: Values) -> OwnLoad:
+        parts, amplitudes = self.at(values).parts, self.amplitudes(values).tolist()
+        if len(amplitudes) == 1:
+            (one,) = amplitudes
+            return lambda q, v, m: one * parts(q, v, m)[0]
+        return lambda q, v, m: sum(map(mul, amplitudes, parts(q, v, m)))
+
+
+@dataclass(frozen=True)
+class FrictionLaw(Effect):
+    """A law of friction: every column takes power out of its joint."""
+
+    # the same law with fewer terms, from most to fewest, each by the names of its laws: for logs
+    # that do not tell the terms apart
+    plainer: ClassVar[tuple[tuple[str, ...], ...]] = ()
+
+
+@dataclass(frozen=True)
+class Event(Effect):
+    """An effect whose shapes are a window of time [s] from the start of its log."""
+
+    clock = "log"
+
+    @abstractmethod
+    def promising(self, motion: Motion, arm: ArmModel, residual: Array) -> Iterator[Self]:
+        """Return a few tens of windows that may explain `residual` (samples, joints) [N m]."""
+
+    @abstractmethod
+    def course(self, t: Array) -> Array:
+        """Return how large it is (samples,) at `t` since the start of the log, of its largest."""
+
+
+def plainer(law: Effect) -> tuple[tuple[str, ...], ...]:
+    """Return the names of laws with fewer terms; none where `law` is no law of friction."""
+    return law.plainer if isinstance(law, FrictionLaw) else ()
 
 
 def adds(effect: Effect) -> bool:
     """Return whether it only adds its columns to the torque of the other effects."""
-    return type(effect).apply is Effect.apply and type(effect).torque is Effect.torque
+    kept = ("apply", "corrected", "altered", "passed", "torque")
+    return all(getattr(type(effect), name) is getattr(Effect, name) for name in kept)
 
 
 def joints_of(kind: type[Effect] | Effect, revolute: Sequence[bool]) -> tuple[int, ...]:

@@ -13,9 +13,8 @@ import numpy.typing as npt
 from pipelines.dynamics.altered import chain_of
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.kinematics import SerialChain, jacobian
-from pipelines.effects.base import ArmModel, Hooks, Parameters, Quantity, Values
+from pipelines.effects.base import ArmModel, Event, Hooks, Values
 from pipelines.effects.config import EFFECTS
-from pipelines.effects.kinds import Event
 
 __all__ = ["Contact"]
 
@@ -28,7 +27,7 @@ class Contact(Event):
 
     t is the time since the start of the log: what comes again wherever the same motion is repeated
     comes at the same t, whatever the clocks say. It belongs to one log: what a fit of the arm
-    should do is to leave out its samples (`acting`).
+    should do is to leave out its samples.
     """
 
     start: float = 0.0  # t0 [s]
@@ -36,46 +35,37 @@ class Contact(Event):
 
     name = "contact"
     scope = "arm"
-    parameters = Parameters(
-        Quantity("start", "s", -1e12, 1e12,
-                 "when it begins, from the start of its log", shape=True),
-        Quantity("duration", "s", 0.02, 10.0, "how long it lasts", shape=True),
-        Quantity("force", "N", 0.0, 1e5, "the largest", derived=True),
-        *(Quantity(f"force_{axis}", "N", -1e5, 1e5, f"{axis} of the largest, in the base frame",
-                   healthy=0.0) for axis in "xyz"))
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
         return self._columns(motion.q, motion.t - motion.t[0], chain_of(arm.body))
 
     def _columns(self, q: Array, t: Array, chain: SerialChain) -> Array:
-        """Return (samples, joints, 3) at angles `q` (samples, joints).
-
-        `t` (samples,) since the start of the log.
-        """
+        """Return (samples, joints, 3) at q (samples, joints), t (samples,) since the log began."""
         table = np.zeros((3, *q.shape[::-1])).transpose(2, 1, 0)  # samples side by side
         during = np.flatnonzero(self._acting(t))
         if len(during):
-            table[during] = -self.course(t)[during, None, None] * jacobian(
-                chain, q[during])[:, :3].transpose(0, 2, 1)
+            linear = jacobian(chain, q[during])[:, :3].transpose(0, 2, 1)
+            table[during] = -self.course(t)[during, None, None] * linear
         return table
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
+        """Its memory is when the log began."""
         shaped, chain, force = self.at(values), chain_of(arm.body), self.amplitudes(values)
 
         def load(motion: Motion, states: Array) -> Array:
-            t = motion.t - states[:, 0]  # its memory is when the log began
-            if not shaped._acting(t).any():
-                return np.zeros_like(motion.q)
-            return np.asarray(shaped._columns(motion.q, t, chain) @ force)
+            return np.asarray(shaped._columns(motion.q, motion.t - states[:, 0], chain) @ force)
 
-        return Hooks(load=load, states=1, start=lambda motion, _: motion.t[:, None],
-                     update=lambda motion, _, states: states)
+        return Hooks(
+            load=load,
+            states=1,
+            start=lambda motion, _: motion.t[:, None],
+            update=lambda motion, _, states: states,
+        )
 
     def _acting(self, t: Array) -> npt.NDArray[np.bool_]:
         return np.asarray((t > self.start) & (t < self.start + self.duration))
 
     def course(self, t: Array) -> Array:
-        """Return how large it is (samples,) at `t` since the start of the log, of its largest."""
         return np.where(self._acting(t), np.sin(math.pi * (t - self.start) / self.duration), 0.0)
 
     def shapes(self, motion: Motion, arm: ArmModel) -> Iterator[Self]:
@@ -91,10 +81,10 @@ class Contact(Event):
         mean = np.convolve(power, np.ones(width) / width, mode="same")
         for _ in range(EFFECTS.contacts):
             centre = int(np.argmax(mean))
-            mean[max(0, centre - 2 * width):centre + 2 * width] = -1.0
+            mean[max(0, centre - 2 * width) : centre + 2 * width] = -1.0
             for duration in (0.1, 0.2, 0.3):
-                yield replace(self, start=float(motion.t[centre] - motion.t[0]) - 0.5 * duration,
-                              duration=duration)
+                start = float(motion.t[centre] - motion.t[0]) - 0.5 * duration
+                yield replace(self, start=start, duration=duration)
 
     def amplitudes(self, values: Values) -> Array:
         return np.array([values[f"force_{axis}"] for axis in "xyz"])
@@ -102,6 +92,10 @@ class Contact(Event):
     def values(self, amplitudes: Sequence[float] | Array) -> dict[str, float]:
         x, y, z = map(float, amplitudes)
         return {
-            "start": self.start, "duration": self.duration, "force": math.hypot(x, y, z),
-            "force_x": x, "force_y": y, "force_z": z
+            "start": self.start,
+            "duration": self.duration,
+            "force": math.hypot(x, y, z),
+            "force_x": x,
+            "force_y": y,
+            "force_z": z,
         }

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import ARRAYS, Functions
-from pipelines.effects.base import (
-    LARGE,
-    ArmModel,
-    Effect,
-    Hooks,
-    OwnMemory,
-    Parameters,
-    Quantity,
-    Values,
-)
+from pipelines.effects.base import ArmModel, Effect, Hooks, OwnMemory, Values
 from pipelines.effects.config import EFFECTS
 
 __all__ = ["Presliding"]
@@ -68,23 +60,6 @@ class Presliding(Effect):
     breakaway_speed: float = 0.1  # v_s [rad/s]
 
     name = "presliding"
-    parameters = Parameters(
-        Quantity("amplitude", "N m", 0.0, LARGE, "friction that turns over with travel",
-                 healthy=math.inf),
-        Quantity("distance", "rad", 1e-6, 0.2, "travel over which it turns over", shape=True),
-        Quantity("elastic", "1", -1.0, 0.9,
-                 "share of the largest bending up to which nothing slides", shape=True,
-                 unsaid=-1.0),
-        Quantity("damping_time", "s", 0.0, 0.1, "damping of the bristles over their stiffness",
-                 shape=True),
-        Quantity("exponent", "1", 0.0, 3.0, "how gradually it begins to slide", shape=True,
-                 unsaid=1.0, held=1.0),
-        Quantity("inner_loops", "1", 0.0, 1.0, "1 where a small loop inside a large one closes",
-                 shape=True, discrete=True, unsaid=0.0),
-        Quantity("breakaway", "1", 0.0, 5.0,
-                 "how much larger friction is at standstill than at speed", shape=True, unsaid=0.0),
-        Quantity("breakaway_speed", "rad/s", 1e-3, 5.0, "speed over which it falls to that",
-                 shape=True, unsaid=0.1))
     from_motion = True
 
     def columns(self, motion: Motion, arm: ArmModel) -> Array:
@@ -100,9 +75,9 @@ class Presliding(Effect):
         """From a thousandth to a tenth of the travel."""
         travel = float(np.ptp(self.own(motion.q))) or 1.0
         fast = float(np.abs(self.own(motion.dq)).max(initial=0.0))
-        slow = float(np.clip(EFFECTS.falling * fast, 1e-3, 5.0))
+        slow = self.within("breakaway_speed", EFFECTS.falling * fast)
         for distance in np.geomspace(1e-3 * travel, 0.1 * travel, 9).tolist():
-            yield replace(self, distance=float(np.clip(distance, 1e-6, 0.2)), breakaway_speed=slow)
+            yield replace(self, distance=self.within("distance", distance), breakaway_speed=slow)
 
     def forms(self) -> tuple[Self, ...]:
         other = replace(self, exponent=EFFECTS.other_exponent)
@@ -118,16 +93,14 @@ class Presliding(Effect):
     def reported(self, values: Values) -> dict[str, float | tuple[float, ...]]:
         """Without a speed over which nothing falls."""
         said = super().reported(values)
-        return said if values["breakaway"] else {
-            name: x
-            for name, x in said.items() if not name.startswith("breakaway")
-        }
+        breaks = bool(values["breakaway"])
+        return {name: x for name, x in said.items() if breaks or not name.startswith("breakaway")}
 
     def curve(self, dq: Array, arm: ArmModel, values: Values) -> Array:
         """Return what is left of it at constant speed: Coulomb friction, and its breakaway."""
         shaped = self.at(values)
-        return np.asarray(values["amplitude"] * np.sign(dq)
-                          * sliding_level(dq, shaped.breakaway, shaped.breakaway_speed))
+        level = _sliding_level(dq, shaped.breakaway, shaped.breakaway_speed, ARRAYS)
+        return np.asarray(values["amplitude"] * np.sign(dq) * level)
 
     def simulate(self, arm: ArmModel, values: Values) -> Hooks:
         shaped, amplitude = self.at(values), values["amplitude"]
@@ -145,90 +118,114 @@ class Presliding(Effect):
     def own_memory(self, values: Values) -> OwnMemory | None:
         shaped, amplitude = self.at(values), float(values["amplitude"])
         contact, unit, time = shaped._contact, shaped._unit, shaped.damping_time
-        if isinstance(contact, Slips):
+        if not isinstance(contact, _OneState):
             return None
-        return OwnMemory(lambda u, v, m: contact.rate_of(u, v / unit, m), lambda u, du: amplitude *
-                         (u + time * du))
+        return OwnMemory(
+            lambda u, v, m: contact.rate_of(u, v / unit, m),
+            lambda u, du: amplitude * (u + time * du),
+        )
 
     @property
-    def _contact(self) -> Bristles | Slips | Breaking:
+    def _contact(self) -> _OneState | _Slips:
         if self.breakaway:
-            return Breaking(self.breakaway, self.breakaway_speed / self._unit)
-        return Slips(self.elastic, self.exponent) if self.inner_loops else Bristles(
-            self.elastic, self.exponent)
+            return _Breaking(self.breakaway, self.breakaway_speed / self._unit)
+        kind = _Slips if self.inner_loops else _Bristles
+        return kind(self.elastic, self.exponent)
 
     @property
     def _unit(self) -> float:
         """d [rad].
 
-        Y(x) from -1 is zero at x = 1, or where e < 0 at 1 + e + (1 - e) ln(1 - e), for n = 1.
+        y(x) from -1 is zero at x = 1, or where e < 0 at 1 + e + (1 - e) ln(1 - e), for n = 1.
         """
+        e, n = self.elastic, self.exponent
         if self.breakaway:
             return self.distance
-        e, n = self.elastic, self.exponent
-        one = (1.0 - e) * math.log(1.0 - e) if abs(n - 1.0) < _ONE else ((1.0 - e) -
-                                                                         (1.0 - e)**n) / (1.0 - n)
-        return self.distance * math.log(2.0) / (1.0 if e >= 0.0 else 1.0 + e + one)
-
-
-@dataclass(frozen=True)
-class Bristles:
-    """One state u. Positions and speeds are in units of d."""
-
-    elastic: float
-    exponent: float
-    states = 1
-
-    def along(self, q: Array, v: Array) -> Array:
-        """Return (samples, states), relaxed at the start.
-
-        Exact between the samples where they keep direction.
-        """
-        begin, side, which, travel = _strokes(q)
-        at, first = 0.0, np.empty(len(begin))
-        for k, (s, x) in enumerate(zip(side.tolist(), travel.tolist(), strict=True)):
-            first[k] = s * at
-            at = s * self._after(s * at, x)
-        room, rest = np.maximum(self.elastic - first,
-                                0.0), np.maximum(1.0 - np.maximum(self.elastic, first), _SLIDES)
-        x = np.abs(q - q[begin[which]])
-        rest = self._rest(rest[which], np.maximum(x - room[which], 0.0))
-        bends = x < room[which]
-        return np.asarray(side[which] * np.where(bends, first[which] + x, 1.0 - rest))[:, None]
-
-    def _after(self, y: float, x: float) -> float:
-        room = max(self.elastic - y, 0.0)
-        return y + x if x < room else float(1.0
-                                            - self._rest(max(1.0 - max(y, self.elastic), _SLIDES), x
-                                                         - room))
-
-    def _rest(self, rest: Any, x: Any) -> Any:
-        """1 - y after sliding by `x`, a number or an array, from where it was `rest`."""
-        n, e = self.exponent, self.elastic
+        if e >= 0.0:
+            return self.distance * math.log(2.0)
         if abs(n - 1.0) < _ONE:
-            return rest * (math.exp(-x / (1.0 - e)) if isinstance(x, float) else np.exp(-x /
-                                                                                        (1.0 - e)))
-        power = rest ** (1.0 - n) - (1.0 - n) * x / (1.0 - e) ** n
-        return (max(power, 0.0) if isinstance(x, float) else np.maximum(power, 0.0))**(1.0 /
-                                                                                       (1.0 - n))
+            one = (1.0 - e) * math.log(1.0 - e)
+        else:
+            one = ((1.0 - e) - (1.0 - e) ** n) / (1.0 - n)
+        return self.distance * math.log(2.0) / (1.0 + e + one)
+
+
+class _OneState(ABC):
+    """A contact of one state u. Positions and speeds are in units of d."""
+
+    states: ClassVar[int] = 1
+
+    @abstractmethod
+    def along(self, q: Array, v: Array) -> Array:
+        """Return (samples, states), relaxed at the start; exact where samples keep direction."""
+
+    @abstractmethod
+    def rate_of(self, u: Any, v: Any, m: Functions) -> Any:
+        """du/dt of one state, a number or an array."""
 
     def rate(self, states: Array, v: Array) -> Array:
         return np.asarray(self.rate_of(states[:, 0], v, ARRAYS))[:, None]
-
-    def rate_of(self, u: Any, v: Any, m: Functions) -> Any:
-        """du/dt of one state, a number or an array."""
-        e = self.elastic
-        y = m.where(v > 0.0, u, -u)
-        slides = m.larger(1.0 - y, _SLIDES) / (1.0 - e)
-        slides = slides if self.exponent == 1.0 else slides**self.exponent
-        return v * m.where(y < e, 1.0, m.where(y < 1.0, slides, 1.0 - y))
 
     def bent(self, states: Array) -> Array:
         return np.asarray(states[:, 0])
 
 
 @dataclass(frozen=True)
-class Slips:
+class _Bristles(_OneState):
+    """Y(x) of the law."""
+
+    elastic: float
+    exponent: float
+
+    def along(self, q: Array, v: Array) -> Array:
+        begin, side, which, travel = _strokes(q)
+        at, first = 0.0, np.empty(len(begin))
+        for k, (s, x) in enumerate(zip(side.tolist(), travel.tolist(), strict=True)):
+            first[k] = s * at
+            at = s * float(self._after(s * at, x))
+        x = np.abs(q - q[begin[which]])
+        return np.asarray(side[which] * self._after(first[which], x))[:, None]
+
+    def _after(self, y: Any, x: Any) -> Any:
+        """Return y after `x` more of travel, numbers or arrays."""
+        n, e = self.exponent, self.elastic
+        room = np.maximum(e - y, 0.0)
+        rest, slid = np.maximum(1.0 - np.maximum(y, e), _SLIDES), np.maximum(x - room, 0.0)
+        if abs(n - 1.0) < _ONE:
+            rest = rest * np.exp(-slid / (1.0 - e))
+        else:
+            power = rest ** (1.0 - n) - (1.0 - n) * slid / (1.0 - e) ** n
+            rest = np.maximum(power, 0.0) ** (1.0 / (1.0 - n))
+        return np.where(x < room, y + x, 1.0 - rest)
+
+    def rate_of(self, u: Any, v: Any, m: Functions) -> Any:
+        e = self.elastic
+        y = m.where(v > 0.0, u, -u)
+        slides = m.larger(1.0 - y, _SLIDES) / (1.0 - e)
+        slides = slides if self.exponent == 1.0 else slides**self.exponent
+        return v * m.where(y < e, 1.0, m.where(y < 1.0, slides, 1.0 - y))
+
+
+@dataclass(frozen=True)
+class _Breaking(_OneState):
+    """It slides at the less the faster it goes, and forgets over a travel by its speed."""
+
+    breakaway: float
+    speed: float
+
+    def along(self, q: Array, v: Array) -> Array:
+        step, between = np.diff(q), 0.5 * (v[1:] + v[:-1])
+        level = _sliding_level(between, self.breakaway, self.speed, ARRAYS)
+        kept = np.exp(-np.abs(step) / level)
+        return _recursion(kept, np.sign(step) * level * (1.0 - kept))[:, None]
+
+    def rate_of(self, u: Any, v: Any, m: Functions) -> Any:
+        level = _sliding_level(v, self.breakaway, self.speed, m)
+        return v * (1.0 - m.sign(v) * u / level)
+
+
+@dataclass(frozen=True)
+class _Slips:
     """u = Σ w_i z_i, one state z_i an element.
 
     y(x) = -1 + 2 Σ w_i min(x/X_i, 1) has the curvature of the bristles' y(x) if w(X) dX = -½ X
@@ -238,7 +235,8 @@ class Slips:
 
     elastic: float
     exponent: float
-    states = _ELEMENTS
+
+    states: ClassVar[int] = _ELEMENTS
 
     @property
     def _travels(self) -> Array:
@@ -251,67 +249,26 @@ class Slips:
         return np.asarray(1.0 + self.elastic + (1.0 - self.elastic) * mean)
 
     def along(self, q: Array, v: Array) -> Array:
-        """Return (samples, states), relaxed at the start.
-
-        Exact between the samples where they keep direction.
-        """
+        """Return (samples, states), relaxed at the start; exact where samples keep direction."""
         begin, side, which, travel = _strokes(q)
         half = 0.5 * self._travels
         at, first = np.zeros(_ELEMENTS), np.empty((len(begin), _ELEMENTS))
-        steps = (side * travel)[:, None] / half
-        for k, step in enumerate(steps):
+        for k, step in enumerate((side * travel)[:, None] / half):
             first[k] = at
             at = np.minimum(np.maximum(at + step, -1.0), 1.0)
         return np.asarray(np.clip(first[which] + (q - q[begin[which]])[:, None] / half, -1.0, 1.0))
 
-    @property
-    def _weights(self) -> Array:
-        return 0.5 * self._travels / _ELEMENTS
-
     def rate(self, states: Array, v: Array) -> Array:
         """Return d(states)/dt; what a step went too far comes back with travel."""
         s = np.sign(v)[:, None]
-        return np.asarray(
-            np.abs(v)[:, None] * np.where(s * states < 1.0, s, s - states) * 2.0 / self._travels)
+        moves = np.where(s * states < 1.0, s, s - states)
+        return np.asarray(np.abs(v)[:, None] * moves * 2.0 / self._travels)
 
     def bent(self, states: Array) -> Array:
-        return np.asarray(states @ self._weights)
+        return np.asarray(states @ (0.5 * self._travels / _ELEMENTS))
 
 
-@dataclass(frozen=True)
-class Breaking:
-    """One state u.
-
-    It slides at the less the faster it goes, and forgets over a travel that hangs on the speed.
-    """
-
-    breakaway: float
-    speed: float
-    states = 1
-
-    def along(self, q: Array, v: Array) -> Array:
-        """Return (samples, states), relaxed at the start.
-
-        Exact between the samples where they keep speed and direction.
-        """
-        step = np.diff(q)
-        level = sliding_level(0.5 * (v[1:] + v[:-1]), self.breakaway, self.speed)
-        kept = np.exp(-np.abs(step) / level)
-        return _recursion(kept, np.sign(step) * level * (1.0 - kept))[:, None]
-
-    def rate(self, states: Array, v: Array) -> Array:
-        return np.asarray(self.rate_of(states[:, 0], v, ARRAYS))[:, None]
-
-    def rate_of(self, u: Any, v: Any, m: Functions) -> Any:
-        """du/dt of one state, a number or an array."""
-        level = sliding_level(v, self.breakaway, self.speed, m)
-        return v * (1.0 - m.sign(v) * u / level)
-
-    def bent(self, states: Array) -> Array:
-        return np.asarray(states[:, 0])
-
-
-def sliding_level(v: Any, breakaway: float, speed: float, m: Functions = ARRAYS) -> Any:
+def _sliding_level(v: Any, breakaway: float, speed: float, m: Functions) -> Any:
     """h(v)"""
     over = m.smaller(abs(v), _FAST * speed) / speed
     return 1.0 + breakaway * m.exp(-over * over)
@@ -324,7 +281,7 @@ def _recursion(kept: Array, added: Array) -> Array:
     """
     long = max(1, -(-len(kept) // _SIDE_BY_SIDE))
     a, b = np.ones(_SIDE_BY_SIDE * long), np.zeros(_SIDE_BY_SIDE * long)
-    a[:len(kept)], b[:len(kept)] = kept, added
+    a[: len(kept)], b[: len(kept)] = kept, added
     a, b = (np.ascontiguousarray(x.reshape(_SIDE_BY_SIDE, long).T) for x in (a, b))
     for k in range(1, long):
         b[k] += a[k] * b[k - 1]
@@ -332,7 +289,7 @@ def _recursion(kept: Array, added: Array) -> Array:
     first = [0.0]
     for factor, more in zip(a[-1, :-1].tolist(), b[-1, :-1].tolist(), strict=True):
         first.append(factor * first[-1] + more)
-    return np.append(0.0, (a * np.array(first) + b).T.ravel()[:len(kept)])
+    return np.append(0.0, (a * np.array(first) + b).T.ravel()[: len(kept)])
 
 
 def _strokes(q: Array) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.intp], Array]:

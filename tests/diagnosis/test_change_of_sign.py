@@ -9,7 +9,7 @@ import pytest
 
 from pipelines.diagnosis.dataset import load
 from pipelines.dynamics.body import Motion
-from pipelines.effects.coulomb import Coulomb
+from pipelines.effects.friction import Coulomb
 from pipelines.io.log import Array, ExperimentLog
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.prepare import Logs, prepare

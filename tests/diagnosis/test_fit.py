@@ -11,7 +11,7 @@ from pipelines.diagnosis.config import DiagnosisConfig
 from pipelines.diagnosis.engine import Diagnosis, pose
 from pipelines.diagnosis.refit import Later
 from pipelines.diagnosis.trained import covariance
-from pipelines.effects.cogging import Cogging
+from pipelines.effects.angle import Cogging
 from pipelines.model.rows.prepare import Logs
 from tests.diagnosis.arms import hidden, wave
 from tests.diagnosis.asking import causes, diagnosed, prepared_for

@@ -11,7 +11,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipelines.effects.quadratic_drag import QuadraticDrag
+from pipelines.effects.friction import QuadraticDrag
 from pipelines.io.log import Array, ExperimentLog, Signal
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs

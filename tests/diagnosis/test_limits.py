@@ -16,7 +16,7 @@ from pipelines.diagnosis.limits import without_limit
 from pipelines.diagnosis.result import DetectionLimit, Diagnosis, Rejected
 from pipelines.dynamics.arm import Acting
 from pipelines.effects import effect_names
-from pipelines.effects.two_sigmoid import TwoSigmoid
+from pipelines.effects.friction import TwoSigmoid
 from pipelines.io.log import ExperimentLog
 from pipelines.model.rows.prepare import Logs
 from tests.diagnose.sessions import but

@@ -10,12 +10,10 @@ import pytest
 from pipelines.diagnosis.trained import parameters, told
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
+from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
-from pipelines.effects.cogging import Cogging
-from pipelines.effects.gravity_tilt import GravityTilt
-from pipelines.effects.payload import Payload
-from pipelines.effects.torque_offset import TorqueOffset
-from pipelines.effects.transmission_coupling import TransmissionCoupling
+from pipelines.effects.bodies import GravityTilt, Payload, TransmissionCoupling
+from pipelines.effects.friction import TorqueOffset
 from pipelines.io.log import Array
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, Named

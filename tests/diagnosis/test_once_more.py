@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from pipelines.effects.cogging import Cogging
+from pipelines.effects.angle import Cogging
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs
 from tests.diagnosis.asking import extended

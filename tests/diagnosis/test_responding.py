@@ -13,7 +13,7 @@ from bench.faults import make
 from pipelines.diagnosis import engine, extension
 from pipelines.diagnosis.compliance import Compliance, new_causes
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.effects.base_resonance import BaseResonance
+from pipelines.effects.soft import BaseResonance
 from pipelines.io.log import ExperimentLog
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs

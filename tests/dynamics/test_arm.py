@@ -12,6 +12,7 @@ import pytest
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.parameter import Parameter
+from pipelines.effects.angle import Cogging
 from pipelines.effects.base import (
     LARGE,
     ArmModel,
@@ -21,8 +22,7 @@ from pipelines.effects.base import (
     Quantity,
     Words,
 )
-from pipelines.effects.cogging import Cogging
-from pipelines.effects.viscous import Viscous
+from pipelines.effects.friction import Viscous
 from pipelines.errors import InputRejected, UsageError
 from pipelines.io.model_file import (
     ModelFile,

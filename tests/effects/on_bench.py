@@ -19,8 +19,7 @@ from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
 from pipelines.effects import find_effect
 from pipelines.effects.base import Effect
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.viscous import Viscous
+from pipelines.effects.friction import Coulomb, Viscous
 from pipelines.io.log import Array
 
 __all__ = ["DURATION", "arm", "effect_of", "fault", "faulty", "left_over", "machine", "motion_and_torque", "planned", "rms"]

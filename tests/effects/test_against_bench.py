@@ -15,11 +15,10 @@ from bench.plant import as_log
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
 from pipelines.dynamics.functions import NUMBERS
+from pipelines.effects.angle import Spring
 from pipelines.effects.base import Effect
+from pipelines.effects.bodies import GravityTilt, LinkLength
 from pipelines.effects.contact import Contact
-from pipelines.effects.gravity_tilt import GravityTilt
-from pipelines.effects.link_length import LinkLength
-from pipelines.effects.spring import Spring
 from pipelines.io.log import Array
 from pipelines.simulation import Experiment, Plant, run
 from tests.effects.on_bench import (

@@ -12,7 +12,7 @@ from scipy.optimize import least_squares
 
 from pipelines.dynamics.body import Array
 from pipelines.dynamics.functions import NUMBERS
-from pipelines.effects.concave_friction import ConcaveFriction
+from pipelines.effects.friction import ConcaveFriction
 from sample_logs.make_model import synthetic_arm
 
 ARM = synthetic_arm()

@@ -47,7 +47,7 @@ class LateEncoder(Said):
         return (predict or nominal)(self._shifted(motion, -values["delay"]), arm)
 
     def _shifted(self, motion: Motion, by: float) -> Motion:
-        k = self._index
+        k = self.index
         shift = {key: getattr(motion, key).copy() for key in ("q", "dq", "ddq")}
         shift["q"][:, k] += -by * motion.dq[:, k]
         shift["dq"][:, k] += -by * motion.ddq[:, k]
@@ -72,7 +72,7 @@ class Clipped(Said):
     def apply(self, motion: Motion, arm: ArmModel, values: Values, predict: Predict | None = None) -> Array:
         tau = (predict or nominal)(motion, arm)
         own = self.own(tau)
-        tau[:, self._index] += values["coefficient"] * (np.clip(own, -values["limit"], values["limit"]) - own)
+        tau[:, self.index] += values["coefficient"] * (np.clip(own, -values["limit"], values["limit"]) - own)
         return tau
 
 

@@ -7,9 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pipelines.dynamics.body import Motion
-from pipelines.effects.drive_lag import DriveLag
-from pipelines.effects.torque_crosstalk import TorqueCrosstalk
-from pipelines.effects.torque_lag import TorqueLag
+from pipelines.effects.drives import DriveLag, TorqueCrosstalk, TorqueLag
 from tests.effects.on_bench import arm as described
 
 _H, _T = 1e-3, 5e-3  # [s] sample time, time constant

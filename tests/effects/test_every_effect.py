@@ -14,8 +14,8 @@ import pytest
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.effects import all_effects, effect_names, find_effect
-from pipelines.effects.base import Effect, adds, everywhere
-from pipelines.effects.kinds import FrictionLaw
+from pipelines.effects.base import Effect, FrictionLaw, adds, everywhere
+from pipelines.effects.parameters import causes
 from pipelines.errors import UsageError
 from sample_logs.make_model import synthetic_arm
 
@@ -72,13 +72,16 @@ def without_amplitude(effect: Effect, values: dict[str, float]) -> dict[str, flo
     return shaped.values(np.zeros(len(shaped.amplitudes(values))))
 
 
-def test_every_file_is_an_effect() -> None:
-    """One file, one effect, of the same name; nothing is registered by hand."""
-    contract = {"__init__", "base", "config", "drive_apart", "kinds", "terms"}
+def test_every_entry_of_the_table_is_an_effect() -> None:
+    """Each stands once, in the file that the table says, and no effect of a file is missing from the table."""
+    assert [kind.name for kind in all_effects()] == sorted(effect_names())
+    contract = {"__init__", "base", "config", "hooks", "parameters"}
     files = {path.stem for path in FOLDER.glob("*.py")} - contract
-    assert set(effect_names()) == files
-    assert [kind.name for kind in all_effects()] == sorted(files)
-    assert {"coulomb", "viscous", "three_sigmoid"} <= files
+    assert {cause.file for cause in causes().values()} == files
+    written = re.findall(r'^    name = "(\w+)"$', "\n".join((FOLDER / f"{file}.py").read_text(encoding="utf-8") for file in files),
+                         re.MULTILINE)
+    assert sorted(written) == sorted(effect_names())
+    assert {"coulomb", "viscous", "three_sigmoid"} <= set(written)
 
 
 def _named_in(path: Path, names: set[str]) -> Iterator[str]:
@@ -89,7 +92,7 @@ def _named_in(path: Path, names: set[str]) -> Iterator[str]:
         if isinstance(node, ast.Constant) and node.value in names:
             yield str(node.value)
         elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("pipelines.effects."):
-            yield from {str(node.module).rpartition(".")[2]} & names
+            yield from {re.sub(r"(?<=[a-z])(?=[A-Z])", "_", one.name).lower() for one in node.names} & names
 
 
 @pytest.mark.slow
@@ -101,7 +104,7 @@ def test_no_effect_is_named_elsewhere(tmp_path: Path) -> None:
         if not place.startswith(("pipelines/effects/", "bench/", *MAY_NAME)):
             assert not list(_named_in(path, names)), place
     breach = tmp_path / "breach.py"
-    breach.write_text('from pipelines.effects.spring import Spring\nx = "cogging"\n')
+    breach.write_text('from pipelines.effects.angle import Spring\nx = "cogging"\n')
     assert sorted(_named_in(breach, names)) == ["cogging", "spring"]
 
 

@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Array, Motion
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.three_sigmoid import ThreeSigmoid
-from pipelines.effects.two_sigmoid import TwoSigmoid
+from pipelines.effects.friction import Coulomb, ThreeSigmoid, TwoSigmoid
 from sample_logs.make_model import FRICTION, synthetic_arm
 
 

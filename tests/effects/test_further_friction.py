@@ -10,9 +10,9 @@ from scipy.integrate import solve_ivp
 
 from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.functions import ARRAYS, NUMBERS
-from pipelines.effects.asymmetric_friction import AsymmetricFriction
-from pipelines.effects.load_friction import LoadFriction
-from pipelines.effects.position_friction import PositionFriction
+from pipelines.effects.angle import PositionFriction
+from pipelines.effects.drives import LoadFriction
+from pipelines.effects.friction import AsymmetricFriction
 from pipelines.effects.presliding import Presliding
 from sample_logs.make_model import synthetic_arm
 from tests.seeds import rarely

@@ -9,10 +9,8 @@ import pytest
 
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array, Motion
-from pipelines.effects.drive_lag import DriveLag
-from pipelines.effects.spring import Spring
-from pipelines.effects.torque_crosstalk import TorqueCrosstalk
-from pipelines.effects.torque_gain import TorqueGain
+from pipelines.effects.angle import Spring
+from pipelines.effects.drives import DriveLag, TorqueCrosstalk, TorqueGain
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.rrr_arms import random_states
 

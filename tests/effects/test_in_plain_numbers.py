@@ -9,8 +9,7 @@ from pipelines.dynamics.arm import Arm
 from pipelines.dynamics.body import Motion
 from pipelines.dynamics.functions import ARRAYS, NUMBERS
 from pipelines.effects import all_effects
-from pipelines.effects.base import Effect
-from pipelines.effects.terms import summed
+from pipelines.effects.base import Effect, summed
 from tests.effects.test_every_effect import arm, drawn, every_effect, motion, placed
 
 __all__ = ["arm", "motion"]

@@ -9,10 +9,9 @@ import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
-from pipelines.effects.cogging import Cogging
-from pipelines.effects.encoder_crosstalk import EncoderCrosstalk
-from pipelines.effects.time_delay import TimeDelay
-from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.effects.angle import Cogging
+from pipelines.effects.encoders import EncoderCrosstalk, TimeDelay
+from pipelines.effects.friction import TorqueOffset
 from sample_logs.make_model import synthetic_arm
 from tests.dynamics.rrr_arms import random_states
 

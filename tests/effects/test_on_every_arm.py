@@ -12,12 +12,10 @@ import pytest
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array, Motion
 from pipelines.effects import all_effects
-from pipelines.effects.base import Effect, everywhere
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.encoder_eccentricity import EncoderEccentricity
-from pipelines.effects.kinds import Event
-from pipelines.effects.transmission_coupling import TransmissionCoupling
-from pipelines.effects.viscous import Viscous
+from pipelines.effects.base import Effect, Event, everywhere
+from pipelines.effects.bodies import TransmissionCoupling
+from pipelines.effects.encoders import EncoderEccentricity
+from pipelines.effects.friction import Coulomb, Viscous
 from pipelines.io.robot import Drive, Joint, LinkParameters, RobotDescription
 from pipelines.io.urdf import import_urdf
 from pipelines.simulation import Plant

@@ -22,10 +22,8 @@ from pipelines.dynamics.body import Motion
 from pipelines.effects import find_effect
 from pipelines.effects.backlash import Backlash
 from pipelines.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
-from pipelines.effects.encoder_crosstalk import EncoderCrosstalk
-from pipelines.effects.encoder_eccentricity import EncoderEccentricity
-from pipelines.effects.joint_elasticity import JointElasticity
-from pipelines.effects.time_delay import TimeDelay
+from pipelines.effects.encoders import EncoderCrosstalk, EncoderEccentricity, TimeDelay
+from pipelines.effects.soft import JointElasticity
 from pipelines.io.log import Array, Controller
 from pipelines.simulation import Experiment, Plant, run, simulate_windows
 from tests.effects.on_bench import arm, fault, faulty, healthy, machine, planned, rms

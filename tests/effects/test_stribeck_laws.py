@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 
 from pipelines.dynamics.body import Array
-from pipelines.effects.stribeck import Stribeck
+from pipelines.effects.friction import Stribeck
 from sample_logs.make_model import synthetic_arm
 
 ARM = synthetic_arm()

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from pipelines.effects.spring import Spring
-from pipelines.effects.torque_offset import TorqueOffset
+from pipelines.effects.angle import Spring
+from pipelines.effects.friction import TorqueOffset
 from pipelines.excitation import discrimination as telling
 from pipelines.excitation.discrimination import Pair, best
 from pipelines.excitation.optimise import Design, Effort, design, final_problem, finished

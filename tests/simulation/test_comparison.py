@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.effects.drive_lag import DriveLag
+from pipelines.effects.drives import DriveLag
 from pipelines.errors import InputRejected
 from pipelines.io.log import ExperimentLog
 from pipelines.model.estimation.logs import Recipe

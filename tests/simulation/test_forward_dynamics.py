@@ -10,7 +10,7 @@ import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Array
-from pipelines.effects.rotor_inertia import RotorInertia
+from pipelines.effects.bodies import RotorInertia
 from pipelines.simulation.integrate import RungeKutta
 from pipelines.simulation.one_arm import OneArm
 from pipelines.simulation.plant import Plant

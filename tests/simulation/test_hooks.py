@@ -13,7 +13,7 @@ import pytest
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Motion
 from pipelines.effects.base import ArmModel, Effect, Hooks, Parameters, Values, Words
-from pipelines.effects.quadratic_drag import QuadraticDrag
+from pipelines.effects.friction import QuadraticDrag
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
 from pipelines.simulation import Plant, run

@@ -11,15 +11,11 @@ import pytest
 from pipelines.dynamics.arm import Acting
 from pipelines.dynamics.body import Array
 from pipelines.dynamics.functions import ARRAYS, NUMBERS
-from pipelines.effects.cogging import Cogging
-from pipelines.effects.gravity_tilt import GravityTilt
-from pipelines.effects.load_friction import LoadFriction
+from pipelines.effects.angle import Cogging, Spring
+from pipelines.effects.bodies import GravityTilt
+from pipelines.effects.drives import LoadFriction, TorqueCrosstalk, TorqueGain, TorqueSaturation
+from pipelines.effects.friction import Stribeck
 from pipelines.effects.presliding import Presliding
-from pipelines.effects.spring import Spring
-from pipelines.effects.stribeck import Stribeck
-from pipelines.effects.torque_crosstalk import TorqueCrosstalk
-from pipelines.effects.torque_gain import TorqueGain
-from pipelines.effects.torque_saturation import TorqueSaturation
 from pipelines.errors import InputRejected
 from pipelines.io.log import Controller
 from pipelines.simulation import Noise, Plant, run

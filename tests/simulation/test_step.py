@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.effects.coulomb import Coulomb
+from pipelines.effects.friction import Coulomb
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, Controller
 from pipelines.simulation import Noise, Plant, choose_step, run, simulate

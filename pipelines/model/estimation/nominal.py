@@ -12,8 +12,7 @@ from pipelines.dynamics.body import Motion, RigidBody
 from pipelines.dynamics.parameter import Parameter, Uncertainty
 from pipelines.dynamics.rrr import rigid_body
 from pipelines.effects import find_effect
-from pipelines.effects.base import Effect, everywhere
-from pipelines.effects.kinds import FrictionLaw
+from pipelines.effects.base import Effect, FrictionLaw, everywhere
 from pipelines.errors import UsageError
 from pipelines.io.robot import RobotDescription
 from pipelines.model.estimation.estimate import Estimate

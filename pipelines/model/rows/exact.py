@@ -21,8 +21,7 @@ import numpy as np
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
-from pipelines.effects.base import ArmModel, Effect, Quantity, adds
-from pipelines.effects.kinds import FrictionLaw
+from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Quantity, adds
 from pipelines.io.log import Array
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data

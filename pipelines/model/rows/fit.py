@@ -20,8 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.arm import Acting, Arm
-from pipelines.effects.base import Effect, Values
-from pipelines.effects.kinds import FrictionLaw
+from pipelines.effects.base import Effect, FrictionLaw, Values
 from pipelines.fit.bootstrap import apart
 from pipelines.fit.differences import difference
 from pipelines.io.log import Array

@@ -19,8 +19,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipelines.effects import find_effect
-from pipelines.effects.base import Effect
-from pipelines.effects.kinds import plainer
+from pipelines.effects.base import Effect, plainer
 from pipelines.io.log import Array
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data

@@ -18,8 +18,7 @@ import numpy as np
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.parameter import Parameter
-from pipelines.effects.base import ArmModel, Effect, Quantity
-from pipelines.effects.kinds import FrictionLaw, plainer
+from pipelines.effects.base import ArmModel, Effect, FrictionLaw, Quantity, plainer
 from pipelines.io.log import Array
 from pipelines.model.estimation.regression import Columns
 from pipelines.model.rows.data import Data

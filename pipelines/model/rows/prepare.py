@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pipelines.dynamics.arm import Arm
-from pipelines.effects.kinds import FrictionLaw
+from pipelines.effects.base import FrictionLaw
 from pipelines.errors import InputRejected
 from pipelines.io.log import Array, ExperimentLog, recording
 from pipelines.model.estimation.conditioning import cutoff_at

@@ -11,8 +11,7 @@ import numpy as np
 
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.viscous import Viscous
+from pipelines.effects.friction import Coulomb, Viscous
 from pipelines.io.log import Array, Controller, ExperimentLog
 from pipelines.simulation import Experiment, Noise, simulate
 from sample_logs.make_closed_form import (

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.torque_offset import TorqueOffset
-from pipelines.effects.viscous import Viscous
+from pipelines.effects.friction import Coulomb, TorqueOffset, Viscous
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact
 from pipelines.model.rows.fit import Refined, dissipating, driving, refine

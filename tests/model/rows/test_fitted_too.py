@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.hidden_effects.cases import SealedCase, campaign
 from benchmarks.hidden_effects.sessions import record_case
-from pipelines.effects.torque_saturation import TorqueSaturation
+from pipelines.effects.drives import TorqueSaturation
 from pipelines.model.rows.families import Wanted
 from pipelines.model.rows.prepare import Logs
 from tests.diagnosis.asking import answered, extended

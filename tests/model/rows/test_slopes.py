@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from pipelines.effects.base import Effect
-from pipelines.effects.gravity_tilt import GravityTilt
-from pipelines.effects.torque_gain import TorqueGain
-from pipelines.effects.viscous_drift import ViscousDrift
+from pipelines.effects.bodies import GravityTilt
+from pipelines.effects.drives import TorqueGain
+from pipelines.effects.friction import ViscousDrift
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, slopes_of
 from pipelines.model.rows.fit import refine

@@ -13,12 +13,9 @@ import numpy as np
 import pytest
 
 from pipelines.dynamics.body import Motion
+from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
-from pipelines.effects.cogging import Cogging
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.three_sigmoid import ThreeSigmoid
-from pipelines.effects.two_sigmoid import TwoSigmoid
-from pipelines.effects.viscous import Viscous
+from pipelines.effects.friction import Coulomb, ThreeSigmoid, TwoSigmoid, Viscous
 from pipelines.io.files import open_log
 from pipelines.io.log import Array
 from pipelines.model.estimation.logs import Recipe

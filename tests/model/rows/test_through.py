@@ -12,15 +12,11 @@ from pipelines.diagnosis.engine import pose
 from pipelines.diagnosis.screening import best_of
 from pipelines.dynamics.arm import Acting, Arm
 from pipelines.dynamics.body import Motion
+from pipelines.effects.angle import Cogging
 from pipelines.effects.base import Effect
-from pipelines.effects.cogging import Cogging
-from pipelines.effects.coulomb import Coulomb
-from pipelines.effects.drive_lag import DriveLag
-from pipelines.effects.encoder_eccentricity import EncoderEccentricity
-from pipelines.effects.load_friction import LoadFriction
-from pipelines.effects.time_delay import TimeDelay
-from pipelines.effects.torque_lag import TorqueLag
-from pipelines.effects.viscous_drift import ViscousDrift
+from pipelines.effects.drives import DriveLag, LoadFriction, TorqueLag
+from pipelines.effects.encoders import EncoderEccentricity, TimeDelay
+from pipelines.effects.friction import Coulomb, ViscousDrift
 from pipelines.io.log import Array
 from pipelines.model.estimation.logs import Recipe
 from pipelines.model.rows.exact import Exact, nominal_slopes, slopes_of
