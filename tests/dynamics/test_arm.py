@@ -14,7 +14,6 @@ from pipelines.dynamics.body import Array, Motion
 from pipelines.dynamics.parameter import Parameter
 from pipelines.effects.angle import Cogging
 from pipelines.effects.base import (
-    LARGE,
     ArmModel,
     Effect,
     Parameters,
@@ -122,7 +121,7 @@ def test_every_number_has_an_address(arm: Arm) -> None:
     assert numbers["p3"].value == pytest.approx(0.17306)
     assert numbers["p3"].origin == "known"
     assert numbers["three_sigmoid:1:b"].value == 0.6
-    assert numbers["viscous:2:coefficient"] == Parameter("coefficient", 0.4, 0.01, "N m s/rad", (0.0, LARGE))
+    assert numbers["viscous:2:coefficient"] == Parameter("coefficient", 0.4, 0.01, "N m s/rad", (0.0, 1e5))
     assert len(numbers) == 15 + 3 * 7 + 1
 
 
