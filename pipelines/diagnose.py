@@ -31,7 +31,7 @@ from pipelines.model.rows.prepare import BLOCKS, Logs, prepare
 from pipelines.report.diagnosis_report import diagnosis_report
 from pipelines.report.finding_words import summary_of
 from pipelines.report.report import Report
-from pipelines.stage import Beside, Inputs, Request, Stage, read_by_role
+from pipelines.stage import Beside, Inputs, Request, Stage, read_logs
 
 __all__ = ["STAGE", "Result", "Settings", "compute", "read", "report"]
 
@@ -71,8 +71,8 @@ def read(request: Request, settings: Settings) -> Inputs:
         InputRejected: S18, a model that cannot be used.
     """
     _refuse_strange(settings)
-    inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
-                                              "reference": settings.reference})
+    roles = {role: getattr(settings, role) for role in ("identify", "validate", "reference")}
+    inputs = read_logs(replace(request, roles=roles), settings)
     found = beside(settings, request)
     return replace(inputs, sources=(*inputs.sources, *found.sources), folders=(*inputs.folders, *found.folders),
                    material=found.material)

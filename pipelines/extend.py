@@ -43,7 +43,7 @@ from pipelines.model.rows.prepare import BLOCKS, prepare
 from pipelines.report.diagnosis_report import extension_report
 from pipelines.report.report import Report
 from pipelines.report.words import fewer_words
-from pipelines.stage import Inputs, Request, Stage, Uses, read_by_role, slug
+from pipelines.stage import Inputs, Request, Stage, Uses, read_logs, slug
 
 __all__ = ["STAGE", "Extension", "Settings", "compute", "read", "report"]
 
@@ -83,8 +83,8 @@ def read(request: Request, settings: Settings) -> Inputs:
     for text in settings.causes:
         refuse_unknown(text, "--with")
     refuse_strange(settings)
-    inputs = read_by_role(request, settings, {"identify": settings.identify, "validate": settings.validate,
-                                              "reference": settings.reference})
+    roles = {role: getattr(settings, role) for role in ("identify", "validate", "reference")}
+    inputs = read_logs(replace(request, roles=roles), settings)
     if settings.model is None:
         return replace(inputs, material=Material(None, request.tell))
     path = Path(settings.model).absolute()

@@ -53,7 +53,6 @@ from pipelines.io.sessions import (
     Request,
     check_alike,
     of_one_session,
-    read_by_role,
     read_logs,
     refuse_mixed,
 )
@@ -70,7 +69,6 @@ __all__ = [
     "Uses",
     "default_out",
     "footer_of",
-    "read_by_role",
     "read_logs",
     "refuse_foreign",
     "result_type",

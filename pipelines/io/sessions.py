@@ -8,10 +8,10 @@ Sessions differ in attributes of their logs (robot, description, day), never in 
 
 from __future__ import annotations
 
-import dataclasses
-from collections import defaultdict
+import contextlib
+from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -24,10 +24,6 @@ from pipelines.io.robot import RobotDescription
 from pipelines.io.robot_files import load_robot
 
 Key = tuple[str, str, str]  # robot's name, its description, day
-
-
-def _silent(words: str) -> None:
-    """Report no progress."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +39,8 @@ class Request:
     no_report: bool = False
     assume_units: bool = False
     format: str = "h5"  # of derived logs
-    tell: Callable[[str], None] = field(default=_silent, compare=False)  # progress, in words
+    # progress, in words
+    tell: Callable[[str], None] = field(default=lambda words: None, compare=False)
     joints: tuple[int, ...] = ()  # 1-based: the joints of every log, in this order; none: all
     # role -> paths of logs that have it, instead of their attribute
     roles: Mapping[str, Sequence[str]] = field(default_factory=dict)
@@ -101,12 +98,9 @@ class SeveralSessions(UsageError):
         return {**super().as_dict(), "sessions": [clean(name) for name in self.names]}
 
 
-def _by_role(roles: Mapping[str, Sequence[str]]) -> dict[str, tuple[Path, ...]]:
-    return {
-        role: tuple(Path(path).expanduser().absolute() for path in paths)
-        for role, paths in roles.items()
-        if paths
-    }
+def _by_role(roles: Mapping[str, Sequence[str]]) -> dict[str, list[Path]]:
+    absolute = {k: [Path(path).expanduser().absolute() for path in own] for k, own in roles.items()}
+    return {role: paths for role, paths in absolute.items() if paths}
 
 
 def read_logs(request: Request, settings: object, *, keep_rejected: bool = False) -> Inputs:
@@ -120,19 +114,21 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
             one's, and names the others.
         UsageError: C01, no such session; C02, no logs, or one for two roles; C04, no such file.
     """
-    by_role = _by_role(request.roles)
-    asked = tuple(dict.fromkeys((*request.paths, *(p for own in by_role.values() for p in own))))
-    if not asked:
+    if not request.named:
         raise UsageError("C02", "no logs", "LOGS", "name logs, or folders of logs")
-    paths, checks = find_logs(asked)
+    by_role = _by_role(request.roles)
+    paths, checks = find_logs(dict.fromkeys(request.named))
     robot = load_robot(request.robot) if request.robot is not None else None
     logs: list[Opened] = []
     rejected: list[Rejected] = []
     for index, path in enumerate(paths, 1):
         request.tell(f"reading {path.name} ({index} of {len(paths)})")
         try:
-            units, joints = request.assume_units, request.joints
-            logs.append(open_log(path, assume_units=units, joints=joints, robot=robot))
+            logs.append(
+                open_log(
+                    path, assume_units=request.assume_units, joints=request.joints, robot=robot
+                )
+            )
         except RrridError as problem:
             if problem.exit_code != InputRejected.exit_code:
                 raise
@@ -140,17 +136,16 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     if rejected and not keep_rejected:
         raise _all_of(rejected)
     names = sorted({opened.log.robot_name for opened in logs})
-    hashes = {opened.path: opened.sha256 for opened in logs}
     roles = _roles_of(by_role)
     inputs = Inputs(
         tuple(_in_role(logs, roles, by_role)),
         tuple(rejected),
         (*(robot.checks if robot is not None else ()), *checks),
         paths,
-        hashes,
+        {opened.path: opened.sha256 for opened in logs},
         folders=tuple(path for own in by_role.values() for path in own),
         robot=robot,
-        label=_label(asked[0].absolute()),
+        label=_label(request.named[0].absolute()),
         robot_name=names[0] if len(names) == 1 else "several" if names else "unknown",
         named=frozenset(roles),
     )
@@ -165,19 +160,7 @@ def read_logs(request: Request, settings: object, *, keep_rejected: bool = False
     return only(inputs, session)
 
 
-def read_by_role(
-    request: Request,
-    settings: object,
-    named: Mapping[str, Sequence[str]],
-    *,
-    keep_rejected: bool = False,
-) -> Inputs:
-    """Open the logs of the request with the roles of `named`: role -> paths."""
-    request = dataclasses.replace(request, roles=named)
-    return read_logs(request, settings, keep_rejected=keep_rejected)
-
-
-def _roles_of(by_role: Mapping[str, tuple[Path, ...]]) -> dict[Path, str]:
+def _roles_of(by_role: Mapping[str, Sequence[Path]]) -> dict[Path, str]:
     """Map every file that is named for a role to it."""
     roles: dict[Path, str] = {}
     for role, given in by_role.items():
@@ -192,10 +175,9 @@ def _in_role(
     logs: Iterable[Opened], roles: Mapping[Path, str], named: Collection[str]
 ) -> Iterable[Opened]:
     for opened in logs:
-        role = roles.get(opened.path, opened.log.role)
-        if role != opened.log.role:
-            yield dataclasses.replace(opened, log=dataclasses.replace(opened.log, role=role))
-        elif opened.path in roles or role not in named:
+        if opened.path in roles:
+            yield replace(opened, log=replace(opened.log, role=roles[opened.path]))
+        elif opened.log.role not in named:
             yield opened
 
 
@@ -226,7 +208,7 @@ def only(inputs: Inputs, session: Session) -> Inputs:
     """Return the inputs with the logs of that session alone."""
     kept = {opened.path for opened in session.logs}
     others = {opened.path for opened in inputs.logs} - kept
-    return dataclasses.replace(
+    return replace(
         inputs,
         logs=tuple(opened for opened in inputs.logs if opened.path in kept),
         robot_name=session.robot,
@@ -241,15 +223,15 @@ def apart(logs: Iterable[Opened], named: Collection[Path] = ()) -> tuple[Session
     Args:
         named: files that the user named for a role: they go with every day of their robot.
     """
-    groups = _grouped(logs, named)
+    groups = _grouped(list(logs), named)
     names = [f"{robot} {day}".strip() for robot, _, day in groups]
-    robots = [robot for robot, _, _ in groups]
+    robots = Counter(robot for robot, _, _ in groups)
     found = []
     for i, ((robot, description, day), members) in enumerate(groups.items()):
         name, own = names[i], day
         if names.count(name) > 1:
-            name, own = f"{name} ({i + 1})", "-".join(filter(None, (day, str(i + 1))))
-        own = own if robots.count(robot) > 1 else ""
+            name, own = f"{name} ({i + 1})", f"{day}-{i + 1}".strip("-")
+        own = own if robots[robot] > 1 else ""
         found.append(Session(name, robot, description, tuple(members), own))
     return tuple(found)
 
@@ -257,11 +239,11 @@ def apart(logs: Iterable[Opened], named: Collection[Path] = ()) -> tuple[Session
 def called(wanted: str, found: Collection[Session]) -> Session | None:
     """Return the session of this name, or the only one of the robot of this name."""
     of_robot = [one for one in found if one.robot == wanted]
-    by_name = next((one for one in found if one.name == wanted), None)
-    return by_name or (of_robot[0] if len(of_robot) == 1 else None)
+    fitting = [one for one in found if one.name == wanted] or of_robot
+    return fitting[0] if len(fitting) == 1 else None
 
 
-def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[Opened]]:
+def _grouped(logs: list[Opened], named: Collection[Path]) -> dict[Key, list[Opened]]:
     """Return the logs by the robot's name, its description, and the day.
 
     Reference logs go with every later day, or with the only one; a plan, and what is in `named`,
@@ -269,51 +251,43 @@ def _grouped(logs: Iterable[Opened], named: Collection[Path]) -> dict[Key, list[
     before it that has others, or with the first one after; logs without a date go with the only
     day of their robot.
     """
-    by_day = _across_midnight(list(logs))
-    groups: dict[Key, list[Opened]] = {}
-    references, meant, plans = [], [], []
-    for key, opened in by_day:
-        if opened.path in named:
-            meant.append((key, opened))
-        elif opened.log.origin == "planned":
-            plans.append((key, opened))
-        elif opened.log.role == "reference":
-            references.append((key, opened))
+    groups: dict[Key, list[Opened]] = defaultdict(list)
+    others: list[tuple[Key, Opened]] = []
+    for key, opened in _across_midnight(logs):
+        shared = opened.path in named or opened.log.origin == "planned"
+        if shared or opened.log.role == "reference":
+            others.append((key, opened))
         else:
-            groups.setdefault(key, []).append(opened)
-    if not groups:
-        _add_to_every_day(groups, meant)
-        meant = []
+            groups[key].append(opened)
+
+    def days(key: Key, without: Collection[Key] = ()) -> list[Key]:
+        return [one for one in groups if one[:2] == key[:2] and one not in without]
+
     for key in [key for key in groups if not key[2]]:
-        days = [other for other in groups if other[:2] == key[:2] and other != key]
-        if len(days) == 1:
-            groups[days[0]] += groups.pop(key)
+        if len(days(key, [key])) == 1:
+            groups[days(key, [key])[0]] += groups.pop(key)
     judging = [
-        k for k, own in groups.items() if k[2] and all(o.log.role == "validate" for o in own)
+        key for key, own in groups.items() if key[2] and all(o.log.role == "validate" for o in own)
     ]
     for key in judging:
-        days = [other for other in groups if other[:2] == key[:2] and other[2]]
-        days = sorted(set(days) - set(judging))
-        if days:
-            before = [other for other in days if other[2] <= key[2]]
-            groups[before[-1] if before else days[0]] += groups.pop(key)
-    found = tuple(groups)
-    for key, opened in references:
-        days = [other for other in found if other[:2] == key[:2]]
-        later = [other for other in days if not other[2] or key[2] <= other[2]]
-        for other in later or (days if len(days) == 1 else [key]):
-            groups.setdefault(other, []).append(opened)
-    _add_to_every_day(groups, (*meant, *plans))
+        fitted = sorted(day for day in days(key, judging) if day[2])
+        if fitted:
+            before = [day for day in fitted if day < key]
+            groups[before[-1] if before else fitted[0]] += groups.pop(key)
+    if not groups:  # what the user named alone is one session
+        for key, opened in others:
+            if opened.path in named:
+                groups[*key[:2], ""].append(opened)
+        others = [(key, opened) for key, opened in others if opened.path not in named]
+    recorded = {key: days(key) for key, _ in others}
+    for key, opened in others:
+        chosen = recorded[key]
+        if opened.path not in named and opened.log.origin != "planned":
+            later = [day for day in chosen if not day[2] or key[2] <= day[2]]
+            chosen = later or (chosen if len(chosen) == 1 else [key])
+        for day in chosen or days(key) or [(*key[:2], "")]:
+            groups[day].append(opened)
     return groups
-
-
-def _add_to_every_day(groups: dict[Key, list[Opened]], logs: Iterable[tuple[Key, Opened]]) -> None:
-    """Add each log to every day of its robot; where there is none, to one without a date."""
-    found = tuple(groups)
-    for key, opened in logs:
-        of_robot = [other for other in found if other[:2] == key[:2]]
-        for other in of_robot or [(key[0], key[1], "")]:
-            groups.setdefault(other, []).append(opened)
 
 
 def _across_midnight(logs: list[Opened]) -> list[tuple[Key, Opened]]:
@@ -322,35 +296,23 @@ def _across_midnight(logs: list[Opened]) -> list[tuple[Key, Opened]]:
     It is one session where no pause is longer than three hours, and all of it twelve. Reference
     logs and hours that are not given decide nothing.
     """
-    by_day = [(_key(opened), opened) for opened in logs]
+    keys = [(o.log.robot_name, o.log.robot_text, (o.log.recorded or "")[:10]) for o in logs]
     times: dict[Key, list[datetime]] = defaultdict(list)
-    for key, opened in by_day:
-        began = _time(opened.log.recorded)
-        if began is not None and opened.log.role != "reference":
-            times[key].append(began)
+    for key, opened in zip(keys, logs, strict=True):
+        recorded = opened.log.recorded or ""
+        if "T" in recorded and opened.log.role != "reference":
+            with contextlib.suppress(ValueError):  # 30 February
+                began = datetime.fromisoformat(recorded)
+                times[key].append(began.replace(tzinfo=began.tzinfo or UTC))
     same: dict[Key, Key] = {}
     for key, after in sorted(times.items()):
-        yesterday = (min(after) - timedelta(days=1)).date().isoformat()
-        before = (*key[:2], yesterday)
+        before = (*key[:2], (min(after) - timedelta(days=1)).date().isoformat())
         if before not in times or before in same:
             continue
         pause, whole = min(after) - max(times[before]), max(after) - min(times[before])
         if pause <= SESSIONS.pause and whole <= SESSIONS.longest:
             same[key] = before
-    return [(same.get(key, key), opened) for key, opened in by_day]
-
-
-def _key(opened: Opened) -> Key:
-    return opened.log.robot_name, opened.log.robot_text, (opened.log.recorded or "")[:10]
-
-
-def _time(recorded: str | None) -> datetime | None:
-    """Return when a log began; None where it says a day alone, or no time."""
-    try:
-        time = datetime.fromisoformat(recorded or "")
-    except ValueError:
-        return None
-    return time.replace(tzinfo=time.tzinfo or UTC) if "T" in (recorded or "") else None
+    return [(same.get(key, key), opened) for key, opened in zip(keys, logs, strict=True)]
 
 
 def of_one_session(inputs: Inputs) -> Inputs:
@@ -360,20 +322,17 @@ def of_one_session(inputs: Inputs) -> Inputs:
         SeveralSessions: C02, they are of several; --session takes one, `batch` takes all.
         UsageError: C02, they are of several robots, and some were named for a role.
     """
-    used = {}
-    for session in apart(inputs.logs, inputs.named):
-        paths = {opened.path for opened in session.logs if opened.log.origin != "planned"}
-        used[session.name] = (session, paths)
-    every = set().union(*(paths for _, paths in used.values()))
+    sessions = apart(inputs.logs, inputs.named)
+    used = [{o.path for o in one.logs if o.log.origin != "planned"} for one in sessions]
+    every = set().union(*used)
     if not every:
         return inputs
-    for session, paths in used.values():
-        if paths == every:
-            return only(inputs, session)
+    if every in used:
+        return only(inputs, sessions[used.index(every)])
     several = [
         session
-        for session, mine in used.values()
-        if not any(mine < others for _, others in used.values())
+        for session, mine in zip(sessions, used, strict=True)
+        if not any(mine < others for others in used)
     ]
     robots = len({(session.robot, session.description) for session in several})
     days = len(several) > robots
@@ -403,7 +362,7 @@ def refuse_mixed(inputs: Inputs, folders: Iterable[Path]) -> None:
     """
     for folder in folders:
         logs = tuple(opened for opened in inputs.logs if opened.path.is_relative_to(folder))
-        of_one_session(dataclasses.replace(inputs, logs=logs, label=str(folder)))
+        of_one_session(replace(inputs, logs=logs, label=str(folder)))
 
 
 def _listed(sessions: list[Session]) -> str:
@@ -411,27 +370,23 @@ def _listed(sessions: list[Session]) -> str:
     names = [clean(session.name, 60) for session in sessions]
     if len(sessions) > SESSIONS.listed:
         return "; ".join(names)
-    logs = [[o for o in session.logs if o.log.origin != "planned"] for session in sessions]
-    homes: dict[Path, set[int]] = defaultdict(set)
-    for index, own in enumerate(logs):
-        for opened in own:
-            homes[opened.path.parent].add(index)
+    logs = [[o.path for o in one.logs if o.log.origin != "planned"] for one in sessions]
+    homes = [sorted({path.parent for path in own}) for own in logs]
+    shared = Counter(folder for own in homes for folder in own)
     parts = []
-    for name, own in zip(names, logs, strict=True):
-        folders = list(dict.fromkeys(opened.path.parent for opened in own))
-        if len(folders) < SESSIONS.named and all(len(homes[folder]) == 1 for folder in folders):
-            count = f"{len(own)} log{'s' if len(own) > 1 else ''}"
-            there = f"{count} in {', '.join(clean(folder.name, 40) for folder in folders)}"
-        else:
-            there = _first_of([opened.path.name for opened in own])
+    for name, own, folders in zip(names, logs, homes, strict=True):
+        there = _first_of([path.name for path in own])
+        if len(folders) < SESSIONS.named and all(shared[folder] == 1 for folder in folders):
+            there = f"{len(own)} log{'s' if len(own) > 1 else ''} in "
+            there += _first_of([folder.name for folder in folders])
         parts.append(f"{name} ({there})")
     return "; ".join(parts)
 
 
 def _first_of(names: Sequence[str]) -> str:
-    first, rest = names[: SESSIONS.named], names[SESSIONS.named :]
-    more = f" and {len(rest)} more" if rest else ""
-    return f"{', '.join(clean(name, 40) for name in first)}{more}"
+    first = ", ".join(clean(name, 40) for name in names[: SESSIONS.named])
+    rest = len(names) - SESSIONS.named
+    return f"{first} and {rest} more" if rest > 0 else first
 
 
 def check_alike(inputs: Inputs) -> tuple[Check, ...]:
@@ -441,30 +396,25 @@ def check_alike(inputs: Inputs) -> tuple[Check, ...]:
     """
     found = []
     for session in apart(inputs.logs, inputs.named):
-        where = clean(session.name, 60)
         logs = [o for o in session.logs if o.path not in inputs.named]
         homes: dict[tuple[str, str], dict[Path, str]] = defaultdict(dict)
         for opened in logs:
             if opened.log.origin != "planned":
                 homes[opened.log.name, opened.log.role][opened.path.parent] = opened.sha256
         doubled = [own for own in homes.values() if len(set(own.values())) > 1]
-        folders = list(dict.fromkeys(folder for own in doubled for folder in own))
-        if doubled:
-            names = _first_of([folder.name for folder in folders])
-            words = f"the folders {names} hold logs of the same names, robot and day, "
-            words += "and were taken for one session"
+        if folders := dict.fromkeys(folder.name for own in doubled for folder in own):
+            words = f"the folders {_first_of(list(folders))} hold logs of the same names, robot "
+            words += "and day, and were taken for one session"
             remedy = (
                 "if they are of two machines or sessions, give each folder by itself, or let "
                 "their logs say so: robot_name, recorded"
             )
-            found.append(Check.of("S21", "warn", words, where, remedy))
-        days: dict[bool, set[str]] = {True: set(), False: set()}
-        for opened in logs:
-            if opened.log.recorded:
-                days[opened.log.role == "validate"].add(opened.log.recorded[:10])
-        alone = days[True] - days[False]
-        if days[False] and alone:
+            found.append(Check.of("S21", "warn", words, clean(session.name, 60), remedy))
+        days = [(o.log.role == "validate", (o.log.recorded or "")[:10]) for o in logs]
+        fitted = {day for judges, day in days if day and not judges}
+        alone = {day for judges, day in days if day and judges} - fitted
+        if fitted and alone:
             words = f"its logs of {max(alone)}, which all judge, were taken with it"
             remedy = "if that is another session, name its logs by --validate"
-            found.append(Check.of("S21", "warn", words, where, remedy))
+            found.append(Check.of("S21", "warn", words, clean(session.name, 60), remedy))
     return tuple(found)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -23,109 +24,56 @@ class Unit:
         return self.factor == 1.0 and self.offset == 0.0
 
 
-_TURN = 2.0 * math.pi
-_KGF, _LBF = 9.80665, 4.4482216152605  # numerics: [N] NIST SP 811 (2008), table B.8
-
-UNITS: Final[dict[str, Unit]] = {
-    # time
-    "s": Unit("time", 1.0),
-    "ms": Unit("time", 1e-3),
-    "us": Unit("time", 1e-6),
-    "ns": Unit("time", 1e-9),
-    "100 ns": Unit("time", 1e-7),
-    "min": Unit("time", 60.0),
-    "d": Unit("time", 86400.0),
-    # position, revolute and prismatic
-    "rad": Unit("position", 1.0),
-    "mrad": Unit("position", 1e-3),
-    "deg": Unit("position", math.pi / 180.0),
-    "°": Unit("position", math.pi / 180.0),
-    "rev": Unit("position", _TURN),
-    "turn": Unit("position", _TURN),
-    "mdeg": Unit("position", math.pi / 180e3),
-    "arcmin": Unit("position", math.pi / 10800.0),
-    "arcsec": Unit("position", math.pi / 648e3),
-    "m": Unit("position", 1.0),
-    "cm": Unit("position", 1e-2),
-    "mm": Unit("position", 1e-3),
-    "um": Unit("position", 1e-6),
-    # velocity
-    "rad/s": Unit("velocity", 1.0),
-    "deg/s": Unit("velocity", math.pi / 180.0),
-    "rpm": Unit("velocity", _TURN / 60.0),
-    "rev/s": Unit("velocity", _TURN),
-    "mrad/s": Unit("velocity", 1e-3),
-    "mdeg/s": Unit("velocity", math.pi / 180e3),
-    "m/s": Unit("velocity", 1.0),
-    "cm/s": Unit("velocity", 1e-2),
-    "mm/s": Unit("velocity", 1e-3),
-    # acceleration
-    "rad/s^2": Unit("acceleration", 1.0),
-    "deg/s^2": Unit("acceleration", math.pi / 180.0),
-    "rev/s^2": Unit("acceleration", _TURN),
-    "m/s^2": Unit("acceleration", 1.0),
-    "mm/s^2": Unit("acceleration", 1e-3),
-    # torque and force
-    "N m": Unit("torque", 1.0),
-    "mN m": Unit("torque", 1e-3),
-    "N mm": Unit("torque", 1e-3),
-    "N cm": Unit("torque", 1e-2),
-    "kN m": Unit("torque", 1e3),
-    "cN m": Unit("torque", 1e-2),
-    "uN m": Unit("torque", 1e-6),
-    "kgf m": Unit("torque", _KGF),
-    "kgf cm": Unit("torque", 1e-2 * _KGF),
-    "lbf ft": Unit("torque", 0.3048 * _LBF),
-    "lbf in": Unit("torque", 0.0254 * _LBF),
-    "ozf in": Unit("torque", 0.0254 * _LBF / 16.0),
-    "N": Unit("torque", 1.0),
-    "mN": Unit("torque", 1e-3),
-    "kN": Unit("torque", 1e3),
-    # current
-    "A": Unit("current", 1.0),
-    "mA": Unit("current", 1e-3),
-    "Arms": Unit("current", 1.0),  # what it is times: N m per A rms
-    # temperature
-    "degC": Unit("temperature", 1.0),
-    "°C": Unit("temperature", 1.0),
-    "K": Unit("temperature", 1.0, -273.15),
+# [N] per kgf and lbf: NIST SP 811 (2008), table B.8. A factor, or "/" and parts of a turn.
+_FACTORS: Final = {
+    "time": "s 1, ms 1e-3, us 1e-6, ns 1e-9, 100 ns 1e-7, min 60, d 86400",
+    "position": "rad 1, mrad 1e-3, deg /360, ° /360, rev /1, turn /1, mdeg /360e3, arcmin /21600, "
+    "arcsec /1296e3, m 1, cm 1e-2, mm 1e-3, um 1e-6",
+    "velocity": "rad/s 1, deg/s /360, rpm /60, rev/s /1, mrad/s 1e-3, mdeg/s /360e3, m/s 1, "
+    "cm/s 1e-2, mm/s 1e-3",
+    "acceleration": "rad/s^2 1, deg/s^2 /360, rev/s^2 /1, m/s^2 1, mm/s^2 1e-3",
+    "torque": "N m 1, mN m 1e-3, N mm 1e-3, N cm 1e-2, kN m 1e3, cN m 1e-2, uN m 1e-6, "
+    "kgf m 9.80665, kgf cm 0.0980665, lbf ft 1.3558179483314004, lbf in 0.1129848290276167, "
+    "ozf in 0.007061551814226044, N 1, mN 1e-3, kN 1e3",
+    "current": "A 1, mA 1e-3, Arms 1",  # what it is times: N m per A rms
+    "temperature": "degC 1, °C 1, K 1",
 }
 
+
+def _units() -> Iterator[tuple[str, Unit]]:
+    for quantity, units in _FACTORS.items():
+        for name, _, number in (unit.rpartition(" ") for unit in units.split(", ")):
+            turns = number.removeprefix("/")
+            factor = 2.0 * math.pi / float(turns) if turns != number else float(number)
+            yield name, Unit(quantity, factor, -273.15 if name == "K" else 0.0)
+
+
+UNITS: Final[dict[str, Unit]] = dict(_units())
 _SPELLINGS: Final = str.maketrans(
     {"·": " ", "*": " ", "⋅": " ", "•": " ", "∙": " ", "・": " ", "²": "^2", "\u03bc": "µ"}
 )
-_ALIASES = {
-    "µs": "us",
-    "Nmm": "N mm",
-    "N.mm": "N mm",
-    "Ncm": "N cm",
-    "N.cm": "N cm",
-    "rad/s2": "rad/s^2",
-    "m/s2": "m/s^2",
-    "deg/s2": "deg/s^2",
-    "1/min": "rpm",
-    "Grad": "deg",
-    "Grad/s": "deg/s",
-    "U/min": "rpm",
-    "r/min": "rpm",
-    "°": "deg",
-    "℃": "degC",
+_OTHER_SPELLINGS: Final = {
+    "rad": "弧度, ラジアン, рад, radians, radianes, radianti, radianos",
+    "deg": "°, Grad, 度, град, град., grados, degrés, gradi, graus, graden, grader, stopnie",
+    "rad/s": "弧度/秒, 弧度/s, рад/с",
+    "deg/s": "Grad/s, 度/秒, 度/s, град/с, grados/s, degrés/s, gradi/s",
+    "rpm": "1/min, U/min, r/min, 转/分, об/мин, tr/min, giri/min, obr/min, ot/min",
+    "rad/s^2": "rad/s2",
+    "deg/s^2": "deg/s2",
+    "m/s^2": "m/s2",
+    "s": "秒, с, Sekunden, secondes, segundos, secondi",
+    "ms": "毫秒, ミリ秒, мс",
+    "us": "µs, 微秒",
+    "N m": "牛米, 牛 米, 牛顿米, Нм, Н м",
+    "N mm": "Nmm, N.mm",
+    "N cm": "Ncm, N.cm",
+    "A": "安, 安培, А",
+    "mA": "毫安, мА",
+    "degC": "℃",
 }
-_IN_OTHER_LANGUAGES: Final = {
-    "rad": "弧度 ラジアン рад radians radianes radianti radianos",
-    "deg": "度 град град. grados degrés gradi graus graden grader stopnie",
-    "rad/s": "弧度/秒 弧度/s рад/с",
-    "deg/s": "度/秒 度/s град/с grados/s degrés/s gradi/s",
-    "rpm": "转/分 об/мин tr/min giri/min obr/min ot/min",
-    "s": "秒 с Sekunden secondes segundos secondi",
-    "ms": "毫秒 ミリ秒 мс",
-    "us": "微秒",
-    "N m": "牛米 牛顿米 Нм",
-    "A": "安 安培 А",
-    "mA": "毫安 мА",
+_ALIASES: Final = {
+    word: unit for unit, words in _OTHER_SPELLINGS.items() for word in words.split(", ")
 }
-_ALIASES |= {word: unit for unit, words in _IN_OTHER_LANGUAGES.items() for word in words.split()}
-_ALIASES |= {"牛 米": "N m", "Н м": "N m"}
 _WORDS: Final = (
     (r"\s*\b(?:per|pro|par|por|al)\b\s*|\s*/\s*", "/"),
     (r"\bmilli[ -]?(?=deg|rad|newton|amp|sec|met)", "m"),
@@ -148,7 +96,7 @@ _WORDS: Final = (
     (r"^min(?:ute)?s?$", "min"),
     (r"\bkg(?=[ -])", "kgf"),
     (r"(?i)^a[ _-]?rms$", "Arms"),
-    (r"\b(?:ft|in)[ -](?:lbs?|lbf|oz)\b", lambda m: _turned(m[0])),
+    (r"\b(ft|in)[ -](lb|oz)[sf]?\b", r"\2f \1"),  # people write the arm on either side
     (r"\blbs?(?=[ -])", "lbf"),
     (r"\boz(?=[ -])", "ozf"),
     (r"(?<=f)-", " "),
@@ -159,12 +107,6 @@ _WORDS: Final = (
 _SHARE: Final = re.compile(r"(\d++(?:\.\d++)?|\.\d++)?\s*+(%|‰|pct|per ?cent)", re.IGNORECASE)
 _RATED: Final = {"torque": "N m", "current": "A", "velocity": "rad/s"}
 _NO_WORDS: Final = re.compile(r"[013-9]|^.?$")  # of a unit; "s2" has a digit
-
-
-def _turned(name: str) -> str:
-    """Return "lbf ft" of "ft-lb": people write the arm on either side."""
-    arm, force = re.split("[ -]", name)
-    return f"{force.rstrip('fs')}f {arm}"
 
 
 def canonical_unit(unit: str) -> str:

@@ -21,12 +21,9 @@ from pipelines.io.schema import Array
 
 _MOVING = ("revolute", "continuous", "prismatic")
 _TYPES = (*_MOVING, "fixed", "planar", "floating")
-_OTHER_FORMATS = {
-    "mujoco": "an MJCF model (MuJoCo)",
-    "mujocoinclude": "a part of an MJCF model (MuJoCo)",
-    "sdf": "an SDF model (Gazebo)",
-    "gazebo": "an SDF model (Gazebo)",
-}
+_OTHER_FORMATS = {"mujoco": "an MJCF model (MuJoCo)", "sdf": "an SDF model (Gazebo)"}
+_OTHER_FORMATS |= {"mujocoinclude": "a part of an MJCF model (MuJoCo)"}
+_SERIAL = "only serial arms can be described"
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,10 +72,6 @@ class _Joint:
         """Return whether its one coordinate is its own."""
         return self.type in _MOVING and not self.mimics
 
-    @property
-    def rotation(self) -> Array:
-        return _rotation_of(self.rpy)
-
 
 @dataclass(frozen=True, eq=False)
 class _Tree:
@@ -87,27 +80,24 @@ class _Tree:
     name: str
     links: dict[str, Element]
     into: dict[str, _Joint]  # by child link
-    out: dict[str, list[_Joint]]  # by parent link
     root: str
     where: str  # the file, or "urdf_text"
 
-    def body(self, link: str) -> list[str]:
-        """Return `link` and all links that are fixed to it, below it."""
+    def below(self, link: str, *, fixed: bool = False, stop: tuple[str, ...] = ()) -> list[str]:
+        """Return `link` and all links below it, or those `fixed` to it; `stop` names joints."""
         found = [link]
         for name in found:  # grows meanwhile
-            found += [joint.child for joint in self.out[name] if not joint.moves]
+            for joint in self.into.values():
+                if joint.parent == name and joint.name not in stop and not (fixed and joint.moves):
+                    found.append(joint.child)
         return found
 
     def onwards(self, link: str) -> list[_Joint]:
         """Return the moving joints that leave the body of `link`."""
-        return [joint for name in self.body(link) for joint in self.out[name] if joint.moves]
-
-    def below(self, link: str, stop: set[str]) -> list[str]:
-        """Return `link` and all links below it, not going through the joints named in `stop`."""
-        found = [link]
-        for name in found:
-            found += [joint.child for joint in self.out[name] if joint.name not in stop]
-        return found
+        body = self.below(link, fixed=True)
+        return [
+            one for name in body for one in self.into.values() if one.parent == name and one.moves
+        ]
 
     def way(self, link: str) -> list[_Joint]:
         """Return the joints from the root to `link`."""
@@ -131,28 +121,25 @@ def import_urdf(path: str | Path, tip_link: str | None = None) -> RobotDescripti
     try:
         tree = _tree_of(_read(path), str(path))
         way, tip = _way_to_tip(tree, tip_link)
-        moving = [joint for joint in way if joint.moves]
-        stop = {joint.name for joint in moving}
-        joints = tuple(_described(joint, _link(tree, joint.child, stop)) for joint in moving)
+        joints = tuple(_described(tree, joint, way) for joint in way if joint.moves)
         checks = _impossible_links(tree)
     except InputRejected as problem:
         code = problem.code.removeprefix("RRID-")
         raise UsageError(code, problem.message, path, problem.remedy) from None
-    text = _canonical(tree, way)
-    gravity = (0.0, 0.0, -9.81)
+    gravity, text = (0.0, 0.0, -9.81), _canonical(tree, way)
     return RobotDescription(
         tree.name, gravity, "urdf", joints, urdf_text=text, tip_link=tip, checks=checks
     )
 
 
-def _described(joint: _Joint, link: LinkParameters | None) -> Joint:
+def _described(tree: _Tree, joint: _Joint, way: list[_Joint]) -> Joint:
     return Joint(
         joint.name,
         "prismatic" if joint.type == "prismatic" else "revolute",
         position=joint.range,
         velocity=joint.velocity,
         torque=joint.effort,
-        link=link,
+        link=_link(tree, joint.child, tuple(one.name for one in way if one.moves)),
     )
 
 
@@ -162,17 +149,27 @@ def chain_from_urdf(urdf_text: str, tip_link: str | None = None) -> UrdfChain:
     Raises:
         InputRejected: the text is not the URDF of a serial arm.
     """
-    tree = _tree_of(urdf_text, "urdf_text")
-    way, tip = _way_to_tip(tree, tip_link)
+    way, tip = _way_to_tip(_tree_of(urdf_text, "urdf_text"), tip_link)
     placed: list[JointPlacement] = []
     rotation, position = np.eye(3), np.zeros(3)
     for joint in way:
-        rotation, position = rotation @ joint.rotation, rotation @ joint.xyz + position
+        rotation, position = _placed(rotation, position, joint.xyz, joint.rpy)
         if joint.moves:
             slides = joint.type == "prismatic"
             placed.append(JointPlacement(joint.name, slides, rotation, position, joint.axis))
             rotation, position = np.eye(3), np.zeros(3)
     return UrdfChain(tuple(placed), tip, rotation, position)
+
+
+def _placed(rotation: Array, position: Array, xyz: Array, rpy: Array) -> tuple[Array, Array]:
+    """Return a frame at `xyz`, `rpy` of another: R = Rz(yaw) Ry(pitch) Rx(roll), fixed axes."""
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    turn = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return rotation @ np.array(turn), rotation @ xyz + position
 
 
 def _wrong(
@@ -213,12 +210,11 @@ def _parse(text: bytes | str) -> Element:
     def start(tag: str, attributes: dict[str, str]) -> None:
         nonlocal depth, elements
         depth, elements = depth + 1, elements + 1
-        if tag.startswith("xacro:"):
+        if tag.startswith("xacro:") or any("${" in v or "$(" in v for v in attributes.values()):
             raise _xacro()
-        if depth > URDF.depth:
-            raise _wrong(f"elements nested more than {URDF.depth} deep", code="X13")
-        if elements > URDF.elements:
-            raise _wrong(f"more than {URDF.elements} elements", code="X13")
+        if depth > URDF.depth or elements > URDF.elements:
+            words = f"more than {URDF.elements} elements, or {URDF.depth} in each other"
+            raise _wrong(words, code="X13")
         builder.start(tag, attributes)
 
     def end(tag: str) -> None:
@@ -250,31 +246,8 @@ def _tree_of(text: bytes | str, where: str) -> _Tree:
     for element in elements:
         if links.setdefault(_name(element), element) is not element:
             raise _wrong(f"two links are called '{element.get('name')}'")
-    into, out = _connected(joints, links)
-    roots = [name for name in links if name not in into]
-    if len(roots) != 1:
-        words = (
-            f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
-        )
-        loose = ", ".join(name for name in roots if not out[name])
-        more = f", or delete those without joints: {loose}" if loose else ""
-        remedy = f"connect all links into one tree{more}"
-        raise _wrong(f"there must be one root link, but {words}", remedy)
-    tree = _Tree(robot.get("name") or "robot", links, into, out, roots[0], where)
-    if len(tree.below(tree.root, set())) != len(links):
-        words = "some joints form a closed loop apart from the root"
-        raise _wrong(words, "only serial arms can be described")
-    return tree
-
-
-def _connected(
-    elements: list[Element], links: dict[str, Element]
-) -> tuple[dict[str, _Joint], dict[str, list[_Joint]]]:
-    """Return the joints by their child link, and by their parent link."""
     into: dict[str, _Joint] = {}
-    out: dict[str, list[_Joint]] = {name: [] for name in links}
-    for element in elements:
-        joint = _joint(element)
+    for joint in map(_joint, joints):
         for end in (joint.parent, joint.child):
             if end not in links:
                 words = f"joint '{joint.name}' connects link '{end}', which is not defined"
@@ -284,10 +257,21 @@ def _connected(
         if joint.child in into:
             both = f"'{into[joint.child].name}' and '{joint.name}'"
             words = f"link '{joint.child}' hangs on joints {both}: a closed loop"
-            raise _wrong(words, "only serial arms can be described")
+            raise _wrong(words, _SERIAL)
         into[joint.child] = joint
-        out[joint.parent].append(joint)
-    return into, out
+    roots = [name for name in links if name not in into]
+    if len(roots) != 1:
+        words = (
+            f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
+        )
+        loose = ", ".join(n for n in roots if all(joint.parent != n for joint in into.values()))
+        more = f", or delete those without joints: {loose}" if loose else ""
+        remedy = f"connect all links into one tree{more}"
+        raise _wrong(f"there must be one root link, but {words}", remedy)
+    tree = _Tree(robot.get("name") or "robot", links, into, roots[0], where)
+    if len(tree.below(tree.root)) != len(links):
+        raise _wrong("some joints form a closed loop apart from the root", _SERIAL)
+    return tree
 
 
 def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
@@ -302,8 +286,7 @@ def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
             what = "a mimic of another" if joint.mimics else joint.type
             words = f"joint '{joint.name}' is {what}, and an arm has independent revolute, "
             words += "continuous and prismatic joints"
-            remedy = f'make it type="fixed" in the URDF{_end_there(tree, ", or ")}'
-            raise _wrong(words, remedy)
+            raise _wrong(words, f'make it type="fixed" in the URDF{_end_there(tree, ", or ")}')
     if not any(joint.moves for joint in way):
         remedy = _end_there(tree) or "give the URDF of an arm whose joints move"
         raise _wrong(f"no joint moves between '{tree.root}' and '{tip}'", remedy)
@@ -313,18 +296,16 @@ def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
 def _only_tip(tree: _Tree) -> str:
     """Return the end of the only chain of moving joints; among links fixed to it, the first."""
     link = tree.root
-    while True:
-        onwards = tree.onwards(link)
+    while onwards := tree.onwards(link):
         if len(onwards) > 1:
             words = f"joints {', '.join(repr(joint.name) for joint in onwards)} branch off"
             remedy = _end_there(tree) or 'make those that are no joint of the arm type="fixed"'
             raise _wrong(f"{words} the same body", remedy)
-        if not onwards:
-            ends = [name for name in tree.body(link) if not tree.out[name]]
-            return ends[0] if len(ends) == 1 else link
         link = onwards[0].child
         if not onwards[0].independent:
             return link
+    ends = [n for n in tree.below(link) if all(one.parent != n for one in tree.into.values())]
+    return ends[0] if len(ends) == 1 else link
 
 
 def _end_there(tree: _Tree, before: str = "") -> str:
@@ -334,19 +315,17 @@ def _end_there(tree: _Tree, before: str = "") -> str:
     first, and before them a body that fingers branch off, not one that arms branch off.
     """
     ends: dict[str, int] = {}
-    moved = (joint.child for joint in tree.into.values() if joint.moves)
-    for link in dict.fromkeys((tree.root, *moved)):
+    for link in (tree.root, *(joint.child for joint in tree.into.values() if joint.moves)):
         way = [joint for joint in tree.way(link) if joint.moves]
         onwards = tree.onwards(link)
         goes_on = len(onwards) == 1 and onwards[0].independent
         if way and all(joint.independent for joint in way) and not goes_on:
-            end = onwards[0].parent if onwards else tree.body(link)[-1]
+            end = onwards[0].parent if onwards else tree.below(link, fixed=True)[-1]
             ends[end] = len(way) * (2 if len(onwards) > 1 else 1)
     if not ends:
         return ""
     longest = sorted(ends, key=lambda end: -ends[end])
-    file = tree.where.rpartition("/")[2]
-    named = ", ".join(f"{file}:{end}" for end in longest[:4])
+    named = ", ".join(f"{tree.where.rpartition('/')[2]}:{end}" for end in longest[:4])
     remedy = f"{before}say at which link the arm ends, after a colon: {named}"
     return f'{remedy}; in a description or a recipe also tip_link = "{longest[0]}"'
 
@@ -355,34 +334,36 @@ def _joint(element: Element) -> _Joint:
     name = _name(element)
     kind, place = element.get("type", ""), f"joint '{name}'"
     if kind not in _TYPES:
-        words = f"has type '{kind}', which must be one of {', '.join(_TYPES)}"
-        raise _wrong(f"{place} {words}")
-    ends = []
-    for side in ("parent", "child"):
-        part = element.find(side)
-        ends.append("" if part is None else part.get("link", ""))
-    if not all(ends):
+        raise _wrong(f"{place} has type '{kind}', which must be one of {', '.join(_TYPES)}")
+    parts = [element.find(side) for side in ("parent", "child")]
+    parent, child = ("" if part is None else part.get("link", "") for part in parts)
+    if not parent or not child:
         raise _wrong(f"{place} lacks its parent or child link")
-    xyz, rpy = _origin(element, place)
-    axis = _vector(element.find("axis"), "xyz", (1.0, 0.0, 0.0), place)
+    axis = _numbers(element.find("axis"), "xyz", "1 0 0", place)
     length = float(np.linalg.norm(axis))
     if kind in _MOVING and length < URDF.short:
         raise _wrong(f"{place} has an axis without direction")
     limit = element.find("limit")
     low, high, velocity, effort = (
-        _limit(limit, key, place) for key in ("lower", "upper", "velocity", "effort")
+        float(_numbers(limit, key, "0", place, bounded=False)[0])
+        for key in ("lower", "upper", "velocity", "effort")
     )
     if kind == "continuous":
         low = high = 0.0
     if velocity < 0.0 or effort < 0.0 or low > high:
-        words = "has a negative velocity or effort limit, or lower above upper"
-        raise _wrong(f"{place} {words}")
-    ranged = (-math.inf, math.inf) if low == high else (low, high)
-    axis = axis / length if length else axis
-    mimics = element.find("mimic") is not None
-    velocity, effort = velocity or math.inf, effort or math.inf
-    parent, child = ends
-    return _Joint(name, kind, parent, child, xyz, rpy, axis, ranged, velocity, effort, mimics)
+        raise _wrong(f"{place} has a negative velocity or effort limit, or lower above upper")
+    return _Joint(
+        name,
+        kind,
+        parent,
+        child,
+        *_origin(element, place),
+        axis=axis / (length or 1.0),
+        range=(-math.inf, math.inf) if low == high else (low, high),
+        velocity=velocity or math.inf,
+        effort=effort or math.inf,
+        mimics=element.find("mimic") is not None,
+    )
 
 
 def _name(element: Element) -> str:
@@ -392,78 +373,55 @@ def _name(element: Element) -> str:
     return name
 
 
-def _word(word: str, key: str, place: str) -> float:
-    if "${" in word or "$(" in word:
-        raise _xacro()
-    try:
-        return float(word.replace("_", "?"))  # Python reads 1_0 as 10, no other reader does
-    except ValueError:
-        raise _wrong(f"{place}: {key} holds '{word}', which is not a number") from None
+def _numbers(
+    element: Element | None, key: str, default: str, place: str, *, bounded: bool = True
+) -> Array:
+    """Return as many numbers of an attribute as its default has.
 
-
-def _limit(element: Element | None, key: str, place: str) -> float:
-    """Return a limit: 0 where it is missing, infinite where it is too large to be one."""
-    value = _word("0" if element is None else element.get(key, "0"), key, place)
-    if math.isnan(value):
-        raise _wrong(f"{place}: {key} is not a number")
-    return value if abs(value) < URDF.number else math.copysign(math.inf, value)
-
-
-def _number(element: Element | None, key: str, place: str) -> float:
-    """Return a finite number, 0 where it is missing."""
-    return _finite("0" if element is None else element.get(key, "0"), key, place)
-
-
-def _finite(word: str, key: str, place: str) -> float:
-    value = _word(word, key, place)
-    if not abs(value) <= URDF.number:
-        words = f"{key} holds {word}, which is not finite or absurdly large"
-        raise _wrong(f"{place}: {words}")
-    return value
-
-
-def _vector(element: Element | None, key: str, default: tuple[float, ...], place: str) -> Array:
-    text = None if element is None else element.get(key)
-    if text is None:
-        return np.array(default)
-    words = text.split()
-    if "$" not in text and len(words) != len(default):
-        raise _wrong(f"{place}: {key} must hold three numbers, not {len(words)}")
-    return np.array([_finite(word, key, place) for word in words])
+    Args:
+        bounded: refuse numbers that are too large; else they are infinite, which means no limit.
+    """
+    words = (default if element is None else element.get(key, default)).split()
+    if len(words) != len(default.split()):
+        count = "three numbers" if " " in default else "one number"
+        raise _wrong(f"{place}: {key} must hold {count}, not {len(words)}")
+    values = []
+    for word in words:
+        try:
+            values.append(float(word.replace("_", "?")))  # no other reader takes 1_0 for 10
+        except ValueError:
+            raise _wrong(f"{place}: {key} holds '{word}', which is not a number") from None
+        if not abs(values[-1]) <= URDF.number:
+            if bounded or math.isnan(values[-1]):
+                words_ = f"{key} holds {word}, which is not finite or absurdly large"
+                raise _wrong(f"{place}: {words_}")
+            values[-1] = math.copysign(math.inf, values[-1])
+    return np.array(values)
 
 
 def _origin(element: Element, place: str) -> tuple[Array, Array]:
     """Return xyz [m] and rpy [rad]."""
-    origin, zero = element.find("origin"), (0.0, 0.0, 0.0)
-    xyz = _vector(origin, "xyz", zero, place)
-    return xyz, _vector(origin, "rpy", zero, place)
+    origin = element.find("origin")
+    return _numbers(origin, "xyz", "0 0 0", place), _numbers(origin, "rpy", "0 0 0", place)
 
 
-def _rotation_of(rpy: Array) -> Array:
-    """Return R = Rz(yaw) Ry(pitch) Rx(roll): turns about fixed axes, roll first."""
-    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+def _link(tree: _Tree, first: str, stop: tuple[str, ...]) -> LinkParameters | None:
+    """Return the parameters of a moving body about its joint's frame, all fixed to it included.
 
-
-def _link(tree: _Tree, first: str, stop: set[str]) -> LinkParameters | None:
-    """Return the parameters of a moving body about its joint's frame, all fixed to it included."""
+    I_o = Σ R I_c Rᵀ + m (|c|² 1 - c cᵀ)
+    """
     placed = {first: (np.eye(3), np.zeros(3))}
     mass, moment, inertia, known = 0.0, np.zeros(3), np.zeros((3, 3)), False
-    for name in tree.below(first, stop):
+    for name in tree.below(first, stop=stop):
         if name != first:
             joint = tree.into[name]
-            r, p = placed[joint.parent]
-            placed[name] = (r @ joint.rotation, r @ joint.xyz + p)
-        element = tree.links[name].find("inertial")
-        if element is not None:
-            m, h, i = _inertial(element, *placed[name], f"link '{name}'")
-            mass, moment, inertia, known = mass + m, moment + h, inertia + i, True
+            placed[name] = _placed(*placed[joint.parent], joint.xyz, joint.rpy)
+        if (element := tree.links[name].find("inertial")) is not None:
+            m, about_com = _inertial(element, f"link '{name}'")
+            turn, c = _placed(*placed[name], *_origin(element, f"link '{name}'"))
+            parallel = m * (float(c @ c) * np.eye(3) - np.outer(c, c))
+            mass, moment, known = mass + m, moment + m * c, True
+            inertia = inertia + turn @ about_com @ turn.T + parallel
     if not known:
         return None
     x, y, z = (moment / mass if mass else np.zeros(3)).tolist()
@@ -473,27 +431,14 @@ def _link(tree: _Tree, first: str, stop: set[str]) -> LinkParameters | None:
     return LinkParameters(float(mass), (x, y, z), six)
 
 
-def _tensor(element: Element, place: str) -> Array:
-    """Return the inertia (3, 3) about the centre of mass, in the axes of <inertial>."""
-    inertia = element.find("inertia")
-    keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    xx, yy, zz, xy, xz, yz = (_number(inertia, key, place) for key in keys)
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _inertial(element: Element, r: Array, p: Array, place: str) -> tuple[float, Array, Array]:
-    """Return mass, first moment and inertia about the body's origin.
-
-    I_o = R I_c Rᵀ + m (|c|² 1 - c cᵀ)
-    """
-    mass = _number(element.find("mass"), "value", place)
+def _inertial(element: Element, place: str) -> tuple[float, Array]:
+    """Return the mass, and the inertia (3, 3) about its centre in the axes of <inertial>."""
+    mass = float(_numbers(element.find("mass"), "value", "0", place)[0])
     if mass < 0.0:
         raise _wrong(f"{place} has negative mass {mass}")
-    xyz, rpy = _origin(element, place)
-    turn = r @ _rotation_of(rpy)
-    c = r @ xyz + p
-    about_com = turn @ _tensor(element, place) @ turn.T
-    return mass, mass * c, about_com + mass * (float(c @ c) * np.eye(3) - np.outer(c, c))
+    keys, inertia = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), element.find("inertia")
+    xx, yy, zz, xy, xz, yz = (float(_numbers(inertia, key, "0", place)[0]) for key in keys)
+    return mass, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _impossible_links(tree: _Tree) -> tuple[Check, ...]:
@@ -501,10 +446,7 @@ def _impossible_links(tree: _Tree) -> tuple[Check, ...]:
     found = []
     for name, link in tree.links.items():
         element, place = link.find("inertial"), f"link '{name}'"
-        if element is None:
-            continue
-        mass = _number(element.find("mass"), "value", place)
-        if words := inconsistency(mass, _tensor(element, place)):
+        if element is not None and (words := inconsistency(*_inertial(element, place))):
             words = f"no rigid body has the inertial parameters of {place}: {words}"
             remedy = "correct them in the URDF: what is known of its links is used"
             found.append(Check.of("S17", "warn", words, tree.where, remedy))
@@ -521,12 +463,11 @@ def _canonical(tree: _Tree, way: list[_Joint]) -> str:
     lines = [f"<robot name={quoteattr(tree.name)}>", f"  <link name={quoteattr(tree.root)}/>"]
     for joint in way:
         low, high = joint.range
-        limits = {"velocity": joint.velocity, "effort": joint.effort}
-        kind = joint.type
-        if kind == "revolute" and math.isinf(low) and math.isinf(high):
-            kind = "continuous"
+        limits, kind = {"velocity": joint.velocity, "effort": joint.effort}, joint.type
         if math.isfinite(low) or math.isfinite(high):  # an end that is left out would be 0
             limits |= {"lower": max(low, -URDF.no_limit), "upper": min(high, URDF.no_limit)}
+        elif kind == "revolute":
+            kind = "continuous"
         lines += [
             f"  <link name={quoteattr(joint.child)}/>",
             f'  <joint name={quoteattr(joint.name)} type="{kind}">',
