@@ -13,23 +13,19 @@ import dataclasses
 import json
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from pipelines.errors import InputRejected, did_you_mean
+from pipelines.errors import InputRejected
 from pipelines.io.config import FORMAT as LIMITS
 from pipelines.io.output import write_text
 from pipelines.io.results import encode, json_text
 from pipelines.io.robot import shipped
 from pipelines.io.sandbox import read_small_text, regular_file
-from pipelines.io.schema import DRAFT, Array, Strict, adapter, described
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
-
+from pipelines.io.schema import DRAFT, Array, Strict, adapter, described, fault_in_words
 
 FORMAT = "rrrid-model"
 FORMAT_VERSION = 1  # numerics
@@ -175,8 +171,8 @@ def parse_model(text: str, where: object = "") -> ModelFile:
     try:
         model: ModelFile = adapter(ModelFile).validate_json(text)
     except ValidationError as problem:
-        fault = problem.errors(include_url=False)[0]
-        raise _wrong(_fault_in_words(fault), where) from None
+        kinds = (StoredValue, StoredParameter, StoredEffect, Validity, Source, ModelFile)
+        raise _wrong(fault_in_words(problem, *kinds)[1], where) from None
     for words in _implausible(model):
         raise _wrong(words, where)
     return model
@@ -197,18 +193,6 @@ def _implausible(model: ModelFile) -> Iterator[str]:
         for limits in getattr(model.validity, key, None) or ():
             if limits is not None and limits[0] > limits[1]:
                 yield f"validity.{key} runs from {limits[0]} to {limits[1]}"
-
-
-def _fault_in_words(fault: ErrorDetails) -> str:
-    place = [x for x in fault["loc"] if isinstance(x, int) or not x.startswith("nullable")]
-    words = "".join(f"[{x}]" if isinstance(x, int) else f".{x}" for x in place).lstrip(".")
-    if fault["type"] == "unexpected_keyword_argument":
-        kinds = (StoredValue, StoredParameter, StoredEffect, Validity, Source, ModelFile)
-        known = {one.name for kind in kinds for one in fields(kind)}
-        return f"{words} is not a key of the format{did_you_mean(str(place[-1]), known)}"
-    if fault["type"] in ("missing", "missing_argument"):
-        return f"{words} is missing"
-    return f"{words}: {fault['msg'].lower()}"
 
 
 def model_text(model: ModelFile) -> str:

@@ -11,24 +11,20 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from pipelines.errors import Check, InputRejected, RrridError, UsageError, did_you_mean
 from pipelines.io.config import URDF
 from pipelines.io.sandbox import TomlError, parse_toml
-from pipelines.io.schema import Array, Strict, adapter, described
-
-if TYPE_CHECKING:
-    from pydantic_core import ErrorDetails
+from pipelines.io.schema import Array, Strict, adapter, described, fault_in_words
 
 Vector = tuple[float, float, float]
 Six = tuple[float, float, float, float, float, float]
 
-_GEOMETRY = ("a", "alpha", "d", "offset")
 _CORRECT = "correct the robot description"
 _TEXT = r"^[^\x00]*[^\x00\s][^\x00]*$"
 
@@ -146,133 +142,102 @@ def parse_robot(text: str, *, where: object = "", inside_log: bool = False) -> R
     fail: type[RrridError] = InputRejected if inside_log else UsageError
     try:
         table = parse_toml(text)
-        _refuse_incomplete(table)
-        text = json.dumps(table, default=str)  # TOML has dates
-        found: _Table = adapter(_Table).validate_json(text)
-        _refuse_impossible(found)
+        if lacks := _incomplete(table):
+            raise fail("C02", f"robot description, {lacks[0]}", where, lacks[1])
+        found: _Table = adapter(_Table).validate_json(json.dumps(table, default=str))  # of dates
     except TomlError as problem:
         words = f"the robot description is not valid TOML: {problem}"
         raise fail("C01", words, where, "correct it at that place") from None
     except ValidationError as problem:
-        code, words = _fault_in_words(problem.errors(include_url=False)[0])
+        kind, words = fault_in_words(
+            problem, _Table, _Kinematics, Joint, LinkParameters, Drive, first=1
+        )
+        code = "C01" if kind == "unknown" else "C02"
         raise fail(code, f"robot description, {words}", where, _CORRECT) from None
-    except UsageError as problem:
-        raise fail("C02", problem.message, where, problem.remedy) from None
+    if impossible := _impossible(found):
+        raise fail("C02", f"robot description, {impossible[0]}", where, impossible[1])
     own = found.kinematics
-    urdf_text = own.urdf_text if own.convention == "urdf" else None
     return RobotDescription(
         found.name,
         found.gravity,
         own.convention,
         found.joint,
         own.tool,
-        urdf_text,
+        own.urdf_text if own.convention == "urdf" else None,
         own.tip_link,
         found.drive,
     )
 
 
-def _wrong(words: str, remedy: str = _CORRECT) -> UsageError:
-    return UsageError("C02", f"robot description, {words}", remedy=remedy)
-
-
-def _refuse_incomplete(table: Mapping[str, Any]) -> None:
-    """Name at once all that a joint lacks, and a URDF that only its file can reach."""
+def _incomplete(table: Mapping[str, Any]) -> tuple[str, str] | None:
+    """Say at once all that a joint lacks, and of a URDF that only its file can reach."""
     kinematics, joints = table.get("kinematics"), table.get("joint")
     if not isinstance(kinematics, dict) or not isinstance(joints, list):
-        return
-    urdf = kinematics.get("convention") == "urdf"
+        return None
     if "urdf" in kinematics:
         words = "kinematics.urdf: names a file, which a text on its own cannot reach"
-        remedy = "load the description from its file, so that the URDF can be embedded"
-        raise _wrong(words, remedy)
+        return words, "load the description from its file, so that the URDF can be embedded"
+    urdf = kinematics.get("convention") == "urdf"
     if urdf and "urdf_text" not in kinematics:
-        raise _wrong("kinematics.urdf_text: is missing with convention 'urdf'")
-    wanted = ("name", "type") if urdf else ("name", "type", *_GEOMETRY)
+        return "kinematics.urdf_text: is missing with convention 'urdf'", _CORRECT
+    wanted = ("name", "type") if urdf else ("name", "type", "a", "alpha", "d", "offset")
     for index, joint in enumerate(joints, 1):
         missing = [key for key in wanted if isinstance(joint, dict) and key not in joint]
         if missing:
-            words = f"joint[{index}]: {', '.join(missing)} "
-            words += "is missing" if len(missing) == 1 else "are missing"
+            verb = "is" if len(missing) == 1 else "are"
             example = {"name": '"elbow"', "type": '"revolute"', "a": "0.4"}
             least = ", ".join(f"{key} = {example.get(key, '0.0')}" for key in wanted)
-            raise _wrong(words, f"write at least: [[joint]] {least}, a line each")
+            words = f"joint[{index}]: {', '.join(missing)} {verb} missing"
+            return words, f"write at least: [[joint]] {least}, a line each"
+    return None
 
 
-def _refuse_impossible(table: _Table) -> None:
-    """Refuse lengths and twists in another unit, empty ranges, and drives of another size."""
+def _impossible(table: _Table) -> tuple[str, str] | None:
+    """Say what has another unit, an empty range, or another number of joints."""
     for index, joint in enumerate(table.joint, 1):
         place = f"joint[{index}]"
         if abs(joint.alpha) > 2 * math.pi:
             words = f"{place}.alpha: is {joint.alpha:g} rad: looks like degrees"
-            raise _wrong(words, "write it in rad")
-        for key in ("a", "d"):
-            if abs(getattr(joint, key)) > URDF.longest:
-                words = f"{place}.{key}: is {getattr(joint, key):g} m: looks like mm"
-                raise _wrong(words, "write it in m")
+            return words, "write it in rad"
+        for key, length in (("a", joint.a), ("d", joint.d)):
+            if abs(length) > URDF.longest:
+                return f"{place}.{key}: is {length:g} m: looks like mm", "write it in m"
         low, high = joint.position
         if not low < high:
             words = f"{place}.position: its lower end {low} is not below its upper end {high}"
-            raise _wrong(words)
-    n = len(table.joint)
-    if table.drive is not None:
-        rows = table.drive.transmission or ((0.0,) * n,) * n
-        constants = table.drive.torque_constant or (0.0,) * n
-        if len(rows) != n or any(len(row) != n for row in rows):
-            raise _wrong(f"drive.transmission: must hold {n} rows of {n} numbers")
-        if len(constants) != n:
-            raise _wrong(f"drive.torque_constant: must be a list of {n} numbers")
-
-
-def _fault_in_words(fault: ErrorDetails) -> tuple[str, str]:
-    """Return the code and the words of what pydantic found."""
-    place = ""
-    for part in fault["loc"]:
-        place += f"[{part + 1}]" if isinstance(part, int) else f".{part}" if place else part
-    if fault["type"] == "unexpected_keyword_argument":
-        kinds = (_Table, _Kinematics, Joint, LinkParameters, Drive)
-        known = {one.name for kind in kinds for one in fields(kind)} | {"urdf"}
-        hint = did_you_mean(str(fault["loc"][-1]), known)
-        return "C01", f"{place}: is not a key of the format{hint}"
-    if fault["type"] in ("missing", "missing_argument"):
-        return "C02", f"{place}: is missing"
-    if fault["type"] == "dataclass_type":
-        return "C02", f"{place}: must be a table"
-    return "C02", f"{place}: {fault['msg'].lower()}"
+            return words, _CORRECT
+    n, drive = len(table.joint), table.drive or Drive()
+    for key, value in (
+        ("transmission", drive.transmission),
+        ("torque_constant", drive.torque_constant),
+        *(("transmission", row) for row in drive.transmission or ()),
+    ):
+        if value is not None and len(value) != n:
+            return f"drive.{key}: a row of {len(value)} for {n} joints", _CORRECT
+    return None
 
 
 def format_robot(robot: RobotDescription) -> str:
     """Return the canonical TOML text of `robot`: `parse_robot` gives back an equal description."""
     import tomli_w
 
-    kinematics = {"convention": robot.convention, "tool": robot.tool}
-    kinematics |= _given({"tip_link": robot.tip_link, "urdf_text": robot.urdf_text})
-    joints = [_joint_table(joint, robot.convention) for joint in robot.joints]
-    table = {
-        "name": robot.name,
-        "gravity": robot.gravity,
-        "kinematics": kinematics,
-        "joint": joints,
-    }
-    if robot.drive is not None:
-        table["drive"] = _given(asdict(robot.drive))
-    return tomli_w.dumps(table, multiline_strings=True)
+    own: dict[str, Any] = {"convention": robot.convention, "tool": robot.tool}
+    own |= {"tip_link": robot.tip_link, "urdf_text": robot.urdf_text}
+    table: dict[str, Any] = {"name": robot.name, "gravity": robot.gravity, "kinematics": own}
+    table["joint"] = [asdict(joint) for joint in robot.joints]
+    for joint in table["joint"]:
+        for key in ("velocity", "acceleration", "torque"):
+            joint[key] = joint[key] if math.isfinite(joint[key]) else None
+        if robot.convention == "urdf":
+            joint |= {"a": None, "alpha": None, "d": None, "offset": joint["offset"] or None}
+    table["drive"] = robot.drive and asdict(robot.drive)
+    return tomli_w.dumps(_without_none(table), multiline_strings=True)
 
 
-def _given(values: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in values.items() if value is not None}
-
-
-def _joint_table(joint: Joint, convention: str) -> dict[str, Any]:
-    table = _given(asdict(joint))
-    if convention == "urdf":
-        del table["a"], table["alpha"], table["d"]
-        if not joint.offset:
-            del table["offset"]
-    for key in ("velocity", "acceleration", "torque"):
-        if not math.isfinite(table[key]):
-            del table[key]
-    return table
+def _without_none(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_none(item) for key, item in value.items() if item is not None}
+    return [_without_none(item) for item in value] if isinstance(value, list) else value
 
 
 def inconsistency(mass: float, inertia: Array) -> str:

@@ -14,7 +14,6 @@ from pipelines.io.robot import Joint, RobotDescription, inconsistency_of_link, p
 from pipelines.io.sandbox import TomlError, parse_toml, read_small_text
 
 _URDF = (".urdf", ".xacro")
-_HERE, _SHIPPED = "robot.toml", "rrr"  # where none is named
 
 
 def load_robot(source: str | Path, tip_link: str | None = None) -> RobotDescription:
@@ -29,12 +28,11 @@ def load_robot(source: str | Path, tip_link: str | None = None) -> RobotDescript
     """
     path, tip = _file_and_tip(source)
     tip = tip_link or tip
-    ending = path.suffix.lower()
-    if ending in ENDINGS:
+    if path.suffix.lower() in ENDINGS:
         return open_log(path).log.robot
-    what = "a robot description (TOML) or a URDF"
-    text = "" if ending in _URDF else read_small_text(path, what=what)
-    if ending in _URDF or text.lstrip("\ufeff \t\n").startswith("<"):
+    is_urdf = path.suffix.lower() in _URDF
+    text = "" if is_urdf else read_small_text(path, what="a robot description (TOML) or a URDF")
+    if is_urdf or text.lstrip("\ufeff \t\n").startswith("<"):
         return _from_urdf(path, tip)
     if tip:
         words = "the link at which the arm ends is given for a URDF, and this is a description"
@@ -64,9 +62,9 @@ def split_tip(source: str) -> tuple[str, str | None]:
 
 def robot_at_hand() -> tuple[str, str]:
     """Return a robot where none was named, for `load_robot`, and why it is that one."""
-    if Path(_HERE).is_file():
-        return _HERE, f"none was named: {_HERE} here"
-    return _SHIPPED, f"none was named, and no {_HERE} is here: the shipped {_SHIPPED}"
+    if Path("robot.toml").is_file():
+        return "robot.toml", "none was named: robot.toml here"
+    return "rrr", "none was named, and no robot.toml is here: the shipped rrr"
 
 
 def _split_file(path: Path) -> tuple[Path, str | None]:
@@ -85,10 +83,9 @@ def _file_and_tip(source: str | Path) -> tuple[Path, str | None]:
     try:
         return shipped("robots", str(path)), tip
     except UsageError as problem:
-        if not os.path.isdir(path):
-            raise
-        words = "a folder, not the description of a robot"
-        raise UsageError("C04", words, source, problem.remedy) from None
+        if os.path.isdir(path):
+            problem.message = "a folder, not the description of a robot"
+        raise
 
 
 def _table_of(text: str) -> dict[str, Any]:
@@ -103,11 +100,9 @@ def _refuse_recipe(table: dict[str, Any], path: Path) -> None:
     """Refuse a recipe of `rrrid import` where the robot is wanted (C02)."""
     if "kinematics" in table or not {"log", "file", "time", "signals"} & set(table):
         return
-    remedy = "give a robot description (TOML), a URDF or a shipped robot"
-    robot = table.get("robot")
+    remedy, robot = "give a robot description (TOML), a URDF or a shipped robot", table.get("robot")
     if isinstance(robot, dict) and isinstance(use := robot.get("use"), str):
-        here = path.parent / use
-        use = str(here) if os.path.lexists(here) else use
+        use = str(path.parent / use) if os.path.lexists(path.parent / use) else use
         tip = robot.get("tip_link")
         remedy = f"give the robot that it names: {f'{use}:{tip}' if tip else use}"
     words = "this is a recipe of rrrid import, not a robot description"
@@ -118,8 +113,7 @@ def _impossible_links(robot: RobotDescription, path: Path) -> tuple[Check, ...]:
     """Warn of every link of a description that no rigid body can be (S20)."""
     checks = []
     for joint in robot.joints:
-        words = inconsistency_of_link(joint.link) if joint.link is not None else ""
-        if words:
+        if joint.link is not None and (words := inconsistency_of_link(joint.link)):
             words = f"no rigid body has the inertial parameters of joint '{joint.name}': {words}"
             remedy = "correct its link: what is known of the links is used"
             checks.append(Check.of("S20", "warn", words, path, remedy))
@@ -138,9 +132,9 @@ def _with_urdf(table: dict[str, Any], path: Path) -> RobotDescription:
     import tomli_w
 
     kinematics = table["kinematics"]
-    file, after_colon = _split_file(path.parent / kinematics.pop("urdf"))
-    tip = kinematics.get("tip_link")
-    arm = _from_urdf(file, tip if isinstance(tip, str) else after_colon)
+    file, tip = _split_file(path.parent / kinematics.pop("urdf"))
+    given = kinematics.get("tip_link")
+    arm = _from_urdf(file, given if isinstance(given, str) else tip)
     kinematics["urdf_text"] = arm.urdf_text
     table.setdefault("joint", [{"name": joint.name, "type": joint.type} for joint in arm.joints])
     described = parse_robot(tomli_w.dumps(table), where=path)
@@ -148,16 +142,15 @@ def _with_urdf(table: dict[str, Any], path: Path) -> RobotDescription:
         words = f"{described.n_joints} [[joint]] tables, but the URDF has {arm.n_joints}"
         remedy = "describe each moving joint once, or none"
         raise UsageError("S02", f"{words} moving joints", path, remedy)
-    joints = []
+    joints, plain = [], Joint("")
     for mine, urdf in zip(described.joints, arm.joints, strict=True):
-        plain = Joint(mine.name)
-        keys = ("position", "velocity", "torque", "link")
-        given = {
-            key: getattr(urdf, key) for key in keys if getattr(mine, key) == getattr(plain, key)
+        filled = {
+            key: getattr(urdf, key)
+            for key in ("position", "velocity", "torque", "link")
+            if getattr(mine, key) == getattr(plain, key)
         }
-        joints.append(replace(mine, type=urdf.type, **given))
-    tip_link, checks = arm.tip_link, arm.checks
-    return replace(described, joints=tuple(joints), tip_link=tip_link, checks=checks)
+        joints.append(replace(mine, type=urdf.type, **filled))
+    return replace(described, joints=tuple(joints), tip_link=arm.tip_link, checks=arm.checks)
 
 
 def _from_urdf(path: Path, tip_link: str | None) -> RobotDescription:

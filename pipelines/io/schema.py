@@ -20,7 +20,7 @@ import numpy.typing as npt
 from pipelines.errors import InputRejected, did_you_mean
 
 if TYPE_CHECKING:
-    from pydantic import TypeAdapter
+    from pydantic import TypeAdapter, ValidationError
     from pydantic_core import ErrorDetails
 
 Array = npt.NDArray[np.float64]
@@ -204,6 +204,26 @@ def adapter(kind: Any) -> TypeAdapter[Any]:
     from pydantic import TypeAdapter
 
     return TypeAdapter(kind)
+
+
+def fault_in_words(problem: ValidationError, *kinds: Any, first: int = 0) -> tuple[str, str]:
+    """Return the first fault that pydantic found: "unknown", "missing" or "wrong", and its words.
+
+    Args:
+        kinds: the dataclasses whose fields are known.
+        first: number of the first item of a list: 0 in JSON, 1 in texts of people.
+    """
+    fault = problem.errors(include_url=False)[0]
+    path = [x for x in fault["loc"] if isinstance(x, int) or not x.startswith("nullable")]
+    place = "".join(f"[{x + first}]" if isinstance(x, int) else f".{x}" for x in path).lstrip(".")
+    if fault["type"] == "unexpected_keyword_argument":
+        known = {one.name for kind in kinds for one in dataclasses.fields(kind)}
+        hint = did_you_mean(str(path[-1]), known)
+        return "unknown", f"{place} is not a key of the format{hint}"
+    if fault["type"] in ("missing", "missing_argument"):
+        return "missing", f"{place} is missing"
+    words = "must be a table" if fault["type"] == "dataclass_type" else fault["msg"].lower()
+    return "wrong", f"{place}: {words}"
 
 
 def plain(value: object) -> Any:

@@ -260,34 +260,41 @@ def _grouped(logs: list[Opened], named: Collection[Path]) -> dict[Key, list[Open
         else:
             groups[key].append(opened)
 
-    def days(key: Key, without: Collection[Key] = ()) -> list[Key]:
-        return [one for one in groups if one[:2] == key[:2] and one not in without]
-
-    for key in [key for key in groups if not key[2]]:
-        if len(days(key, [key])) == 1:
-            groups[days(key, [key])[0]] += groups.pop(key)
-    judging = [
-        key for key, own in groups.items() if key[2] and all(o.log.role == "validate" for o in own)
-    ]
-    for key in judging:
-        fitted = sorted(day for day in days(key, judging) if day[2])
-        if fitted:
-            before = [day for day in fitted if day < key]
-            groups[before[-1] if before else fitted[0]] += groups.pop(key)
+    _join_days(groups)
     if not groups:  # what the user named alone is one session
         for key, opened in others:
             if opened.path in named:
                 groups[*key[:2], ""].append(opened)
         others = [(key, opened) for key, opened in others if opened.path not in named]
-    recorded = {key: days(key) for key, _ in others}
+    recorded = {key: _days(groups, key) for key, _ in others}
     for key, opened in others:
         chosen = recorded[key]
         if opened.path not in named and opened.log.origin != "planned":
             later = [day for day in chosen if not day[2] or key[2] <= day[2]]
             chosen = later or (chosen if len(chosen) == 1 else [key])
-        for day in chosen or days(key) or [(*key[:2], "")]:
+        for day in chosen or _days(groups, key) or [(*key[:2], "")]:
             groups[day].append(opened)
     return groups
+
+
+def _days(groups: Iterable[Key], key: Key) -> list[Key]:
+    """Return the groups of the same robot as `key`."""
+    return [one for one in groups if one[:2] == key[:2]]
+
+
+def _join_days(groups: dict[Key, list[Opened]]) -> None:
+    """Join logs without a date, and days of which all logs judge, with the day they belong to."""
+    for key in [key for key in groups if not key[2]]:
+        days = [day for day in _days(groups, key) if day != key]
+        if len(days) == 1:
+            groups[days[0]] += groups.pop(key)
+    judging = [
+        key for key, own in groups.items() if key[2] and all(o.log.role == "validate" for o in own)
+    ]
+    for key in judging:
+        if days := sorted(day for day in _days(groups, key) if day[2] and day not in judging):
+            before = [day for day in days if day < key]
+            groups[before[-1] if before else days[0]] += groups.pop(key)
 
 
 def _across_midnight(logs: list[Opened]) -> list[tuple[Key, Opened]]:

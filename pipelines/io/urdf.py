@@ -7,6 +7,7 @@ chain = chain_from_urdf(robot.urdf_text)     the placements of the joints, for g
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, TreeBuilder
@@ -259,19 +260,22 @@ def _tree_of(text: bytes | str, where: str) -> _Tree:
             words = f"link '{joint.child}' hangs on joints {both}: a closed loop"
             raise _wrong(words, _SERIAL)
         into[joint.child] = joint
-    roots = [name for name in links if name not in into]
-    if len(roots) != 1:
-        words = (
-            f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
-        )
-        loose = ", ".join(n for n in roots if all(joint.parent != n for joint in into.values()))
-        more = f", or delete those without joints: {loose}" if loose else ""
-        remedy = f"connect all links into one tree{more}"
-        raise _wrong(f"there must be one root link, but {words}", remedy)
-    tree = _Tree(robot.get("name") or "robot", links, into, roots[0], where)
+    tree = _Tree(robot.get("name") or "robot", links, into, _root(links, into), where)
     if len(tree.below(tree.root)) != len(links):
         raise _wrong("some joints form a closed loop apart from the root", _SERIAL)
     return tree
+
+
+def _root(links: Iterable[str], into: dict[str, _Joint]) -> str:
+    """Return the only link that hangs on no joint."""
+    roots = [name for name in links if name not in into]
+    if len(roots) == 1:
+        return roots[0]
+    words = f"links {', '.join(roots)} hang on nothing" if roots else "every link hangs on another"
+    loose = ", ".join(n for n in roots if all(joint.parent != n for joint in into.values()))
+    more = f", or delete those without joints: {loose}" if loose else ""
+    remedy = f"connect all links into one tree{more}"
+    raise _wrong(f"there must be one root link, but {words}", remedy)
 
 
 def _way_to_tip(tree: _Tree, tip_link: str | None) -> tuple[list[_Joint], str]:
